@@ -1,0 +1,71 @@
+"""Ant Colony Learning: colonies of ants that learn control policies.
+
+Each slot of a Gymnasium vector environment is one ant; all share one table of
+pheromone over (state, action) pairs (J. M. van Ast, Delft 2010).
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from acl_gym.registration import register_environments
+
+if TYPE_CHECKING:
+    from acl_gym.agents.acl import ACL
+    from acl_gym.agents.q_iteration import fuzzy_q_iteration
+    from acl_gym.agents.q_learning import QLearning
+    from acl_gym.agents.sb3 import VectorEnvAdapter
+    from acl_gym.callbacks import Callback, PolicyEvaluation
+    from acl_gym.envs.wrappers import ScaledObservation, ScaledVectorObservation
+    from acl_gym.evaluation import PolicyCost, evaluate_policy_cost
+    from acl_gym.partition import Crisp, Fuzzy, Partition
+
+__version__ = "0.1.0"
+
+# Name -> module. Modules are imported on first use: compiled kernels and torch cost
+# seconds that `gym.make` on another environment should not pay.
+_PUBLIC = {
+    "ACL": "acl_gym.agents.acl",
+    "Callback": "acl_gym.callbacks",
+    "Crisp": "acl_gym.partition",
+    "Fuzzy": "acl_gym.partition",
+    "Partition": "acl_gym.partition",
+    "PolicyCost": "acl_gym.evaluation",
+    "PolicyEvaluation": "acl_gym.callbacks",
+    "QLearning": "acl_gym.agents.q_learning",
+    "ScaledObservation": "acl_gym.envs.wrappers",
+    "ScaledVectorObservation": "acl_gym.envs.wrappers",
+    "VectorEnvAdapter": "acl_gym.agents.sb3",
+    "evaluate_policy_cost": "acl_gym.evaluation",
+    "fuzzy_q_iteration": "acl_gym.agents.q_iteration",
+}
+
+__all__ = [
+    "ACL",
+    "Callback",
+    "Crisp",
+    "Fuzzy",
+    "Partition",
+    "PolicyCost",
+    "PolicyEvaluation",
+    "QLearning",
+    "ScaledObservation",
+    "ScaledVectorObservation",
+    "VectorEnvAdapter",
+    "__version__",
+    "evaluate_policy_cost",
+    "fuzzy_q_iteration",
+]
+
+register_environments()
+
+
+def __getattr__(name: str) -> Any:
+    if name in _PUBLIC:
+        return getattr(import_module(_PUBLIC[name]), name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted([*globals(), *_PUBLIC])

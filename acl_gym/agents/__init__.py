@@ -1,0 +1,1 @@
+"""Agents: the colony and the reinforcement-learning methods to compare it with."""

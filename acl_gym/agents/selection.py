@@ -1,0 +1,225 @@
+"""How an ant chooses its action: the three rules of §3.3.1, and the greedy policy.
+
+All are written over `(index, degree)`: with one cell a state they are the crisp rules.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from acl_gym.agents.pheromone import BoolArray, Pheromone
+from acl_gym.partition import CellArray, FloatArray, IntArray
+
+RULES = ("boltzmann", "epsilon_greedy", "max_boltzmann")
+
+
+def choose_actions(
+    rule: str,
+    pheromone: Pheromone,
+    index: CellArray,
+    degree: FloatArray,
+    epsilon: float,
+    rng: np.random.Generator,
+) -> IntArray:
+    """Choose an action for each ant; all choose on the same pheromone.
+
+    - `"boltzmann"` (3.4), fuzzy (4.11): in proportion to the degree-weighted mean of
+      tau^alpha / sum of tau^alpha. `epsilon` is not used.
+    - `"epsilon_greedy"` (3.5): the best action of (4.16), ties broken at random; with
+      probability epsilon any action.
+    - `"max_boltzmann"` (3.6): Boltzmann; with probability epsilon any action.
+
+    Args:
+        rule: one of `RULES`.
+        pheromone: the shared table; stale probabilities are repaired in passing.
+        index: cells of the ants' states, `(m, k)`.
+        degree: their degrees, `(m, k)`.
+        epsilon: exploration probability, in [0, 1].
+        rng: two uniform numbers an ant are drawn from it: a coin, and a choice.
+
+    Returns:
+        Indices of actions, `(m,)`.
+    """
+    if rule == "epsilon_greedy":
+        return epsilon_greedy_actions(pheromone.levels, index, degree, epsilon, rng)
+    coin, choice = rng.random((2, index.shape[0]))
+    actions = np.empty(index.shape[0], dtype=np.int64)
+    _boltzmann(
+        pheromone.levels,
+        pheromone.alpha,
+        pheromone.probabilities,
+        pheromone.stale,
+        index,
+        degree,
+        coin,
+        choice,
+        epsilon if rule == "max_boltzmann" else 0.0,
+        actions,
+    )
+    return actions
+
+
+def epsilon_greedy_actions(
+    table: FloatArray,
+    index: CellArray,
+    degree: FloatArray,
+    epsilon: float,
+    rng: np.random.Generator,
+) -> IntArray:
+    """Rule (3.5) on any table of values; see `choose_actions`."""
+    coin, choice = rng.random((2, index.shape[0]))
+    actions = np.empty(index.shape[0], dtype=np.int64)
+    _epsilon_greedy(table, index, degree, coin, choice, epsilon, actions)
+    return actions
+
+
+def greedy_actions(
+    table: FloatArray,
+    preference: NDArray[np.int32],
+    index: CellArray,
+    degree: FloatArray,
+) -> IntArray:
+    """The policy (4.16): the action with the largest degree-weighted value.
+
+    Args:
+        table: `(n_cells, n_actions)`, pheromone levels or action values.
+        preference: `(n_cells, n_actions)`, a rank of the actions for each cell. Tied
+            actions go by their rank in the state's foremost cell, so that a policy
+            whose ties were once broken at random is a function of the state.
+        index: `(n, k)`.
+        degree: `(n, k)`.
+
+    Returns:
+        Indices of actions, `(n,)`.
+    """
+    actions = np.empty(index.shape[0], dtype=np.int64)
+    _greedy(table, preference, index, degree, actions)
+    return actions
+
+
+@njit(cache=True, inline="always")  # type: ignore[untyped-decorator]
+def _value(table: FloatArray, cells: CellArray, degrees: FloatArray, u: int) -> float:
+    """The sum over a state's cells of degree times table entry."""
+    total = 0.0
+    for c in range(cells.size):
+        total += degrees[c] * table[cells[c], u]
+    return total
+
+
+@njit(cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
+def _repair(
+    levels: FloatArray, alpha: float, cell: int, probabilities: FloatArray
+) -> None:
+    """Compute one row of (4.3). Levels are scaled by the largest: no underflow."""
+    n_actions = levels.shape[1]
+    largest = levels[cell, 0]
+    for u in range(1, n_actions):
+        largest = max(largest, levels[cell, u])
+    whole = int(alpha)
+    multiply = whole == alpha and whole <= 8  # cheaper than pow
+    total = 0.0
+    for u in range(n_actions):
+        ratio = levels[cell, u] / largest
+        if multiply:
+            weight = ratio
+            for _ in range(1, whole):
+                weight *= ratio
+        else:
+            weight = ratio**alpha
+        probabilities[cell, u] = weight
+        total += weight
+    for u in range(n_actions):
+        probabilities[cell, u] /= total
+
+
+@njit(cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
+def _boltzmann(
+    levels: FloatArray,
+    alpha: float,
+    probabilities: FloatArray,
+    stale: BoolArray,
+    index: CellArray,
+    degree: FloatArray,
+    coin: FloatArray,
+    choice: FloatArray,
+    epsilon: float,
+    actions: IntArray,
+) -> None:
+    n_actions = levels.shape[1]
+    for j in range(actions.size):
+        if coin[j] < epsilon:
+            actions[j] = int(choice[j] * n_actions)
+            continue
+        for c in range(index.shape[1]):
+            cell = index[j, c]
+            if stale[cell]:
+                _repair(levels, alpha, cell, probabilities)
+                stale[cell] = False
+        # Invert the distribution (4.11). Rounding may leave its sum below 1, so the
+        # last action takes what is left.
+        cumulated = 0.0
+        action = n_actions - 1
+        for u in range(n_actions - 1):
+            cumulated += _value(probabilities, index[j], degree[j], u)
+            if choice[j] < cumulated:
+                action = u
+                break
+        actions[j] = action
+
+
+@njit(cache=True)  # type: ignore[untyped-decorator]
+def _epsilon_greedy(
+    levels: FloatArray,
+    index: CellArray,
+    degree: FloatArray,
+    coin: FloatArray,
+    choice: FloatArray,
+    epsilon: float,
+    actions: IntArray,
+) -> None:
+    n_actions = levels.shape[1]
+    values = np.empty(n_actions)
+    for j in range(actions.size):
+        if coin[j] < epsilon:
+            actions[j] = int(choice[j] * n_actions)
+            continue
+        best = -np.inf
+        tied = 0
+        for u in range(n_actions):
+            values[u] = _value(levels, index[j], degree[j], u)
+            if values[u] > best:
+                best = values[u]
+                tied = 1
+            elif values[u] == best:
+                tied += 1
+        skip = int(choice[j] * tied)
+        for u in range(n_actions):
+            if values[u] == best:
+                if skip == 0:
+                    actions[j] = u
+                    break
+                skip -= 1
+
+
+@njit(cache=True)  # type: ignore[untyped-decorator]
+def _greedy(
+    table: FloatArray,
+    preference: NDArray[np.int32],
+    index: CellArray,
+    degree: FloatArray,
+    actions: IntArray,
+) -> None:
+    for j in range(actions.size):
+        foremost = 0
+        for c in range(1, index.shape[1]):
+            if degree[j, c] > degree[j, foremost]:
+                foremost = c
+        rank = preference[index[j, foremost]]
+        best = -np.inf
+        for u in range(table.shape[1]):
+            value = _value(table, index[j], degree[j], u)
+            if value > best or (value == best and rank[u] < rank[actions[j]]):
+                best = value
+                actions[j] = u

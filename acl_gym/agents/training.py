@@ -1,0 +1,139 @@
+"""The frame around a learning loop: budget, clock, measures, callbacks, progress."""
+
+from __future__ import annotations
+
+import time
+from types import TracebackType
+from typing import TYPE_CHECKING, Any, Self
+
+import numpy as np
+from tqdm.auto import tqdm
+
+from acl_gym import validation
+from acl_gym.callbacks import Callbacks, Row, as_callbacks
+
+if TYPE_CHECKING:
+    from acl_gym.agents.tabular import TabularAgent
+
+DEFAULT_TRIALS = 100
+"""K of Table 5.2."""
+
+
+class Training:
+    """Runs from `learn` being called to its return; use it as a context manager.
+
+    Args:
+        agent: who learns.
+        total_timesteps: stop after the trial that reaches so many steps of all slots
+            together; None sets no such limit.
+        trials: K, stop after so many trials; None sets no such limit. With neither
+            limit, 100 trials.
+        callback: see `acl_gym.callbacks`.
+        log_interval: print a line every so many trials; None prints nothing.
+        progress_bar: show a bar.
+    """
+
+    def __init__(
+        self,
+        agent: TabularAgent,
+        total_timesteps: int | None,
+        trials: int | None,
+        callback: Callbacks,
+        log_interval: int | None,
+        progress_bar: bool,
+    ) -> None:
+        if total_timesteps is not None:
+            total_timesteps = validation.integer(
+                "total_timesteps", total_timesteps, at_least=1
+            )
+        if trials is not None:
+            trials = validation.integer("trials", trials, at_least=1)
+        if log_interval is not None:
+            log_interval = validation.integer("log_interval", log_interval, at_least=1)
+        if total_timesteps is None and trials is None:
+            trials = DEFAULT_TRIALS
+        self._agent = agent
+        self._last_step = _end(agent.num_timesteps, total_timesteps)
+        self._last_trial = _end(agent.trials, trials)
+        self._callbacks = as_callbacks(callback)
+        self._log_interval = log_interval
+        self._stopped = False
+        self._policy = agent.greedy_policy()
+        in_trials = trials is not None
+        self._bar: Any = tqdm(
+            total=trials if in_trials else total_timesteps,
+            unit="trial" if in_trials else "step",
+            unit_scale=not in_trials,
+            disable=not progress_bar,
+            desc=type(agent).__name__,
+        )
+        self._bar_counts_trials = in_trials
+
+    def __enter__(self) -> Self:
+        for callback in self._callbacks:
+            callback.on_training_start(self._agent)
+        self._clock = time.perf_counter()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        try:
+            for callback in self._callbacks:
+                callback.on_training_end(self._agent)
+        finally:
+            self._bar.close()
+
+    @property
+    def goes_on(self) -> bool:
+        """Whether there is another trial to make."""
+        return (
+            not self._stopped
+            and self._agent.num_timesteps < self._last_step
+            and self._agent.trials < self._last_trial
+        )
+
+    def end_trial(self) -> None:
+        """Count the trial, measure it (§3.6.1) and tell the callbacks."""
+        agent, walk = self._agent, self._agent.walk
+        steps = int(walk.length.sum())
+        agent.num_timesteps += steps
+        agent.trials += 1
+        agent.seconds += time.perf_counter() - self._clock
+        policy = agent.greedy_policy()
+        row: Row = {
+            "trial": agent.trials,
+            "env_steps": agent.num_timesteps,
+            "seconds": agent.seconds,
+            "ants_cost": float(walk.cost.mean()),
+            "ants_success_rate": float(walk.success.mean()),
+            "policy_variation": float(np.mean(policy != self._policy)),
+            **agent.measures(policy),
+        }
+        self._policy = policy
+        agent.history.append(row)
+        for callback in self._callbacks:
+            if callback.on_trial_end(agent, row) is False:
+                self._stopped = True
+        self._report(row, 1 if self._bar_counts_trials else steps)
+        self._clock = time.perf_counter()
+
+    def _report(self, row: Row, progress: int) -> None:
+        self._bar.update(progress)
+        shown = {"ants' cost": f"{row['ants_cost']:.1f}"}
+        if "policy_cost" in row:
+            shown["policy cost"] = f"{row['policy_cost']:.1f}"
+        self._bar.set_postfix(shown, refresh=False)
+        if self._log_interval and row["trial"] % self._log_interval == 0:
+            words = "  ".join(f"{name} {value}" for name, value in shown.items())
+            self._bar.write(
+                f"trial {row['trial']:>4}  steps {row['env_steps']:>9,}  "
+                f"{row['seconds']:6.2f} s  {words}"
+            )
+
+
+def _end(done: int, more: int | None) -> float:
+    return float("inf") if more is None else done + more

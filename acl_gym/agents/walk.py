@@ -1,0 +1,183 @@
+"""One episode in each slot of any vector environment.
+
+Algorithms 4.1 and 4.2 let every ant walk until it reaches the goal or has made T
+steps, and wait for the others. Vector environments differ in what they do with a slot
+that has finished; `Walk` hides the difference, so that an agent sees walking ants and
+nothing else.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import gymnasium as gym
+import numpy as np
+from gymnasium import spaces
+from gymnasium.vector import AutoresetMode, VectorEnv
+from numpy.typing import NDArray
+
+from acl_gym import validation
+from acl_gym.envs.control_env import ControlVectorEnv
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+BoolArray = NDArray[np.bool_]
+
+
+class Step(NamedTuple):
+    """What one step brought to the ants that walked it, each array `(m,)`."""
+
+    ants: IntArray
+    """The slots that took the step."""
+    observation: NDArray[Any]
+    """Observations of all slots after the step, `(num_envs, ...)`."""
+    cost: FloatArray
+    """Stage costs, -reward."""
+    terminated: BoolArray
+    """Whether the episode ended in a terminal state."""
+    finished: BoolArray
+    """Whether the ant walks no further, for whatever reason."""
+
+
+class Walk:
+    """Steps each slot through one episode of at most `max_steps` steps.
+
+    - Environments of this package are told to let finished slots wait
+      (`reset(options={"finished": "wait"})`): idle ants cost nothing.
+    - Where autoreset is disabled, finished slots are reset by mask, walk on as
+      dummies, and are masked out.
+    - Where the environment resets slots itself, those that have finished are masked
+      out; the last observation is recovered from `infos["final_obs"]`.
+
+    Args:
+        env: any vector environment with `Discrete` actions.
+        max_steps: T, >= 1.
+
+    Attributes:
+        ants: the slots that still walk.
+        cost: J so far of each slot, the sum of its stage costs.
+        length: steps of each slot so far.
+        success: whether each slot has ended in a terminal state.
+
+    Raises:
+        TypeError: `env` is not a vector environment.
+        ValueError: its action space is not `Discrete`.
+    """
+
+    def __init__(self, env: VectorEnv[Any, Any, Any], max_steps: int) -> None:
+        if not isinstance(env, VectorEnv):
+            remedy = "make it with gym.make_vec(id, num_envs=...)"
+            if isinstance(env, gym.Env):
+                remedy += " or wrap it in gym.vector.SyncVectorEnv([lambda: env])"
+            raise TypeError(
+                "env must be a gymnasium.vector.VectorEnv, got "
+                f"{type(env).__name__}; {remedy}."
+            )
+        space = env.single_action_space
+        if not isinstance(space, spaces.Discrete):
+            raise ValueError(
+                f"env must have Discrete actions, got {space}; discretise them, for "
+                "instance with gymnasium.wrappers.TransformAction."
+            )
+        self.env = env
+        self.max_steps = validation.integer("max_steps", max_steps, at_least=1)
+        self.n_actions = int(space.n)
+        self._waits = isinstance(env.unwrapped, ControlVectorEnv)
+        self._mode = env.metadata.get("autoreset_mode", AutoresetMode.NEXT_STEP)
+        self._actions = np.full(env.num_envs, space.start, dtype=np.int64)
+        self.first_action = int(space.start)
+        self._all = np.arange(env.num_envs)
+        self._stale: BoolArray | None = None  # slots to reset before the next step
+
+    def start(
+        self, seed: int | None = None, states: FloatArray | None = None
+    ) -> NDArray[Any]:
+        """Begin an episode in every slot.
+
+        Args:
+            seed: seeds the environment; None continues its stream.
+            states: initial states `(num_envs, ...)`, for environments that take
+                `options["state"]`; None draws them.
+
+        Returns:
+            The first observations, `(num_envs, ...)`.
+        """
+        options: dict[str, Any] = {}
+        if self._waits:
+            options["finished"] = "wait"
+        if states is not None:
+            options["state"] = states
+        observation, _ = self.env.reset(seed=seed, options=options or None)
+        n = self.env.num_envs
+        self.ants = self._all
+        self.cost = np.zeros(n)
+        self.length = np.zeros(n, dtype=np.int64)
+        self.success = np.zeros(n, dtype=np.bool_)
+        self.steps = 0
+        self._stale = None
+        return np.asarray(observation)
+
+    def step(self, actions: IntArray) -> Step:
+        """Let every walking ant take one action.
+
+        Args:
+            actions: index of an action for each ant of `ants`, shape `(m,)`.
+
+        Returns:
+            What the step brought. Ants that have finished leave `ants`.
+
+        Raises:
+            ValueError: a reward is NaN or infinite.
+        """
+        ants = self.ants
+        if self._stale is not None:
+            self.env.reset(options={"reset_mask": self._stale})
+            self._stale = None
+        self._actions[ants] = actions + self.first_action
+        observation, reward, terminated, truncated, infos = self.env.step(self._actions)
+        observation = np.asarray(observation)
+        self.steps += 1
+
+        everyone = ants.size == self._all.size
+        cost = np.negative(reward if everyone else reward[ants], dtype=np.float64)
+        if not np.isfinite(cost).all():
+            bad = int(np.flatnonzero(~np.isfinite(cost))[0])
+            raise ValueError(
+                f"rewards must be finite, got {-cost[bad]} in slot {ants[bad]}; "
+                "check the environment's reward function."
+            )
+        reached = terminated if everyone else terminated[ants]
+        stopped = reached | (truncated if everyone else truncated[ants])
+        if everyone:
+            self.cost += cost
+            self.length += 1
+        else:
+            self.cost[ants] += cost
+            self.length[ants] += 1
+        if self._mode is AutoresetMode.DISABLED and not self._waits:
+            # Idle slots that finish once more are reset with the others.
+            done = np.logical_or(terminated, truncated)
+            self._stale = done if done.any() else None
+        if stopped.any():
+            observation = self._finish(ants, reached, stopped, observation, infos)
+        if self.steps >= self.max_steps:
+            self.ants = ants[:0]
+            stopped = np.ones_like(stopped)
+        return Step(ants, observation, cost, reached, stopped)
+
+    def _finish(
+        self,
+        ants: IntArray,
+        reached: BoolArray,
+        stopped: BoolArray,
+        observation: NDArray[Any],
+        infos: dict[str, Any],
+    ) -> NDArray[Any]:
+        """Take finished ants out; return observations with their last one in place."""
+        self.success[ants[reached]] = True
+        self.ants = ants[~stopped]
+        if self._mode is AutoresetMode.SAME_STEP and not self._waits:
+            observation = observation.copy()
+            for slot in ants[stopped]:
+                observation[slot] = infos["final_obs"][slot]
+        return observation

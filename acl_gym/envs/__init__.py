@@ -1,0 +1,1 @@
+"""The control systems that ants walk through, as Gymnasium environments."""

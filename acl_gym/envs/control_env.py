@@ -1,0 +1,436 @@
+"""The bookkeeping that all control environments share, single and native vector.
+
+A system (`ControlSystem`) says how states move. This module says when a slot starts,
+how long it may walk, what happens when it has finished, and which arrays are handed
+out. Every array that leaves `reset` or `step` is a new one.
+"""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar, Self
+
+import gymnasium as gym
+import numpy as np
+from gymnasium.error import ResetNeeded
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space
+from numpy.typing import ArrayLike, NDArray
+
+from acl_gym import validation
+from acl_gym.envs.system import BoolArray, ControlSystem, FloatArray, IntArray
+
+Observation = NDArray[Any]
+StepResult = tuple[Observation, FloatArray, BoolArray, BoolArray, dict[str, Any]]
+
+
+def _checked_options(
+    options: dict[str, Any] | None, allowed: tuple[str, ...]
+) -> dict[str, Any]:
+    """Refuse reset options that would otherwise be ignored in silence."""
+    unknown = sorted(set(options or ()) - set(allowed))
+    if unknown:
+        raise ValueError(
+            f"reset options must be among {list(allowed)}, got {unknown}; "
+            "check the spelling."
+        )
+    return dict(options or {})
+
+
+class ControlEnv(gym.Env[Observation, np.int64]):
+    """The single-environment face of a control system.
+
+    It has no time limit of its own: `gym.make(id, max_episode_steps=T)` adds one.
+
+    Args:
+        render_mode: None; rendering is not available yet.
+        parameters: the parameters of the system, see its class.
+    """
+
+    metadata: dict[str, Any] = {"render_modes": [], "render_fps": 10}  # noqa: RUF012
+    system_type: ClassVar[type[ControlSystem]]
+
+    def __init__(self, render_mode: str | None = None, **parameters: Any) -> None:
+        self.render_mode = _checked_render_mode(render_mode, self.metadata)
+        self.system = self.system_type(**parameters)
+        self.observation_space = self.system.observation_space
+        self.action_space = self.system.action_space
+        self._state: FloatArray | None = None
+        self._finished = False
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Observation, dict[str, Any]]:
+        """Start an episode.
+
+        Args:
+            seed: seeds the generator of initial states; None continues its stream.
+            options: `{"state": array}`, shape `(state_size,)`, sets the state
+                instead of drawing it.
+
+        Returns:
+            The first observation and an empty info.
+
+        Raises:
+            ValueError: the state or a key of `options` is not valid.
+        """
+        options = _checked_options(options, ("state",))
+        given = options.get("state")
+        state = None
+        if given is not None:
+            state = self.system.checked_states(_as_row(given)).T.copy()
+        super().reset(seed=seed)
+        if state is None:
+            state = self.system.sample_states(self.np_random, 1)
+        self._state = state
+        self._finished = False
+        return self.system.observe(state)[0], {}
+
+    def step(
+        self, action: np.int64 | int
+    ) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
+        """Apply an action for one sampling time.
+
+        Returns:
+            `(observation, reward, terminated, truncated, info)` with reward
+            = -(stage cost) and `terminated` once the goal is reached.
+
+        Raises:
+            ResetNeeded: there was no `reset`, or the goal has been reached since.
+            ValueError: `action` is not an action of this environment.
+        """
+        if self._state is None or self._finished:
+            raise ResetNeeded(
+                "step() needs a running episode, but this one "
+                + ("has not begun" if self._state is None else "reached its goal")
+                + "; call reset() first."
+            )
+        actions = _checked_actions([action], 1, int(self.action_space.n))  # type: ignore[attr-defined]
+        rewards, reached = np.empty(1), np.empty(1, dtype=np.bool_)
+        uniforms = _uniforms(self.system, self.np_random, 1)
+        self.system.advance(self._state, actions, uniforms, rewards, reached)
+        self._finished = bool(reached[0])
+        observation = self.system.observe(self._state)[0]
+        return observation, float(rewards[0]), self._finished, False, {}
+
+
+class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
+    """Native vector environment over a control system: one kernel call a step.
+
+    Args:
+        num_envs: number of slots, >= 1.
+        max_episode_steps: an episode is truncated after this many steps; None sets
+            no limit, so that an agent's own T rules.
+        autoreset_mode: what happens to a slot that has finished: "NextStep" (reset
+            on the next step, whose action is ignored), "SameStep" (reset at once,
+            last observation in `infos["final_obs"]`) or "Disabled" (the caller
+            resets, `reset(options={"reset_mask": finished})`).
+        render_mode: None; rendering is not available yet.
+        parameters: the parameters of the system, see its class.
+
+    Note:
+        One generator serves all slots in slot order. With the same seed, another
+        number of slots gives other initial states.
+    """
+
+    metadata: dict[str, Any] = {  # noqa: RUF012
+        "render_modes": [],
+        "render_fps": 10,
+        "autoreset_mode": AutoresetMode.NEXT_STEP,
+    }
+    system_type: ClassVar[type[ControlSystem]]
+
+    def __init__(
+        self,
+        num_envs: int = 1,
+        *,
+        max_episode_steps: int | None = None,
+        autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
+        render_mode: str | None = None,
+        **parameters: Any,
+    ) -> None:
+        self.num_envs = validation.integer("num_envs", num_envs, at_least=1)
+        if max_episode_steps is not None:
+            max_episode_steps = validation.integer(
+                "max_episode_steps", max_episode_steps, at_least=1
+            )
+        self.max_episode_steps = max_episode_steps
+        self.autoreset_mode = _checked_autoreset_mode(autoreset_mode)
+        self.metadata = {**self.metadata, "autoreset_mode": self.autoreset_mode}
+        self.render_mode = _checked_render_mode(render_mode, self.metadata)
+        self.parameters = parameters
+        self.system = self.system_type(**parameters)
+        self.single_observation_space = self.system.observation_space
+        self.single_action_space = self.system.action_space
+        self.observation_space = batch_space(
+            self.single_observation_space, self.num_envs
+        )
+        self.action_space = batch_space(self.single_action_space, self.num_envs)
+        self._n_actions = int(self.system.action_space.n)
+
+        self._state: FloatArray | None = None  # (state_size, num_envs)
+        self._steps = np.zeros(self.num_envs, dtype=np.int64)
+        self._finished = np.zeros(self.num_envs, dtype=np.bool_)
+        self._wait_when_finished = False
+        self._walking: IntArray | None = None  # slots still walking; None means all
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Observation, dict[str, Any]]:
+        """Start an episode in all slots, or in some.
+
+        Args:
+            seed: seeds the generator of initial states; None continues its stream.
+            options: any of
+
+                - `"state"`: array `(num_envs, state_size)`, sets the states instead
+                  of drawing them (rows outside the mask are not looked at);
+                - `"reset_mask"`: bool array `(num_envs,)`, the slots to reset, the
+                  others are left as they are;
+                - `"finished"`: `"wait"`, in any autoreset mode: from now to the next
+                  full reset a slot that finishes stands still. Its finish is
+                  reported once; after that its action is ignored, its observation
+                  stays, its reward is 0 and its flags are False. A synchronous
+                  trial of a colony is this, and costs nothing for idle slots.
+
+        Returns:
+            The observations of all slots, `(num_envs, ...)`, and an empty info.
+
+        Raises:
+            ValueError: a state, the mask or a key of `options` is not valid.
+            TypeError: the mask is not a bool array.
+            ResetNeeded: a mask was given before the first full reset.
+        """
+        options = _checked_options(options, ("state", "reset_mask", "finished"))
+        mask = self._checked_mask(options.get("reset_mask"))
+        slots = np.arange(self.num_envs) if mask is None else np.flatnonzero(mask)
+        given = options.get("state")
+        states = None if given is None else self._given_states(given, slots)
+        if "finished" in options:
+            validation.one_of("options['finished']", options["finished"], ("wait",))
+
+        super().reset(seed=seed)
+        if mask is None:
+            self._wait_when_finished = False
+        self._wait_when_finished |= "finished" in options
+        self._start(slots, states)
+        return self._observe(), {}
+
+    def step(self, actions: ArrayLike) -> StepResult:  # type: ignore[override]
+        """Apply one action to each slot.
+
+        Args:
+            actions: integers of shape `(num_envs,)`.
+
+        Returns:
+            `(observations, rewards, terminations, truncations, infos)`, new arrays.
+
+        Raises:
+            ResetNeeded: there was no reset yet, or autoreset is disabled and a slot
+                has finished.
+            ValueError: an action has the wrong shape or is out of range.
+            TypeError: the actions are not integers.
+        """
+        if self._state is None:
+            raise ResetNeeded("step() needs states; call reset() first.")
+        checked = _checked_actions(actions, self.num_envs, self._n_actions)
+        restarting = self._slots_to_restart()
+        rewards = np.zeros(self.num_envs)
+        terminated = np.zeros(self.num_envs, dtype=np.bool_)
+        truncated = np.zeros(self.num_envs, dtype=np.bool_)
+        if self._walking is None:
+            self._advance(self._state, checked, rewards, terminated)
+            self._steps += 1
+            if self.max_episode_steps is not None:
+                np.greater_equal(self._steps, self.max_episode_steps, out=truncated)
+        elif self._walking.size:
+            self._advance_walking(self._walking, checked, rewards, terminated)
+            self._steps[self._walking] += 1
+            if self.max_episode_steps is not None:
+                truncated[self._walking] = (
+                    self._steps[self._walking] >= self.max_episode_steps
+                )
+        if restarting is not None:
+            self._start(restarting, None)
+
+        infos: dict[str, Any] = {}
+        finished = terminated | truncated
+        if finished.any():
+            if (
+                self.autoreset_mode is AutoresetMode.SAME_STEP
+                and not self._wait_when_finished
+            ):
+                infos = self._final_infos(finished)
+                self._start(np.flatnonzero(finished), None)
+            else:
+                self._finished |= finished
+                self._walking = np.flatnonzero(~self._finished)
+        return self._observe(), rewards, terminated, truncated, infos
+
+    def with_slots(self, num_envs: int) -> Self:
+        """Make a new environment of the same system and limits with other slots."""
+        return type(self)(
+            num_envs,
+            max_episode_steps=self.max_episode_steps,
+            autoreset_mode=self.autoreset_mode,
+            render_mode=self.render_mode,
+            **self.parameters,
+        )
+
+    def _slots_to_restart(self) -> IntArray | None:
+        """The finished slots that this step must reset, None if there are none."""
+        if self._walking is None or self._wait_when_finished:
+            return None
+        if self.autoreset_mode is AutoresetMode.DISABLED:
+            slots = np.flatnonzero(self._finished)
+            raise ResetNeeded(
+                f"slots {slots[:10].tolist()} have finished and autoreset is disabled; "
+                'call reset(options={"reset_mask": finished}) before the next step.'
+            )
+        return np.flatnonzero(self._finished)
+
+    def _advance(
+        self,
+        states: FloatArray,
+        actions: IntArray,
+        rewards: FloatArray,
+        reached: BoolArray,
+    ) -> None:
+        uniforms = _uniforms(self.system, self.np_random, actions.size)
+        self.system.advance(states, actions, uniforms, rewards, reached)
+
+    def _advance_walking(
+        self,
+        walking: IntArray,
+        actions: IntArray,
+        rewards: FloatArray,
+        reached: BoolArray,
+    ) -> None:
+        """Advance some slots only: gather them, run the kernel, put them back."""
+        states = self._states[:, walking]
+        part_rewards = np.empty(walking.size)
+        part_reached = np.empty(walking.size, dtype=np.bool_)
+        self._advance(states, actions[walking], part_rewards, part_reached)
+        self._states[:, walking] = states
+        rewards[walking] = part_rewards
+        reached[walking] = part_reached
+
+    def _start(self, slots: IntArray, states: FloatArray | None) -> None:
+        """Put `slots` at the given `(state_size, n)` states, or at random ones."""
+        if states is None:
+            states = self.system.sample_states(self.np_random, slots.size)
+        if slots.size == self.num_envs:
+            self._state = states
+        else:
+            self._states[:, slots] = states
+        self._steps[slots] = 0
+        self._finished[slots] = False
+        walking = np.flatnonzero(~self._finished)
+        self._walking = None if walking.size == self.num_envs else walking
+
+    def _final_infos(self, finished: BoolArray) -> dict[str, Any]:
+        final_obs = np.full(self.num_envs, None, dtype=object)
+        observations = self._observe()
+        for slot in np.flatnonzero(finished):
+            final_obs[slot] = observations[slot]
+        return {
+            "final_obs": final_obs,
+            "_final_obs": finished.copy(),
+            "final_info": {},
+            "_final_info": finished.copy(),
+        }
+
+    @property
+    def _states(self) -> FloatArray:
+        if self._state is None:
+            raise ResetNeeded("the slots have no states yet; call reset() first.")
+        return self._state
+
+    def _observe(self) -> Observation:
+        return self.system.observe(self._states)
+
+    def _given_states(self, given: Any, slots: IntArray) -> FloatArray:
+        rows = np.asarray(given)
+        if rows.shape[:1] != (self.num_envs,):
+            raise ValueError(
+                "options['state'] must hold one row for each slot, shape "
+                f"({self.num_envs}, ...), got shape {rows.shape}."
+            )
+        return self.system.checked_states(rows[slots]).T.copy()
+
+    def _checked_mask(self, mask: Any) -> BoolArray | None:
+        if mask is None:
+            return None
+        if not isinstance(mask, np.ndarray) or mask.dtype != np.bool_:
+            actual = mask.dtype if isinstance(mask, np.ndarray) else type(mask)
+            raise TypeError(
+                f"options['reset_mask'] must be a NumPy array of bool, got {actual}."
+            )
+        if mask.shape != (self.num_envs,) or not mask.any():
+            raise ValueError(
+                f"options['reset_mask'] must have shape ({self.num_envs},) and at "
+                f"least one True, got shape {mask.shape} with {int(mask.sum())} True."
+            )
+        if self._state is None:
+            raise ResetNeeded(
+                "the first reset must start all slots; leave 'reset_mask' out."
+            )
+        return mask
+
+
+def _uniforms(
+    system: ControlSystem, rng: np.random.Generator, count: int
+) -> FloatArray | None:
+    if system.draws_per_step == 0:
+        return None
+    return rng.random((system.draws_per_step, count))
+
+
+def _as_row(state: Any) -> NDArray[Any]:
+    row = np.asarray(state)
+    if row.ndim != 1:
+        raise ValueError(
+            f"options['state'] must be one state, shape (state_size,), got shape "
+            f"{row.shape}."
+        )
+    return row[None, :]
+
+
+def _checked_actions(actions: ArrayLike, count: int, n_actions: int) -> IntArray:
+    array = np.asarray(actions)
+    if array.dtype.kind not in "iu":
+        raise TypeError(
+            f"actions must be integers, got dtype {array.dtype}; "
+            "cast with .astype(np.int64)."
+        )
+    if array.shape != (count,):
+        raise ValueError(
+            f"actions must have shape ({count},), one a slot, got {array.shape}."
+        )
+    checked = array.astype(np.int64)
+    # As unsigned numbers, negative actions are huge: one pass checks both ends.
+    if checked.view(np.uint64).max() >= n_actions:
+        slot = int(checked.view(np.uint64).argmax())
+        raise ValueError(
+            f"actions must lie in 0..{n_actions - 1}, got {checked[slot]} "
+            f"in slot {slot}."
+        )
+    return checked
+
+
+def _checked_autoreset_mode(mode: str | AutoresetMode) -> AutoresetMode:
+    try:
+        return AutoresetMode(mode)
+    except ValueError:
+        choices = ", ".join(repr(choice.value) for choice in AutoresetMode)
+        raise ValueError(
+            f"autoreset_mode must be one of {choices}, got {mode!r}."
+        ) from None
+
+
+def _checked_render_mode(mode: str | None, metadata: dict[str, Any]) -> str | None:
+    if mode is not None and mode not in metadata["render_modes"]:
+        raise ValueError(
+            f"render_mode must be None or one of {metadata['render_modes']}, "
+            f"got {mode!r}."
+        )
+    return mode

@@ -1,0 +1,94 @@
+"""What a control system is: parameters and dynamics, with no bookkeeping."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import Any, ClassVar
+
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+BoolArray = NDArray[np.bool_]
+
+
+class ControlSystem(ABC):
+    """A discrete-time system x(t+1) = f(x(t), u(t)) (4.1) with a goal and a cost.
+
+    A system is an immutable set of parameters and pure functions of arrays. It owns
+    no state and no random numbers: `ControlEnv` and `ControlVectorEnv` hold those and
+    call the same functions, so that one environment and a thousand slots share one
+    model of the dynamics.
+
+    Inside, states are stored with the variables first, shape `(state_size, n)`, so
+    that each variable is one contiguous vector for the kernels.
+    """
+
+    draws_per_step: ClassVar[int] = 0
+    """How many uniform random numbers `advance` takes for each slot and step."""
+
+    evaluation_steps: ClassVar[int] = 300
+    """T for the evaluation of a policy from `evaluation_states`."""
+
+    @property
+    @abstractmethod
+    def observation_space(self) -> spaces.Space[Any]:
+        """The space of one observation."""
+
+    @property
+    @abstractmethod
+    def action_space(self) -> spaces.Discrete:
+        """The space of one action."""
+
+    @property
+    @abstractmethod
+    def max_stage_cost(self) -> float:
+        """An upper bound on the cost of one step; T times it bounds J_max."""
+
+    @abstractmethod
+    def sample_states(self, rng: np.random.Generator, count: int) -> FloatArray:
+        """Draw `count` initial states, uniform over X without the goal.
+
+        Returns:
+            Array of shape `(state_size, count)`.
+        """
+
+    @abstractmethod
+    def checked_states(self, states: Any) -> FloatArray:
+        """Return `states`, shape `(n, state_size)`, validated and in canonical form.
+
+        Returns:
+            Array of shape `(n, state_size)`.
+
+        Raises:
+            ValueError: a state has the wrong shape, is not finite or is outside X.
+        """
+
+    @abstractmethod
+    def advance(
+        self,
+        states: FloatArray,
+        actions: IntArray,
+        uniforms: FloatArray | None,
+        rewards: FloatArray,
+        reached: BoolArray,
+    ) -> None:
+        """Apply one action to each state.
+
+        Args:
+            states: shape `(state_size, n)`, replaced by the next states in place.
+            actions: shape `(n,)`, valid indices of actions.
+            uniforms: shape `(draws_per_step, n)` from [0, 1), None if there are none.
+            rewards: shape `(n,)`, receives -(stage cost).
+            reached: shape `(n,)`, receives whether the next state is the goal.
+        """
+
+    @abstractmethod
+    def evaluation_states(self) -> FloatArray:
+        """The fixed initial states of the policy cost (3.47), `(n, state_size)`."""
+
+    def observe(self, states: FloatArray) -> NDArray[Any]:
+        """Return what is seen of `states` `(state_size, n)`: a new array `(n, ...)`."""
+        return states.T.copy()

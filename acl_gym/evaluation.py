@@ -1,0 +1,99 @@
+"""The cost of a policy from given initial states (3.47)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+from gymnasium.vector import VectorEnv
+from numpy.typing import NDArray
+
+from acl_gym.agents.walk import Walk
+from acl_gym.envs.control_env import ControlVectorEnv
+
+FloatArray = NDArray[np.float64]
+
+
+class Predictor(Protocol):
+    """Anything with Stable-Baselines3's `predict`: our agents and theirs."""
+
+    def predict(self, observation: Any, *, deterministic: bool = ...) -> Any:
+        """Return `(actions, state)` for a batch of observations."""
+
+
+@dataclass(frozen=True)
+class PolicyCost:
+    """What a policy costs from each initial state.
+
+    Attributes:
+        costs: J of each episode, `(n,)`.
+        success: whether each ended in a terminal state, `(n,)`.
+        lengths: steps of each, `(n,)`.
+    """
+
+    costs: FloatArray
+    success: NDArray[np.bool_]
+    lengths: NDArray[np.int64]
+
+    @property
+    def cost(self) -> float:
+        """J^h, the mean cost over the initial states (3.47)."""
+        return float(self.costs.mean())
+
+    @property
+    def success_rate(self) -> float:
+        """The fraction of episodes that ended in a terminal state."""
+        return float(self.success.mean())
+
+
+def evaluate_policy_cost(
+    model: Predictor,
+    env: VectorEnv[Any, Any, Any],
+    states: FloatArray | None = None,
+    *,
+    max_steps: int | None = None,
+    seed: int | None = None,
+) -> PolicyCost:
+    """Follow the policy of `model`, without exploring, once from each initial state.
+
+    Args:
+        model: an agent with `predict(observation, deterministic=True)`.
+        env: where to follow it. An unwrapped environment of this package is given as
+            many slots as there are states; any other must have that many already.
+        states: initial states `(n, ...)`. None takes `evaluation_states()` of an
+            environment of this package, and random ones of any other.
+        max_steps: T, >= 1. None takes the environment's `evaluation_steps`, 300 for
+            an environment of another package.
+        seed: seeds the environment where it is random.
+
+    Returns:
+        Costs, successes and lengths, one for each state.
+
+    Raises:
+        ValueError: the number of slots and of states differ and `env` is wrapped.
+    """
+    base = env.unwrapped
+    if isinstance(base, ControlVectorEnv):
+        if states is None:
+            states = base.system.evaluation_states()
+        if max_steps is None:
+            max_steps = base.system.evaluation_steps
+        if base is env and env.num_envs != len(states):
+            env = base.with_slots(len(states))
+    elif states is not None:
+        raise ValueError(
+            "states can only be set in environments of acl_gym, got "
+            f"{type(base).__name__}; leave them out to start from random states."
+        )
+    if states is not None and env.num_envs != len(states):
+        raise ValueError(
+            f"a wrapped env must have one slot for each of the {len(states)} states, "
+            f"got {env.num_envs} slots."
+        )
+    walk = Walk(env, 300 if max_steps is None else max_steps)
+    observation = walk.start(seed=seed, states=states)
+    while walk.ants.size:
+        actions, _ = model.predict(observation[walk.ants], deterministic=True)
+        observation = walk.step(np.asarray(actions) - walk.first_action).observation
+    return PolicyCost(walk.cost, walk.success, walk.length)

@@ -1,0 +1,435 @@
+"""Partitions: a batch of states becomes `(index, degree)`, all that an agent sees.
+
+Every state belongs to k cells, to each by a degree >= 0, and the degrees of a state
+sum to 1. A crisp partition (§4.2) has k = 1, a fuzzy one (§4.3) k = 2^d. Equations
+written over `(index, degree)` therefore hold for both.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterable, Sequence
+from typing import Any, ClassVar, Self
+
+import numpy as np
+from gymnasium import spaces
+from numba import njit
+from numpy.typing import ArrayLike, NDArray
+
+from acl_gym import validation
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+CellArray = NDArray[np.int32]
+
+
+class Partition(ABC):
+    """A map from states to cells with degrees."""
+
+    n_cells: int
+    """How many cells there are: the rows of an agent's table."""
+
+    cells_per_state: int
+    """k, how many cells a state belongs to at most."""
+
+    state_ndim: int = 1
+    """Axes of the array that is one state."""
+
+    @abstractmethod
+    def locate(
+        self,
+        states: NDArray[Any],
+        slots: IntArray,
+        index: CellArray,
+        degree: FloatArray,
+    ) -> None:
+        """Locate the states of some slots, without allocating.
+
+        Args:
+            states: the observations of all slots, `(n, ...)`.
+            slots: which rows of `states` to locate, shape `(m,)`.
+            index: int32 `(>= m, k)`; row j receives the cells of `states[slots[j]]`.
+            degree: float64 `(>= m, k)`; row j receives their degrees.
+
+        Raises:
+            ValueError: a state is not finite or does not belong to the partition.
+        """
+
+    @abstractmethod
+    def settings(self) -> dict[str, Any]:
+        """What `partition_from_settings` needs to build this partition again."""
+
+    @abstractmethod
+    def cell_states(self) -> NDArray[Any]:
+        """The state that stands for each cell, `(n_cells, ...)`."""
+
+    def __call__(self, states: ArrayLike) -> tuple[CellArray, FloatArray]:
+        """Return `(index, degree)`, each `(n, k)`, for a batch of states `(n, ...)`.
+
+        Raises:
+            ValueError: a state is not finite or does not belong to the partition.
+        """
+        batch = np.asarray(states)
+        n = len(batch) if batch.ndim else 0
+        index = np.zeros((n, self.cells_per_state), dtype=np.int32)
+        degree = np.zeros((n, self.cells_per_state))
+        self.locate(batch, np.arange(n), index, degree)
+        return index, degree
+
+
+@njit(cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
+def _locate_on_axis(
+    x: float, edges: FloatArray, first: int, count: int, period: float, rate: float
+) -> tuple[int, float]:
+    """Find the interval of `x` between centres, and how far along it x lies.
+
+    Args:
+        x: one state variable, finite.
+        edges: the centres of all axes in a row; this axis owns
+            `edges[first : first + count]`. A circular axis repeats its first centre
+            at the end, one period on.
+        first: see `edges`.
+        count: see `edges`.
+        period: of a circular axis, 0 for any other.
+        rate: 1 / spacing of a regular axis, 0 for an irregular one.
+
+    Returns:
+        `(i, fraction)`: x lies between centres i and i + 1, and the membership (4.7)
+        is 1 - fraction to the former, fraction to the latter. Outside the centres
+        the fraction saturates at 0 or 1.
+    """
+    if count == 1:
+        return 0, 0.0
+    if period > 0.0:
+        turns = np.floor((x - edges[first]) / period)
+        x -= period * turns
+    last = count - 2
+    if x <= edges[first]:
+        return 0, 0.0
+    if x >= edges[first + count - 1]:
+        return last, 1.0
+    if rate > 0.0:
+        # On a regular axis the interval is known but for the rounding of the guess.
+        low = min(int((x - edges[first]) * rate), last)
+        while x < edges[first + low]:
+            low -= 1
+        while x >= edges[first + low + 1]:
+            low += 1
+    else:
+        low, high = 0, count - 1
+        while high - low > 1:
+            middle = (low + high) // 2
+            if x < edges[first + middle]:
+                high = middle
+            else:
+                low = middle
+    left = edges[first + low]
+    return low, (x - left) / (edges[first + low + 1] - left)
+
+
+@njit(cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
+def _locate(
+    states: FloatArray,
+    slots: IntArray,
+    edges: FloatArray,
+    first: IntArray,
+    count: IntArray,
+    cells: IntArray,
+    periods: FloatArray,
+    rates: FloatArray,
+    fuzzy: bool,
+    index: CellArray,
+    degree: FloatArray,
+) -> int:
+    """Fill rows of `index` and `degree`; return a slot that is not finite, or -1."""
+    dimensions = cells.size
+    for j in range(slots.size):
+        slot = slots[j]
+        index[j, 0] = 0
+        degree[j, 0] = 1.0
+        corners = 1
+        for axis in range(dimensions):
+            x = states[slot, axis]
+            if not np.isfinite(x):
+                return int(slot)
+            low, fraction = _locate_on_axis(
+                x, edges, first[axis], count[axis], periods[axis], rates[axis]
+            )
+            n = cells[axis]
+            # A circular axis ends where it begins; one cell alone is its own end.
+            high = (low + 1) % n
+            if not fuzzy:
+                index[j, 0] = index[j, 0] * n + (high if fraction >= 0.5 else low)
+                continue
+            # Each corner splits in two along this axis: product of memberships (4.8).
+            for c in range(corners - 1, -1, -1):
+                cell = index[j, c] * n
+                weight = degree[j, c]
+                index[j, 2 * c] = cell + low
+                degree[j, 2 * c] = weight * (1.0 - fraction)
+                index[j, 2 * c + 1] = cell + high
+                degree[j, 2 * c + 1] = weight * fraction
+            corners *= 2
+    return -1
+
+
+class _Grid(Partition):
+    """A product of axes, each with strictly increasing centres.
+
+    Args:
+        centres: for each state variable its centres, strictly increasing; one or
+            more variables, one or more centres each.
+        periods: for each variable its period if it is circular (2 pi for an angle),
+            else None. None for all: no variable is circular.
+
+    Raises:
+        ValueError: centres that do not increase strictly or are not finite, or that
+            span a full period; a period that is not positive.
+    """
+
+    fuzzy: ClassVar[bool]
+
+    def __init__(
+        self,
+        centres: Sequence[ArrayLike],
+        periods: Sequence[float | None] | None = None,
+    ) -> None:
+        if isinstance(centres, np.ndarray) and centres.ndim == 1:
+            raise ValueError(
+                "centres must be one sequence for each state variable, got a flat "
+                "array; pass [array] for a single variable."
+            )
+        axes = [_checked_centres(axis, values) for axis, values in enumerate(centres)]
+        if not axes:
+            raise ValueError("centres must hold one or more state variables, got none.")
+        lengths = _checked_periods(periods, axes)
+        self.centres = tuple(axes)
+        self.periods = tuple(lengths)
+        self._cells = np.array([axis.size for axis in axes], dtype=np.int64)
+        self.n_cells = int(np.prod(self._cells.astype(object)))
+        if self.n_cells > np.iinfo(np.int32).max:
+            raise ValueError(
+                f"a partition must have fewer than 2^31 cells, got {self.n_cells}; "
+                "use fewer centres."
+            )
+        self.cells_per_state = 2 ** len(axes) if self.fuzzy else 1
+
+        edges = [
+            # A lone centre takes every state, so it needs no copy a period on.
+            axis
+            if period is None or axis.size == 1
+            else np.append(axis, axis[0] + period)
+            for axis, period in zip(axes, lengths, strict=True)
+        ]
+        self._edges = np.concatenate(edges)
+        self._count = np.array([axis.size for axis in edges], dtype=np.int64)
+        self._first = np.cumsum(self._count) - self._count
+        self._period_lengths = np.array([period or 0.0 for period in lengths])  # 0: none
+        self._rates = np.array([_regular_rate(axis) for axis in edges])
+
+    @classmethod
+    def from_box(
+        cls,
+        space: spaces.Box,
+        cells: int | Sequence[int],
+        circular: Iterable[int] = (),
+    ) -> Self:
+        """Spread centres evenly over a Box.
+
+        Args:
+            space: a bounded one-dimensional Box, for instance
+                `env.single_observation_space`.
+            cells: number of centres, for all variables or for each.
+            circular: the variables whose high end is their low end, such as angles.
+                Their centres are low, low + range / n, ... as in (5.2); all others
+                have centres on both ends as in (5.3).
+
+        Raises:
+            ValueError: the Box is unbounded or not one-dimensional, or `cells` or
+                `circular` do not fit it.
+        """
+        if not isinstance(space, spaces.Box) or len(space.shape) != 1:
+            raise ValueError(f"space must be a one-dimensional Box, got {space}.")
+        low = space.low.astype(np.float64)
+        high = space.high.astype(np.float64)
+        if not (np.isfinite(low) & np.isfinite(high)).all():
+            raise ValueError(
+                f"space must be bounded in every variable, got {space}; "
+                "give the centres of an unbounded variable yourself."
+            )
+        counts = [cells] * low.size if isinstance(cells, int) else list(cells)
+        if len(counts) != low.size:
+            raise ValueError(
+                f"cells must be an int or {low.size} ints, one a variable, "
+                f"got {cells!r}."
+            )
+        round_axes = set(circular)
+        if not round_axes <= set(range(low.size)):
+            raise ValueError(
+                f"circular must hold variables 0..{low.size - 1}, "
+                f"got {sorted(round_axes)}."
+            )
+        centres, periods = [], []
+        for axis, count in enumerate(counts):
+            validation.integer(f"cells[{axis}]", count, at_least=1)
+            is_round = axis in round_axes
+            centres.append(
+                np.linspace(low[axis], high[axis], count, endpoint=not is_round)
+            )
+            periods.append(float(high[axis] - low[axis]) if is_round else None)
+        return cls(centres, periods)
+
+    def locate(
+        self,
+        states: NDArray[Any],
+        slots: IntArray,
+        index: CellArray,
+        degree: FloatArray,
+    ) -> None:
+        """See `Partition.locate`."""
+        dimensions = len(self.centres)
+        if states.ndim != 2 or states.shape[1] != dimensions:
+            raise ValueError(
+                f"states must have shape (n, {dimensions}), got {states.shape}."
+            )
+        if states.dtype != np.float64:
+            states = _as_float64(states)
+        bad = _locate(
+            states,
+            slots,
+            self._edges,
+            self._first,
+            self._count,
+            self._cells,
+            self._period_lengths,
+            self._rates,
+            self.fuzzy,
+            index,
+            degree,
+        )
+        if bad >= 0:
+            raise ValueError(
+                f"states must be finite, got {states[bad].tolist()} in row {bad}."
+            )
+
+    def cell_states(self) -> FloatArray:
+        """The centres of all cells, `(n_cells, d)`, in the order of (4.8)."""
+        mesh = np.meshgrid(*self.centres, indexing="ij")
+        return np.stack(mesh, axis=-1).reshape(-1, len(self.centres))
+
+    def settings(self) -> dict[str, Any]:
+        """See `Partition.settings`."""
+        return {
+            "type": type(self).__name__,
+            "centres": [axis.tolist() for axis in self.centres],
+            "periods": list(self.periods),
+        }
+
+    def __repr__(self) -> str:
+        """Name, cells along each axis, and which axes are circular."""
+        shape = " x ".join(str(n) for n in self._cells)
+        rounds = [axis for axis, p in enumerate(self.periods) if p is not None]
+        return f"{type(self).__name__}({shape} cells, circular={rounds})"
+
+
+class Crisp(_Grid):
+    """Crisp bins: a state belongs wholly to the nearest centre, (4.2).
+
+    A state half-way between two centres belongs to the upper one. See `from_box` for
+    evenly spread centres.
+
+    Args:
+        centres: for each state variable its centres, strictly increasing.
+        periods: for each variable its period if circular, else None.
+    """
+
+    fuzzy = False
+
+
+class Fuzzy(_Grid):
+    """Triangular membership functions around the centres, (4.7)-(4.9).
+
+    The degree of a cell is the product of the memberships of the variables; a state
+    beyond the outermost centres belongs wholly to the outermost. See `from_box` for
+    evenly spread centres.
+
+    Args:
+        centres: for each state variable its centres, strictly increasing.
+        periods: for each variable its period if circular, else None.
+    """
+
+    fuzzy = True
+
+
+def partition_from_settings(settings: dict[str, Any]) -> Partition:
+    """Build the partition that `settings` describes.
+
+    Raises:
+        ValueError: `settings` describe no partition of this package.
+    """
+    kinds: dict[str, type[_Grid]] = {"Crisp": Crisp, "Fuzzy": Fuzzy}
+    try:
+        kind = kinds[settings["type"]]
+        return kind(settings["centres"], settings["periods"])
+    except (KeyError, TypeError) as error:
+        raise ValueError(
+            f"settings must describe one of {sorted(kinds)}, got {settings!r}."
+        ) from error
+
+
+def _as_float64(states: NDArray[Any]) -> FloatArray:
+    if states.dtype.kind not in "fiu":
+        raise ValueError(f"states must be real numbers, got dtype {states.dtype}.")
+    return states.astype(np.float64)
+
+
+def _checked_centres(axis: int, values: ArrayLike) -> FloatArray:
+    try:
+        centres = np.array(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        centres = np.empty((0, 0))
+    if centres.ndim != 1 or centres.size == 0 or not np.isfinite(centres).all():
+        raise ValueError(
+            f"centres[{axis}] must be a sequence of one or more finite numbers, "
+            f"got {values!r}."
+        )
+    if (falls := np.flatnonzero(np.diff(centres) <= 0)).size:
+        i = int(falls[0])
+        raise ValueError(
+            f"centres[{axis}] must increase strictly, got {centres[i]:g} followed by "
+            f"{centres[i + 1]:g} at position {i}; sort them and drop duplicates."
+        )
+    return centres
+
+
+def _checked_periods(
+    periods: Sequence[float | None] | None, axes: list[FloatArray]
+) -> list[float | None]:
+    if periods is None:
+        return [None] * len(axes)
+    if len(periods) != len(axes):
+        raise ValueError(
+            f"periods must hold one entry for each of the {len(axes)} variables, "
+            f"got {len(periods)}."
+        )
+    lengths: list[float | None] = []
+    for axis, period in enumerate(periods):
+        if period is not None:
+            period = validation.number(f"periods[{axis}]", period, above=0)
+            span = float(axes[axis][-1] - axes[axis][0])
+            if span >= period:
+                raise ValueError(
+                    f"centres[{axis}] must span less than their period {period:g}, "
+                    f"got {span:g}; leave out the centre that repeats the first."
+                )
+        lengths.append(period)
+    return lengths
+
+
+def _regular_rate(edges: FloatArray) -> float:
+    """1 / spacing where the spacing is constant to rounding, else 0."""
+    if edges.size < 2:
+        return 0.0
+    gaps = np.diff(edges)
+    regular = np.allclose(gaps, gaps.mean(), rtol=1e-9, atol=0.0)
+    return float(1.0 / gaps.mean()) if regular else 0.0

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from typing import TYPE_CHECKING, Any, Union
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from gymnasium.vector import VectorEnv
@@ -13,6 +13,7 @@ from acl_gym import validation
 from acl_gym.evaluation import PolicyCost, evaluate_policy_cost
 
 if TYPE_CHECKING:
+    from acl_gym.agents.policy import TablePolicy
     from acl_gym.agents.tabular import TabularAgent
 
 Row = dict[str, float]
@@ -37,16 +38,13 @@ class Callback:
         """Called once after the last trial, also after an exception."""
 
 
-Callbacks = Union[
-    None,
-    Callback,
-    Callable[["TabularAgent", Row], Any],
-    Iterable[Union[Callback, Callable[["TabularAgent", Row], Any]]],
-]
+Function = Callable[["TabularAgent", Row], Any]
+Callbacks = None | Callback | Function | Iterable[Callback | Function]
+"""What `learn` takes: nothing, one of these, or several."""
 
 
 class _FunctionCallback(Callback):
-    def __init__(self, function: Callable[[TabularAgent, Row], Any]) -> None:
+    def __init__(self, function: Function) -> None:
         self._function = function
 
     def on_trial_end(self, agent: TabularAgent, row: Row) -> bool | None:
@@ -89,7 +87,7 @@ class PolicyEvaluation(Callback):
 
     Attributes:
         best: the evaluation of the best policy so far: the lowest cost.
-        best_table: the agent's table then; `agent.set_table(best_table)` goes back.
+        best_policy: that policy; `agent.set_table(best_policy.table)` goes back.
     """
 
     def __init__(
@@ -105,7 +103,7 @@ class PolicyEvaluation(Callback):
         self.every = validation.integer("every", every, at_least=1)
         self.max_steps = max_steps
         self.best: PolicyCost | None = None
-        self.best_table: NDArray[np.float64] | None = None
+        self.best_policy: TablePolicy | None = None
 
     def on_trial_end(self, agent: TabularAgent, row: Row) -> bool | None:
         """Evaluate if it is time to."""
@@ -126,4 +124,4 @@ class PolicyEvaluation(Callback):
         row["success_rate"] = result.success_rate
         if self.best is None or result.cost < self.best.cost:
             self.best = result
-            self.best_table = agent.table.copy()
+            self.best_policy = agent.policy.copy()

@@ -47,6 +47,23 @@ class PolicyCost:
         return float(self.success.mean())
 
 
+@dataclass(frozen=True)
+class Trajectory:
+    """One episode under a policy.
+
+    Attributes:
+        states: x(0) .. x(n), `(n + 1, state_size)`.
+        actions: u(0) .. u(n - 1) as indices, `(n,)`.
+        costs: stage costs of the steps, `(n,)`.
+        success: whether it ended in a terminal state.
+    """
+
+    states: FloatArray
+    actions: NDArray[np.int64]
+    costs: FloatArray
+    success: bool
+
+
 def evaluate_policy_cost(
     model: Predictor,
     env: VectorEnv[Any, Any, Any],
@@ -74,12 +91,13 @@ def evaluate_policy_cost(
         ValueError: the number of slots and of states differ and `env` is wrapped.
     """
     base = env.unwrapped
+    wrapped = base is not env
     if isinstance(base, ControlVectorEnv):
         if states is None:
             states = base.system.evaluation_states()
         if max_steps is None:
             max_steps = base.system.evaluation_steps
-        if base is env and env.num_envs != len(states):
+        if not wrapped and env.num_envs != len(states):
             env = base.with_slots(len(states))
     elif states is not None:
         raise ValueError(
@@ -97,3 +115,69 @@ def evaluate_policy_cost(
         actions, _ = model.predict(observation[walk.ants], deterministic=True)
         observation = walk.step(np.asarray(actions) - walk.first_action).observation
     return PolicyCost(walk.cost, walk.success, walk.length)
+
+
+def record_trajectory(
+    model: Predictor,
+    env: VectorEnv[Any, Any, Any],
+    state: FloatArray,
+    *,
+    max_steps: int | None = None,
+) -> Trajectory:
+    """Follow the policy of `model` once and keep every state, action and cost.
+
+    Args:
+        model: see `evaluate_policy_cost`.
+        env: an environment of this package with one slot, wrapped or not.
+        state: the initial state, `(state_size,)`.
+        max_steps: T; None takes that of the environment.
+
+    Raises:
+        TypeError: `env` is of another package.
+        ValueError: it has more than one slot.
+    """
+    base = _control_env(env)
+    if env.num_envs != 1:
+        raise ValueError(f"env must have one slot, got {env.num_envs}.")
+    walk = Walk(env, base.system.evaluation_steps if max_steps is None else max_steps)
+    observation = walk.start(states=np.asarray(state)[None])
+    states, actions, costs = [base.states[0]], [], []
+    while walk.ants.size:
+        action, _ = model.predict(observation, deterministic=True)
+        action = np.asarray(action) - walk.first_action
+        step = walk.step(action)
+        observation = step.observation
+        states.append(base.states[0])
+        actions.append(int(action[0]))
+        costs.append(float(step.cost[0]))
+    return Trajectory(
+        np.array(states), np.array(actions), np.array(costs), bool(walk.success[0])
+    )
+
+
+def actions_in(
+    model: Predictor, env: VectorEnv[Any, Any, Any], states: FloatArray
+) -> NDArray[np.int64]:
+    """The action of the policy in each of some states, `(n,)`.
+
+    Args:
+        model: see `evaluate_policy_cost`.
+        env: an environment of this package with one slot a state, wrapped or not.
+        states: `(n, state_size)`.
+
+    Raises:
+        TypeError: `env` is of another package.
+    """
+    _control_env(env)
+    observation, _ = env.reset(options={"state": states})
+    return np.asarray(model.predict(observation, deterministic=True)[0], dtype=np.int64)
+
+
+def _control_env(env: VectorEnv[Any, Any, Any]) -> ControlVectorEnv:
+    base = env.unwrapped
+    if not isinstance(base, ControlVectorEnv):
+        raise TypeError(
+            "env must be a vector environment of acl_gym, which can be put into any "
+            f"state; got {type(base).__name__}."
+        )
+    return base

@@ -77,7 +77,7 @@ class Partition(ABC):
         return index, degree
 
 
-@njit(cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
+@njit(cache=True, error_model="numpy")
 def _locate_on_axis(
     x: float, edges: FloatArray, first: int, count: int, period: float, rate: float
 ) -> tuple[int, float]:
@@ -127,7 +127,7 @@ def _locate_on_axis(
     return low, (x - left) / (edges[first + low + 1] - left)
 
 
-@njit(cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
+@njit(cache=True, error_model="numpy")
 def _locate(
     states: FloatArray,
     slots: IntArray,
@@ -224,7 +224,9 @@ class _Grid(Partition):
         self._edges = np.concatenate(edges)
         self._count = np.array([axis.size for axis in edges], dtype=np.int64)
         self._first = np.cumsum(self._count) - self._count
-        self._period_lengths = np.array([period or 0.0 for period in lengths])  # 0: none
+        self._period_lengths = np.array(
+            [period or 0.0 for period in lengths]
+        )  # 0: none
         self._rates = np.array([_regular_rate(axis) for axis in edges])
 
     @classmethod

@@ -6,6 +6,7 @@ else is JSON.
 
 from __future__ import annotations
 
+import io
 import json
 import os
 import zipfile
@@ -35,20 +36,24 @@ def save(
     """
     target = with_suffix(path)
     text = json.dumps({"format": FORMAT, "version": VERSION, **header})
-    temporary = target.with_name(f".{target.name}.{os.getpid()}.tmp")
+    buffer = io.BytesIO()
+    content = np.frombuffer(text.encode(), dtype=np.uint8)
+    np.savez_compressed(buffer, header=content, **arrays)  # type: ignore[arg-type]
+    write_atomically(target, buffer.getvalue())
+    return target
+
+
+def write_atomically(path: Path, content: bytes) -> None:
+    """Write a file that appears whole or not at all."""
+    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
     try:
         with temporary.open("wb") as file:
-            np.savez_compressed(
-                file,
-                header=np.frombuffer(text.encode(), dtype=np.uint8),
-                **arrays,  # type: ignore[arg-type]
-            )
+            file.write(content)
             file.flush()
             os.fsync(file.fileno())
-        temporary.replace(target)
+        temporary.replace(path)
     finally:
         temporary.unlink(missing_ok=True)
-    return target
 
 
 def load(path: str | Path) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:

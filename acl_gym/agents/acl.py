@@ -144,8 +144,12 @@ class ACL(TabularAgent):
                     )
                     solutions.append(ants, index, degree, actions)  # 10
                     observation = walk.step(actions).observation  # 11, 13-16
-                    pheromone.local_update(index, degree, actions, self.local_decay)  # 12
-                pheromone.global_update(solutions, walk.cost, self.global_decay)  # 18-20
+                    pheromone.local_update(
+                        index, degree, actions, self.local_decay
+                    )  # 12
+                pheromone.global_update(
+                    solutions, walk.cost, self.global_decay
+                )  # 18-20
                 training.end_trial()  # 21
         return self
 
@@ -201,7 +205,7 @@ class ACL(TabularAgent):
 
     def measures(self, policy: IntArray) -> Row:
         """The sensitivity of the policy (3.48), averaged over the cells, in [0, 1]."""
-        return {"sensitivity": _mean_sensitivity(self.table, policy, self.alpha)}
+        return {"sensitivity": float(_mean_sensitivity(self.table, policy, self.alpha))}
 
     def _explore(self, index: CellArray, degree: FloatArray) -> IntArray:
         return choose_actions(
@@ -221,7 +225,7 @@ class ACL(TabularAgent):
         return Solutions(self.num_envs, self.max_steps, self.partition.cells_per_state)
 
 
-@njit(cache=True)  # type: ignore[untyped-decorator]
+@njit(cache=True)
 def _mean_sensitivity(levels: FloatArray, policy: IntArray, alpha: float) -> float:
     total = 0.0
     for cell in range(levels.shape[0]):
@@ -230,4 +234,4 @@ def _mean_sensitivity(levels: FloatArray, policy: IntArray, alpha: float) -> flo
             if u != policy[cell]:
                 second = max(second, levels[cell, u])
         total += (second / levels[cell, policy[cell]]) ** alpha
-    return total / levels.shape[0]
+    return float(total / levels.shape[0])

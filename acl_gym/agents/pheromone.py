@@ -67,9 +67,7 @@ class Pheromone:
         stale: whether a cell's levels have changed since, `(n_cells,)`.
     """
 
-    def __init__(
-        self, n_cells: int, n_actions: int, tau0: float, alpha: float
-    ) -> None:
+    def __init__(self, n_cells: int, n_actions: int, tau0: float, alpha: float) -> None:
         self.tau0 = tau0
         self._alpha = alpha
         self.levels: FloatArray = np.full((n_cells, n_actions), tau0)
@@ -137,7 +135,9 @@ class Pheromone:
         Raises:
             ValueError: a cost is not positive and finite.
         """
-        valid = np.isfinite(costs) & (costs > 0.0)
+        with np.errstate(divide="ignore", over="ignore"):
+            deposits = 1.0 / costs
+        valid = np.isfinite(costs) & (costs > 0.0) & np.isfinite(deposits)
         if not valid.all():
             ant = int(np.flatnonzero(~valid)[0])
             raise ValueError(
@@ -150,7 +150,7 @@ class Pheromone:
             solutions.degree,
             solutions.action,
             solutions.length,
-            1.0 / costs,
+            deposits,
             global_decay,
             self.levels,
             self.stale,
@@ -162,7 +162,7 @@ class Pheromone:
         )
 
 
-@njit(cache=True)  # type: ignore[untyped-decorator]
+@njit(cache=True)
 def _append(
     ants: IntArray,
     index: CellArray,
@@ -183,7 +183,7 @@ def _append(
         length[ant] = t + 1
 
 
-@njit(cache=True)  # type: ignore[untyped-decorator]
+@njit(cache=True)
 def _decay(
     index: CellArray,
     degree: FloatArray,
@@ -200,11 +200,13 @@ def _decay(
                 cell = index[j, c]
                 # (4.17): written around tau0, a level at tau0 stays there exactly.
                 excess = levels[cell, action] - tau0
-                levels[cell, action] = tau0 + (1.0 - local_decay * degree[j, c]) * excess
+                levels[cell, action] = (
+                    tau0 + (1.0 - local_decay * degree[j, c]) * excess
+                )
                 stale[cell] = True
 
 
-@njit(cache=True)  # type: ignore[untyped-decorator]
+@njit(cache=True)
 def _deposit(
     index: CellArray,
     degree: FloatArray,

@@ -136,7 +136,7 @@ class QLearning(TabularAgent):
         )
 
 
-@njit(cache=True)  # type: ignore[untyped-decorator]
+@njit(cache=True)
 def _update(
     values: FloatArray,
     index: CellArray,

@@ -77,7 +77,7 @@ def epsilon_greedy_actions(
 
 def greedy_actions(
     table: FloatArray,
-    preference: NDArray[np.int32],
+    ranks: NDArray[np.int32],
     index: CellArray,
     degree: FloatArray,
 ) -> IntArray:
@@ -85,9 +85,8 @@ def greedy_actions(
 
     Args:
         table: `(n_cells, n_actions)`, pheromone levels or action values.
-        preference: `(n_cells, n_actions)`, a rank of the actions for each cell. Tied
-            actions go by their rank in the state's foremost cell, so that a policy
-            whose ties were once broken at random is a function of the state.
+        ranks: `(n_cells, n_actions)`, an order of the actions for each cell. Tied
+            actions go by their rank in the state's foremost cell.
         index: `(n, k)`.
         degree: `(n, k)`.
 
@@ -95,11 +94,11 @@ def greedy_actions(
         Indices of actions, `(n,)`.
     """
     actions = np.empty(index.shape[0], dtype=np.int64)
-    _greedy(table, preference, index, degree, actions)
+    _greedy(table, ranks, index, degree, actions)
     return actions
 
 
-@njit(cache=True, inline="always")  # type: ignore[untyped-decorator]
+@njit(cache=True, inline="always")
 def _value(table: FloatArray, cells: CellArray, degrees: FloatArray, u: int) -> float:
     """The sum over a state's cells of degree times table entry."""
     total = 0.0
@@ -108,7 +107,7 @@ def _value(table: FloatArray, cells: CellArray, degrees: FloatArray, u: int) -> 
     return total
 
 
-@njit(cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
+@njit(cache=True, error_model="numpy")
 def _repair(
     levels: FloatArray, alpha: float, cell: int, probabilities: FloatArray
 ) -> None:
@@ -134,7 +133,7 @@ def _repair(
         probabilities[cell, u] /= total
 
 
-@njit(cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
+@njit(cache=True, error_model="numpy")
 def _boltzmann(
     levels: FloatArray,
     alpha: float,
@@ -169,7 +168,7 @@ def _boltzmann(
         actions[j] = action
 
 
-@njit(cache=True)  # type: ignore[untyped-decorator]
+@njit(cache=True)
 def _epsilon_greedy(
     levels: FloatArray,
     index: CellArray,
@@ -203,10 +202,10 @@ def _epsilon_greedy(
                 skip -= 1
 
 
-@njit(cache=True)  # type: ignore[untyped-decorator]
+@njit(cache=True)
 def _greedy(
     table: FloatArray,
-    preference: NDArray[np.int32],
+    ranks: NDArray[np.int32],
     index: CellArray,
     degree: FloatArray,
     actions: IntArray,
@@ -216,7 +215,7 @@ def _greedy(
         for c in range(1, index.shape[1]):
             if degree[j, c] > degree[j, foremost]:
                 foremost = c
-        rank = preference[index[j, foremost]]
+        rank = ranks[index[j, foremost]]
         best = -np.inf
         for u in range(table.shape[1]):
             value = _value(table, index[j], degree[j], u)

@@ -8,11 +8,10 @@ from typing import Any, Self
 
 import numpy as np
 from gymnasium.vector import VectorEnv
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from acl_gym import storage, validation
-from acl_gym.agents.selection import greedy_actions
+from acl_gym.agents.policy import RankArray, TablePolicy, random_ranks
 from acl_gym.agents.walk import Walk
 from acl_gym.callbacks import Callbacks, Row
 from acl_gym.partition import (
@@ -159,12 +158,15 @@ class TabularAgent(ABC):
         learning, predicting, ties = np.random.SeedSequence(seed).spawn(3)
         self.rng = np.random.default_rng(learning)
         self._predict_rng = np.random.default_rng(predicting)
-        ranks = np.tile(
-            np.arange(self.n_actions, dtype=np.int32), (self.partition.n_cells, 1)
+        self._ranks: RankArray = random_ranks(
+            self.partition.n_cells, self.n_actions, np.random.default_rng(ties)
         )
-        self._preference: NDArray[np.int32] = np.random.default_rng(ties).permuted(
-            ranks, axis=1
-        )
+
+    @property
+    def policy(self) -> TablePolicy:
+        """The policy as it is now; it follows the table until you `copy()` it."""
+        first_action = 0 if self._walk is None else self._walk.first_action
+        return TablePolicy(self.partition, self.table, self._ranks, first_action)
 
     def predict(
         self,
@@ -188,20 +190,14 @@ class TabularAgent(ABC):
         Raises:
             ValueError: an observation is not finite or has the wrong shape.
         """
+        policy = self.policy
+        if deterministic:
+            return policy.predict(observation, state)
         batch = np.asarray(observation)
         single = batch.ndim == self.partition.state_ndim
         index, degree = self.partition(batch[None] if single else batch)
-        if deterministic:
-            actions = greedy_actions(self.table, self._preference, index, degree)
-        else:
-            actions = self._explore(index, degree)
-        if self._walk is not None:
-            actions += self._walk.first_action
+        actions = self._explore(index, degree) + policy.first_action
         return (actions[0] if single else actions), state
-
-    def greedy_policy(self) -> IntArray:
-        """The best action of every cell, `(n_cells,)`, (3.10)."""
-        return best_actions(self.table, self._preference)
 
     def _locate(
         self, observation: NDArray[Any], ants: IntArray
@@ -234,7 +230,7 @@ class TabularAgent(ABC):
                 rng.bit_generator.state for rng in (self.rng, self._predict_rng)
             ],
         }
-        arrays = {"table": self.table, "preference": self._preference}
+        arrays: dict[str, NDArray[Any]] = {"table": self.table, "ranks": self._ranks}
         return storage.save(path, header, arrays)
 
     @classmethod
@@ -266,7 +262,7 @@ class TabularAgent(ABC):
                 **header["parameters"],
             )
             agent.set_table(arrays["table"])
-            agent._preference[:] = arrays["preference"]
+            agent._ranks[:] = arrays["ranks"]
             agent.num_timesteps = header["num_timesteps"]
             agent.trials = header["trials"]
             agent.seconds = header["seconds"]
@@ -277,17 +273,3 @@ class TabularAgent(ABC):
         except (KeyError, TypeError) as error:
             raise ValueError(f"{path} is damaged: {error}.") from error
         return agent
-
-
-@njit(cache=True)  # type: ignore[untyped-decorator]
-def best_actions(table: FloatArray, preference: NDArray[np.int32]) -> IntArray:
-    """The best action of each cell, ties by rank, `(n_cells,)`."""
-    best = np.zeros(table.shape[0], dtype=np.int64)
-    for cell in range(table.shape[0]):
-        for u in range(1, table.shape[1]):
-            lead = table[cell, u] - table[cell, best[cell]]
-            if lead > 0.0 or (
-                lead == 0.0 and preference[cell, u] < preference[cell, best[cell]]
-            ):
-                best[cell] = u
-    return best

@@ -58,7 +58,7 @@ class Training:
         self._callbacks = as_callbacks(callback)
         self._log_interval = log_interval
         self._stopped = False
-        self._policy = agent.greedy_policy()
+        self._policy = agent.policy.best_actions()
         in_trials = trials is not None
         self._bar: Any = tqdm(
             total=trials if in_trials else total_timesteps,
@@ -103,7 +103,7 @@ class Training:
         agent.num_timesteps += steps
         agent.trials += 1
         agent.seconds += time.perf_counter() - self._clock
-        policy = agent.greedy_policy()
+        policy = agent.policy.best_actions()
         row: Row = {
             "trial": agent.trials,
             "env_steps": agent.num_timesteps,

@@ -54,6 +54,7 @@ class ControlEnv(gym.Env[Observation, np.int64]):
         self.system = self.system_type(**parameters)
         self.observation_space = self.system.observation_space
         self.action_space = self.system.action_space
+        self._n_actions = int(self.system.action_space.n)
         self._state: FloatArray | None = None
         self._finished = False
 
@@ -104,7 +105,7 @@ class ControlEnv(gym.Env[Observation, np.int64]):
                 + ("has not begun" if self._state is None else "reached its goal")
                 + "; call reset() first."
             )
-        actions = _checked_actions([action], 1, int(self.action_space.n))  # type: ignore[attr-defined]
+        actions = _checked_actions(np.asarray([action]), 1, self._n_actions)
         rewards, reached = np.empty(1), np.empty(1, dtype=np.bool_)
         uniforms = _uniforms(self.system, self.np_random, 1)
         self.system.advance(self._state, actions, uniforms, rewards, reached)
@@ -215,7 +216,7 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
         self._start(slots, states)
         return self._observe(), {}
 
-    def step(self, actions: ArrayLike) -> StepResult:  # type: ignore[override]
+    def step(self, actions: ArrayLike) -> StepResult:
         """Apply one action to each slot.
 
         Args:
@@ -338,6 +339,15 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
             "final_info": {},
             "_final_info": finished.copy(),
         }
+
+    @property
+    def states(self) -> FloatArray:
+        """The states of all slots, `(num_envs, state_size)`, a copy.
+
+        Raises:
+            ResetNeeded: there was no reset yet.
+        """
+        return self._states.T.copy()
 
     @property
     def _states(self) -> FloatArray:

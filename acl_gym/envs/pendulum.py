@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, fields
 from functools import cached_property
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from gymnasium import spaces
@@ -23,7 +23,7 @@ _PI_HIGH = 3.1415926218032837
 _PI_LOW = 3.178650954705639e-08
 
 
-@njit(cache=True, inline="always")  # type: ignore[untyped-decorator]
+@njit(cache=True, inline="always")
 def sine(x: float) -> float:
     """Sine without branches, so that LLVM vectorises the loop it is called in.
 
@@ -46,7 +46,7 @@ def sine(x: float) -> float:
     return sign * (r + r * s * series)
 
 
-@njit(cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
+@njit(cache=True, error_model="numpy")
 def _integrate(
     theta: FloatArray,
     omega: FloatArray,
@@ -82,7 +82,7 @@ def _integrate(
             omega[i] = speed1 + sixth * (rate1 + 2.0 * (rate2 + rate3) + rate4)
 
 
-@njit(cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
+@njit(cache=True, error_model="numpy")
 def _settle(
     theta: FloatArray,
     omega: FloatArray,
@@ -140,6 +140,8 @@ class Pendulum(ControlSystem):
         state_weight: Q of (5.4), symmetric and positive semi-definite, shape (2, 2).
         torque_weight: R of (5.4), >= 0.
     """
+
+    circular: ClassVar[tuple[int, ...]] = (0,)
 
     inertia: float = 0.005
     motor_gain: float = 0.1

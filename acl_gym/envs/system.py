@@ -29,6 +29,9 @@ class ControlSystem(ABC):
     draws_per_step: ClassVar[int] = 0
     """How many uniform random numbers `advance` takes for each slot and step."""
 
+    circular: ClassVar[tuple[int, ...]] = ()
+    """The state variables whose high end is their low end, such as angles."""
+
     evaluation_steps: ClassVar[int] = 300
     """T for the evaluation of a policy from `evaluation_states`."""
 

@@ -1,0 +1,84 @@
+# Everything here runs in .venv, which the first call makes. Beforehand a machine
+# needs Python 3.11 with pip and venv, and no more.
+
+.DEFAULT_GOAL := help
+.DELETE_ON_ERROR:
+.PHONY: help install compare bench test lint format build check-wheel clean distclean
+
+VENV := .venv
+BIN := $(VENV)/bin
+STAMP := $(VENV)/.installed
+WHEEL_VENV := build/wheel-venv
+
+# The first interpreter that works, is recent enough and can make an environment.
+PYTHON ?= $(shell for python in python3.11 python3; do \
+	$$python -c 'import ensurepip, sys, venv; sys.exit(sys.version_info < (3, 11))' \
+	2>/dev/null && echo $$python && break; done)
+
+PIP_INSTALL := -m pip install -qq --disable-pip-version-check
+
+PRESET ?= quick
+OUT ?= results/compare
+WORKERS ?= 2
+
+help: ## Show this list
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' \
+		$(firstword $(MAKEFILE_LIST))
+	@echo
+	@echo "  Variables: ARGS (added to the command of compare, bench and test),"
+	@echo "  PRESET and OUT (compare), WORKERS (test), PYTHON (makes .venv)."
+
+# The stamp is renewed, and pip asked again, only when one of these two has changed.
+install: $(STAMP) ## Make .venv with the locked dependencies and this package
+
+$(STAMP): requirements.lock pyproject.toml
+	@$(BIN)/python -m pip --version >/dev/null 2>&1 || { \
+		test -n "$(PYTHON)" || { echo >&2 "make: found no Python 3.11 or later" \
+			"that has pip and venv; install one or name it: make PYTHON=..."; \
+			exit 1; }; \
+		echo "Making $(VENV) with $(PYTHON)"; \
+		$(PYTHON) -m venv --clear $(VENV); }
+	@echo "Installing the locked dependencies into $(VENV): a few minutes, once"
+	@$(BIN)/python $(PIP_INSTALL) -r requirements.lock
+	@$(BIN)/python $(PIP_INSTALL) --no-deps --no-build-isolation -e .
+	@$(BIN)/python -m pip check --disable-pip-version-check
+	@touch $@
+
+compare: $(STAMP) ## Train ants, Q-learning and DQN on one task and compare them
+	$(BIN)/python benchmarks/compare_acl_rl.py --preset $(PRESET) --out $(OUT) $(ARGS)
+
+bench: $(STAMP) ## Measure the throughput of environments and kernels
+	$(BIN)/python benchmarks/throughput.py $(ARGS)
+
+test: $(STAMP) ## Run every test
+	$(BIN)/python -m pytest -n $(WORKERS) --dist worksteal $(ARGS)
+
+lint: $(STAMP) ## Check style, format and types
+	$(BIN)/python -m ruff check .
+	$(BIN)/python -m ruff format --check .
+	$(BIN)/python -m mypy
+
+format: $(STAMP) ## Put the code into the house format
+	$(BIN)/python -m ruff check --fix-only .
+	$(BIN)/python -m ruff format .
+
+build: $(STAMP) ## Build the sdist, and from it the wheel, into dist/
+	@rm -rf dist
+	$(BIN)/python -m build --no-isolation
+
+check-wheel: build ## Install the wheel into an empty environment and try it there
+	@rm -rf $(WHEEL_VENV)
+	@$(BIN)/python -m venv $(WHEEL_VENV)
+	@echo "Installing the wheel and what it asks for into $(WHEEL_VENV)"
+	@$(WHEEL_VENV)/bin/python $(PIP_INSTALL) -c requirements.lock dist/acl_gym-*.whl
+	cd $(WHEEL_VENV) && bin/python -c "import acl_gym"
+	$(WHEEL_VENV)/bin/python -I .ci/check_wheel.py
+	@rm -rf $(WHEEL_VENV)
+
+clean: ## Remove what builds and tests have left, compiled kernels too
+	rm -rf build dist .hypothesis .mypy_cache .numba_cache .pytest_cache .ruff_cache
+	find . -name $(VENV) -prune -o -name __pycache__ -type d -prune \
+		-exec rm -rf {} +
+
+distclean: clean ## Remove .venv as well
+	rm -rf $(VENV)

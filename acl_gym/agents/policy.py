@@ -1,0 +1,100 @@
+"""A policy as a table over a partition: what every method here ends with."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numba import njit
+from numpy.typing import ArrayLike, NDArray
+
+from acl_gym.agents.selection import greedy_actions
+from acl_gym.partition import FloatArray, IntArray, Partition
+
+RankArray = NDArray[np.int32]
+
+
+def random_ranks(n_cells: int, n_actions: int, rng: np.random.Generator) -> RankArray:
+    """A random order of the actions for each cell, `(n_cells, n_actions)`.
+
+    Ties are to be broken at random (4.16). Drawn once, the order makes the policy a
+    function (a decision).
+    """
+    ranks = np.tile(np.arange(n_actions, dtype=np.int32), (n_cells, 1))
+    return np.asarray(rng.permuted(ranks, axis=1), dtype=np.int32)
+
+
+class TablePolicy:
+    """The action with the largest degree-weighted table entry (4.16).
+
+    Args:
+        partition: turns observations into cells and degrees.
+        table: `(n_cells, n_actions)`, pheromone levels or action values.
+        ranks: `(n_cells, n_actions)`, by which tied actions are told apart; None
+            draws them from a fixed seed.
+        first_action: the action that column 0 stands for, `Discrete.start`.
+    """
+
+    def __init__(
+        self,
+        partition: Partition,
+        table: FloatArray,
+        ranks: RankArray | None = None,
+        first_action: int = 0,
+    ) -> None:
+        if ranks is None:
+            n_cells, n_actions = table.shape
+            ranks = random_ranks(n_cells, n_actions, np.random.default_rng(0))
+        self.partition = partition
+        self.table = table
+        self.ranks = ranks
+        self.first_action = first_action
+
+    def predict(
+        self,
+        observation: ArrayLike,
+        state: Any = None,
+        episode_start: Any = None,
+        deterministic: bool = True,
+    ) -> tuple[NDArray[np.int64], Any]:
+        """Choose actions, with the signature of Stable-Baselines3.
+
+        Args:
+            observation: one observation or a batch of them.
+            state: passed through; a table has no memory.
+            episode_start: not used.
+            deterministic: not used; a table's policy is a function.
+
+        Returns:
+            `(actions, state)`; the action of a single observation has no axis.
+
+        Raises:
+            ValueError: an observation is not finite or has the wrong shape.
+        """
+        batch = np.asarray(observation)
+        single = batch.ndim == self.partition.state_ndim
+        index, degree = self.partition(batch[None] if single else batch)
+        actions = greedy_actions(self.table, self.ranks, index, degree)
+        actions += self.first_action
+        return (actions[0] if single else actions), state
+
+    def best_actions(self) -> IntArray:
+        """The best column of every cell, `(n_cells,)`, (3.10)."""
+        return _best_actions(self.table, self.ranks)
+
+    def copy(self) -> TablePolicy:
+        """The same policy over a table that no longer changes."""
+        return TablePolicy(
+            self.partition, self.table.copy(), self.ranks, self.first_action
+        )
+
+
+@njit(cache=True)
+def _best_actions(table: FloatArray, ranks: RankArray) -> IntArray:
+    best = np.zeros(table.shape[0], dtype=np.int64)
+    for cell in range(table.shape[0]):
+        for u in range(1, table.shape[1]):
+            lead = table[cell, u] - table[cell, best[cell]]
+            if lead > 0.0 or (lead == 0.0 and ranks[cell, u] < ranks[cell, best[cell]]):
+                best[cell] = u
+    return best

@@ -1,0 +1,341 @@
+"""Any Gymnasium vector environment as a `VecEnv` of Stable-Baselines3."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+from gymnasium import spaces
+from gymnasium.vector import AutoresetMode, SyncVectorEnv, VectorEnv, VectorWrapper
+from numpy.typing import NDArray
+from stable_baselines3.common.env_util import is_wrapped
+from stable_baselines3.common.vec_env import VecEnv
+from stable_baselines3.common.vec_env.base_vec_env import (
+    VecEnvIndices,
+    VecEnvObs,
+    VecEnvStepReturn,
+)
+
+_SUPPORTED_MODES = (AutoresetMode.DISABLED, AutoresetMode.SAME_STEP)
+_FINAL_KEYS = ("final_obs", "_final_obs", "final_info", "_final_info")
+_ARRAY_SPACES = (
+    spaces.Box,
+    spaces.Discrete,
+    spaces.MultiDiscrete,
+    spaces.MultiBinary,
+)
+
+
+class VectorEnvAdapter(VecEnv):
+    """Lets the agents of Stable-Baselines3 train in a Gymnasium vector environment.
+
+    Both libraries step many slots at once, but a `VecEnv` resets a slot in the step
+    that ends its episode, hands out one info a slot, and tells truncation from
+    termination in that info. With autoreset disabled, the adapter resets the slots
+    that have finished by `reset(options={"reset_mask": ...})`; with SAME_STEP it
+    takes the last observations from `infos["final_obs"]`.
+
+    Put a `VecMonitor` around it to have the returns of the episodes logged.
+
+    Args:
+        env: a vector environment whose autoreset mode is DISABLED (the better choice:
+            wrappers of observations work with it) or SAME_STEP.
+
+    Attributes:
+        env: that environment.
+
+    Raises:
+        TypeError: `env` is not a vector environment.
+        ValueError: its autoreset mode or one of its spaces cannot be shown as a
+            `VecEnv`.
+
+    Example:
+        >>> import gymnasium as gym, acl_gym
+        >>> from stable_baselines3.common.vec_env import VecMonitor
+        >>> env = gym.make_vec(
+        ...     "acl_gym/Pendulum-v0",
+        ...     num_envs=8,
+        ...     autoreset_mode="Disabled",
+        ...     max_episode_steps=300,
+        ... )
+        >>> vec_env = VecMonitor(acl_gym.VectorEnvAdapter(env))
+        >>> vec_env.reset().shape
+        (8, 2)
+    """
+
+    def __init__(self, env: VectorEnv[Any, Any, Any]) -> None:
+        if not isinstance(env, VectorEnv):
+            raise TypeError(
+                "env must be a gymnasium.vector.VectorEnv, got "
+                f"{type(env).__name__}; make it with gym.make_vec(id, num_envs=...)."
+            )
+        mode = env.metadata.get("autoreset_mode", AutoresetMode.NEXT_STEP)
+        if mode not in _SUPPORTED_MODES:
+            raise ValueError(
+                f"env must have autoreset mode DISABLED or SAME_STEP, got {mode.name}, "
+                "which puts a step without meaning between two episodes; make it with "
+                'gym.make_vec(id, autoreset_mode="Disabled"), or where the vector '
+                "environment is built from single ones, with "
+                'vector_kwargs={"autoreset_mode": AutoresetMode.DISABLED}.'
+            )
+        _check_observation_space(env.single_observation_space)
+        _check_start("actions", env.single_action_space)
+        self.env = env
+        self._resets_itself = mode is AutoresetMode.SAME_STEP
+        self._actions: NDArray[Any] | None = None
+        super().__init__(
+            env.num_envs, env.single_observation_space, env.single_action_space
+        )
+
+    @property
+    def spec(self) -> Any:
+        """The specification of the environment, None if it was built by hand."""
+        return self.env.spec
+
+    def reset(self) -> VecEnvObs:
+        """Start an episode in every slot, with the seed and options set before.
+
+        Returns:
+            The first observations; infos are in `reset_infos`.
+        """
+        seed, options = self._seeds[0], self._options[0]
+        observations, infos = self.env.reset(
+            seed=None if seed is None else int(seed), options=options or None
+        )
+        self.reset_infos = _one_info_a_slot(infos, self.num_envs)
+        self._reset_seeds()
+        self._reset_options()
+        self._actions = None
+        return _copy(observations)
+
+    def set_options(
+        self, options: list[dict[str, Any]] | dict[str, Any] | None = None
+    ) -> None:
+        """Set the options of the next reset, one dict for all slots together.
+
+        Raises:
+            TypeError: `options` is a list, one a slot.
+        """
+        if isinstance(options, list):
+            raise TypeError(
+                "options must be one dict for all slots, got a list; a vector "
+                "environment takes what differs between slots as an array with one "
+                'row a slot, such as {"state": states}.'
+            )
+        super().set_options(options)
+
+    def step_async(self, actions: NDArray[Any]) -> None:
+        """Keep the actions for `step_wait`."""
+        self._actions = np.array(actions)
+
+    def step_wait(self) -> VecEnvStepReturn:
+        """Take the step, and start a new episode where one has ended.
+
+        Returns:
+            `(observations, rewards, dones, infos)`, the rewards as float32. Every
+            info has `TimeLimit.truncated`; that of a slot that has finished has
+            `terminal_observation` as well.
+
+        Raises:
+            RuntimeError: `step_async` was not called before.
+        """
+        if self._actions is None:
+            raise RuntimeError(
+                "step_wait() needs actions; call step_async(actions) first, after "
+                "reset()."
+            )
+        actions, self._actions = self._actions, None
+        observations, rewards, terminated, truncated, infos = self.env.step(actions)
+        dones = np.logical_or(terminated, truncated)
+        slots = np.flatnonzero(dones).tolist()
+        plain = {key: infos[key] for key in infos if key not in _FINAL_KEYS}
+        rows = _one_info_a_slot(plain, self.num_envs)
+        if slots and self._resets_itself:
+            # What is not in final_info was written by the reset, or by a wrapper.
+            last = _one_info_a_slot(infos.get("final_info", {}), self.num_envs)
+            for slot in slots:
+                self.reset_infos[slot] = rows[slot]
+                rows[slot] = {**rows[slot], **last[slot]}
+                rows[slot]["terminal_observation"] = _copy(infos["final_obs"][slot])
+        elif slots:
+            for slot in slots:
+                rows[slot]["terminal_observation"] = _row(observations, slot)
+            # Some environments take the mask out of the dict: each gets a new one.
+            observations, infos = self.env.reset(options={"reset_mask": dones.copy()})
+            first = _one_info_a_slot(infos, self.num_envs)
+            for slot in slots:
+                self.reset_infos[slot] = first[slot]
+        for slot, cut in enumerate(np.greater(truncated, terminated).tolist()):
+            rows[slot]["TimeLimit.truncated"] = cut
+        return _copy(observations), np.array(rewards, dtype=np.float32), dones, rows
+
+    def close(self) -> None:
+        """Close the environment; calling it again is harmless."""
+        self.env.close()
+
+    def get_images(self) -> Sequence[NDArray[Any] | None]:
+        """The frame of each slot, None where there is no picture."""
+        frames: Any = self.env.render()
+        return [None] * self.num_envs if frames is None else list(frames)
+
+    def get_attr(self, attr_name: str, indices: VecEnvIndices = None) -> list[Any]:
+        """The attribute for each slot, see `set_attr` for whose.
+
+        Raises:
+            AttributeError: nobody has it.
+        """
+        slots = self._get_indices(indices)
+        if attr_name in ("observation_space", "action_space"):
+            return [getattr(self, attr_name) for _ in slots]
+        if envs := self._single_envs_with(attr_name):
+            return [envs[slot].get_wrapper_attr(attr_name) for slot in slots]
+        value = getattr(self._layer_with(attr_name), attr_name)
+        return [value for _ in slots]
+
+    def set_attr(
+        self, attr_name: str, value: Any, indices: VecEnvIndices = None
+    ) -> None:
+        """Set an attribute that exists.
+
+        In a `SyncVectorEnv` it is that of the slots' single environments. In any
+        other vector environment, or where those do not have it, it is that of the
+        vector environment or of its outermost wrapper that has it, and counts for
+        all slots.
+
+        Raises:
+            AttributeError: nobody has it.
+            ValueError: it counts for all slots, but `indices` names some.
+        """
+        slots = list(self._get_indices(indices))
+        if envs := self._single_envs_with(attr_name):
+            for slot in slots:
+                envs[slot].set_wrapper_attr(attr_name, value)
+            return
+        layer = self._layer_with(attr_name)
+        self._check_all(attr_name, slots)
+        setattr(layer, attr_name, value)
+
+    def env_method(
+        self,
+        method_name: str,
+        *method_args: Any,
+        indices: VecEnvIndices = None,
+        **method_kwargs: Any,
+    ) -> list[Any]:
+        """Call a method, see `set_attr` for whose.
+
+        Returns:
+            What it returned for each slot; a method of the vector environment is
+            called once, and its result stands for all.
+
+        Raises:
+            AttributeError: nobody has it.
+            ValueError: it acts on all slots, but `indices` names some.
+        """
+        slots = list(self._get_indices(indices))
+        if envs := self._single_envs_with(method_name):
+            return [
+                envs[slot].get_wrapper_attr(method_name)(*method_args, **method_kwargs)
+                for slot in slots
+            ]
+        layer = self._layer_with(method_name)
+        self._check_all(method_name, slots)
+        result = getattr(layer, method_name)(*method_args, **method_kwargs)
+        return [result for _ in slots]
+
+    def env_is_wrapped(
+        self,
+        wrapper_class: type[gym.Wrapper[Any, Any, Any, Any]],
+        indices: VecEnvIndices = None,
+    ) -> list[bool]:
+        """Whether each slot, or the vector environment, has such a wrapper."""
+        slots = list(self._get_indices(indices))
+        if any(isinstance(layer, wrapper_class) for layer in self._layers()):
+            return [True for _ in slots]
+        base = self.env.unwrapped
+        if isinstance(base, SyncVectorEnv):
+            return [is_wrapped(base.envs[slot], wrapper_class) for slot in slots]
+        return [False for _ in slots]
+
+    def _layers(self) -> Iterator[VectorEnv[Any, Any, Any]]:
+        """The wrappers from the outermost inwards, and the environment itself."""
+        layer = self.env
+        while isinstance(layer, VectorWrapper):
+            yield layer
+            layer = layer.env
+        yield layer
+
+    def _layer_with(self, name: str) -> VectorEnv[Any, Any, Any]:
+        for layer in self._layers():
+            if hasattr(layer, name):
+                return layer
+        raise AttributeError(f"neither {self.env} nor what it wraps has {name!r}.")
+
+    def _single_envs_with(self, name: str) -> Sequence[gym.Env[Any, Any]]:
+        """The single environments of the slots if they are here and have `name`."""
+        base = self.env.unwrapped
+        if isinstance(base, SyncVectorEnv) and all(
+            env.has_wrapper_attr(name) for env in base.envs
+        ):
+            return base.envs
+        return ()
+
+    def _check_all(self, name: str, slots: Iterable[int]) -> None:
+        if set(slots) != set(range(self.num_envs)):
+            raise ValueError(
+                f"{name!r} belongs to all {self.num_envs} slots together, got the "
+                f"indices {list(slots)}; leave indices out."
+            )
+
+
+def _check_observation_space(space: spaces.Space[Any]) -> None:
+    parts = space.spaces.values() if isinstance(space, spaces.Dict) else [space]
+    for part in parts:
+        if not isinstance(part, _ARRAY_SPACES):
+            raise ValueError(
+                "observations must be a Box, Discrete, MultiDiscrete, MultiBinary or "
+                f"a Dict of those, got {part}; use gymnasium's FlattenObservation."
+            )
+        _check_start("observations", part)
+
+
+def _check_start(what: str, space: spaces.Space[Any]) -> None:
+    """Stable-Baselines3 takes it that the first of n discrete values is 0."""
+    if np.any(getattr(space, "start", 0)):
+        raise ValueError(
+            f"{what} must count from 0, got {space}; shift them with gymnasium's "
+            f"{'TransformAction' if what == 'actions' else 'TransformObservation'}."
+        )
+
+
+def _one_info_a_slot(infos: dict[str, Any], count: int) -> list[dict[str, Any]]:
+    """Take batched infos apart: under each key, what its mask says a slot has."""
+    rows: list[dict[str, Any]] = [{} for _ in range(count)]
+    for key, values in infos.items():
+        if key.startswith("_") and key[1:] in infos:
+            continue
+        mask = infos.get(f"_{key}")
+        slots = range(count) if mask is None else np.flatnonzero(mask).tolist()
+        if isinstance(values, dict):
+            parts: Sequence[Any] = _one_info_a_slot(values, count)
+        elif isinstance(values, np.ndarray) and values.shape[:1] == (count,):
+            parts = list(values.copy())
+        else:  # one value for all
+            parts = [values] * count
+        for slot in slots:
+            rows[slot][key] = parts[slot]
+    return rows
+
+
+def _copy(observations: Any) -> VecEnvObs:
+    if isinstance(observations, dict):
+        return {key: np.array(value) for key, value in observations.items()}
+    return np.array(observations)
+
+
+def _row(observations: Any, slot: int) -> VecEnvObs:
+    if isinstance(observations, dict):
+        return {key: np.array(value[slot]) for key, value in observations.items()}
+    return np.array(observations[slot])

@@ -1,0 +1,186 @@
+"""Runs in processes, each result kept as soon as it is there.
+
+A result is one JSON file, written to a temporary name and renamed. A run that is there
+already, made by the same code with the same settings, is not made again: a comparison
+that was killed goes on where it stopped.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import multiprocessing
+import queue
+from collections.abc import Callable, Iterable
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import acl_gym
+from acl_gym.storage import write_atomically
+
+Result = dict[str, Any]
+Progress = Callable[[str, float], None]
+"""Told the name of a task and the fraction of it that is done."""
+
+
+@dataclass(frozen=True)
+class Task:
+    """A call that is made once.
+
+    Attributes:
+        name: names its file; unique among the tasks of a folder.
+        function: a module-level function of `(*arguments, report)` that returns a
+            dict of JSON types; `report` takes the fraction done.
+        arguments: its other arguments.
+        settings: what the result depends on, JSON types.
+    """
+
+    name: str
+    function: Callable[..., Result]
+    arguments: tuple[Any, ...]
+    settings: dict[str, Any]
+
+    @property
+    def key(self) -> str:
+        """What must be equal for a kept result to be used: settings and code."""
+        text = json.dumps([self.name, self.settings, code_fingerprint()])
+        return hashlib.sha256(text.encode()).hexdigest()
+
+
+class TaskFailedError(RuntimeError):
+    """A task raised an exception, or its process died."""
+
+
+def run_tasks(
+    tasks: Iterable[Task],
+    directory: Path,
+    *,
+    workers: int,
+    progress: Progress | None = None,
+) -> list[Result]:
+    """Return the result of every task, in order, running those that are not there.
+
+    Args:
+        tasks: what to run.
+        directory: where results are kept.
+        workers: processes, >= 1.
+        progress: told how far each task is; 1.0 at once for one that was there.
+
+    Raises:
+        TaskFailedError: a task failed. The results of the others are kept.
+    """
+    tasks = list(tasks)
+    directory.mkdir(parents=True, exist_ok=True)
+    tell = progress or (lambda name, fraction: None)
+    results: dict[str, Result] = {}
+    for task in tasks:
+        kept = _read(task, directory)
+        if kept is not None:
+            results[task.name] = kept
+            tell(task.name, 1.0)
+    missing = [task for task in tasks if task.name not in results]
+    if missing:
+        results |= _run_in_processes(missing, directory, workers, tell)
+    return [results[task.name] for task in tasks]
+
+
+def _run_in_processes(
+    tasks: list[Task], directory: Path, workers: int, tell: Progress
+) -> dict[str, Result]:
+    # Spawned, not forked: a fork after torch or OpenMP has started may hang.
+    context = multiprocessing.get_context("spawn")
+    reports: Any = context.Queue()
+    results = {}
+    with ProcessPoolExecutor(
+        max_workers=min(workers, len(tasks)),
+        mp_context=context,
+        initializer=_start_worker,
+        initargs=(reports,),
+    ) as pool:
+        waiting: dict[Future[Result], Task] = {
+            pool.submit(_run_one, task): task for task in tasks
+        }
+        try:
+            while waiting:
+                done, _ = wait(waiting, timeout=0.2, return_when=FIRST_COMPLETED)
+                _pass_on(reports, tell)
+                for future in done:
+                    task = waiting.pop(future)
+                    results[task.name] = _outcome(task, future)
+                    _write(task, results[task.name], directory)
+                    tell(task.name, 1.0)
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
+    return results
+
+
+def _outcome(task: Task, future: Future[Result]) -> Result:
+    try:
+        return future.result()
+    except BrokenProcessPool as error:
+        raise TaskFailedError(
+            f"a worker process died while {task.name} was under way or waiting "
+            "(out of memory?); what is finished is kept, call again to go on."
+        ) from error
+    except Exception as error:
+        raise TaskFailedError(f"{task.name} failed: {error}") from error
+
+
+_reports: Any = None  # the queue of this worker process
+
+
+def _start_worker(reports: Any) -> None:
+    global _reports  # noqa: PLW0603 - set once, before any task
+    _reports = reports
+
+
+def _run_one(task: Task) -> Result:
+    return task.function(
+        *task.arguments, lambda fraction: _reports.put((task.name, fraction))
+    )
+
+
+def _pass_on(reports: Any, tell: Progress) -> None:
+    while True:
+        try:
+            name, fraction = reports.get_nowait()
+        except queue.Empty:
+            return
+        tell(name, min(fraction, 0.999))
+
+
+def _file(task: Task, directory: Path) -> Path:
+    return directory / f"{task.name}.json"
+
+
+def _read(task: Task, directory: Path) -> Result | None:
+    """The kept result of a task; None if there is none that may be used."""
+    try:
+        stored = json.loads(_file(task, directory).read_text())
+    except (FileNotFoundError, json.JSONDecodeError, UnicodeDecodeError):
+        return None
+    if not isinstance(stored, dict) or stored.get("key") != task.key:
+        return None
+    result = stored.get("result")
+    return result if isinstance(result, dict) else None
+
+
+def _write(task: Task, result: Result, directory: Path) -> None:
+    text = json.dumps({"key": task.key, "settings": task.settings, "result": result})
+    write_atomically(_file(task, directory), text.encode())
+
+
+@cache
+def code_fingerprint() -> str:
+    """A hash over the source of the package: other code, other results."""
+    digest = hashlib.sha256()
+    package = Path(acl_gym.__file__).parent
+    for source in sorted(package.rglob("*.py")):
+        digest.update(source.relative_to(package).as_posix().encode())
+        digest.update(source.read_bytes())
+    return digest.hexdigest()

@@ -1,0 +1,265 @@
+"""The single environment: what Gymnasium asks of it, resets, errors, copies."""
+
+import copy
+import pickle
+from itertools import combinations
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from gymnasium.error import Error, ResetNeeded
+from gymnasium.utils.env_checker import check_env
+from gymnasium.wrappers import TimeLimit
+
+from acl_gym.envs.pendulum import PendulumEnv
+from acl_gym.registration import ENVIRONMENTS, register_environments
+
+ENV_ID = "acl_gym/Pendulum-v0"
+NAN, INF = float("nan"), float("inf")
+UPRIGHT = {"state": [np.pi, 0.0]}
+HANGING = {"state": [0.0, 0.0]}
+EASY = {"goal_bounds": (2.5, 7.0)}  # random torques reach this goal now and then
+
+
+def walk(env: PendulumEnv, actions: list[int]) -> list[tuple[bytes, float, bool]]:
+    """Step through the actions, starting again at the goal; keep every bit."""
+    rows = []
+    for action in actions:
+        observation, reward, terminated, truncated, _ = env.step(action)
+        assert not truncated
+        rows.append((observation.tobytes(), reward, terminated))
+        if terminated:
+            rows.append((env.reset()[0].tobytes(), 0.0, False))
+    return rows
+
+
+def random_actions(count: int, seed: int) -> list[int]:
+    return np.random.default_rng(seed).integers(0, 3, count).tolist()
+
+
+def test_gymnasium_accepts_it() -> None:
+    check_env(gym.make(ENV_ID).unwrapped)
+
+
+def test_registering_again_is_harmless() -> None:
+    before = {env_id: gym.spec(env_id) for env_id in ENVIRONMENTS}
+    register_environments()
+    assert {env_id: gym.spec(env_id) for env_id in ENVIRONMENTS} == before
+    assert gym.spec(ENV_ID).max_episode_steps is None
+
+
+def test_time_limit_of_make() -> None:
+    env = gym.make(ENV_ID, max_episode_steps=3)
+    env.reset(options=HANGING)
+    flags = [env.step(1)[2:4] for _ in range(3)]
+    assert flags == [(False, False), (False, False), (False, True)]
+    # Without the keyword no limit applies.
+    unlimited = gym.make(ENV_ID)
+    unlimited.reset(options=HANGING)
+    assert not any(unlimited.step(1)[3] for _ in range(1000))
+
+
+def test_both_flags_on_the_last_step() -> None:
+    env = TimeLimit(PendulumEnv(), 1)
+    env.reset(options=UPRIGHT)
+    assert env.step(1)[2:4] == (True, True)
+
+
+def test_state_option_sets_the_state() -> None:
+    env = PendulumEnv()
+    state = np.array([-0.5, 9.0])
+    options = {"state": state}
+    observation, info = env.reset(options=options)
+    assert observation.tolist() == [np.mod(-0.5, 2 * np.pi), 9.0]
+    assert info == {}
+    assert options["state"] is state
+    assert state.tolist() == [-0.5, 9.0]
+    expected = env.step(2)[0]
+    # The array that was given and the one that came back belong to the caller.
+    observation, _ = env.reset(options=options)
+    observation[:] = 1.0
+    state[:] = 2.0
+    assert env.step(2)[0].tobytes() == expected.tobytes()
+
+
+def test_no_state_means_a_random_one() -> None:
+    env = PendulumEnv()
+    rows = [
+        env.reset(seed=4, options=options)[0].tolist()
+        for options in (None, {}, {"state": None})
+    ]
+    assert rows[0] == rows[1] == rows[2]
+    assert rows[0] != env.reset()[0].tolist()
+
+
+def test_given_state_draws_no_random_numbers() -> None:
+    env, other = PendulumEnv(), PendulumEnv()
+    env.reset(seed=5)
+    other.reset(seed=5)
+    other.reset(options=HANGING)
+    assert env.reset()[0].tobytes() == other.reset()[0].tobytes()
+
+
+BAD_STATES = {
+    "batch": [[0.0, 0.0]],
+    "one number": 0.0,
+    "three numbers": [0.0, 0.0, 0.0],
+    "empty": [],
+    "nan": [NAN, 0.0],
+    "infinite": [0.0, -INF],
+    "too fast": [0.0, np.nextafter(9.0, 10.0)],
+    "words": ["up", "still"],
+    "digits as strings": ["0", "0"],
+    "complex": [1j, 0.0],
+    "complex array": np.array([1j, 0.0]),
+    "none": [0.0, None],
+    "dict": {"theta": 0.0},
+}
+
+
+@pytest.mark.parametrize("state", BAD_STATES.values(), ids=BAD_STATES)
+def test_bad_state_is_refused_and_changes_nothing(state: Any) -> None:
+    env, twin = PendulumEnv(), PendulumEnv()
+    for each in (env, twin):
+        each.reset(seed=6)
+    with pytest.raises(ValueError, match=r"state|omega"):
+        env.reset(seed=7, options={"state": state})
+    actions = random_actions(20, 1)
+    assert walk(env, actions) == walk(twin, actions)
+    assert env.reset()[0].tobytes() == twin.reset()[0].tobytes()
+
+
+@pytest.mark.parametrize(
+    "options",
+    [{"states": [0.0, 0.0]}, {"reset_mask": np.array([True])}, {"state": None, "x": 1}],
+)
+def test_unknown_option_is_refused(options: dict[str, Any]) -> None:
+    unknown = next(key for key in options if key != "state")
+    with pytest.raises(ValueError, match=rf"among \['state'\], got \['{unknown}'\]"):
+        PendulumEnv().reset(options=options)
+
+
+@pytest.mark.parametrize("seed", [-1, 1.5, "1"])
+def test_bad_seed_changes_nothing(seed: Any) -> None:
+    env, twin = PendulumEnv(), PendulumEnv()
+    for each in (env, twin):
+        each.reset(seed=6)
+    with pytest.raises(Error):
+        env.reset(seed=seed, options=HANGING)
+    assert env.step(2)[0].tobytes() == twin.step(2)[0].tobytes()
+
+
+BAD_ACTIONS = {
+    "float": (1.0, TypeError),
+    "nan": (NAN, TypeError),
+    "numpy float": (np.float32(1), TypeError),
+    "bool": (True, TypeError),
+    "none": (None, TypeError),
+    "string": ("1", TypeError),
+    "beyond": (3, ValueError),
+    "negative": (-1, ValueError),
+    "largest unsigned": (np.uint64(2**64 - 1), ValueError),
+    "smallest": (np.iinfo(np.int64).min, ValueError),
+    "list": ([1], ValueError),
+    "array": (np.array([1]), ValueError),
+    "two": (np.array([1, 1]), ValueError),
+}
+
+
+@pytest.mark.parametrize(("action", "error"), BAD_ACTIONS.values(), ids=BAD_ACTIONS)
+def test_bad_action_is_refused_and_changes_nothing(
+    action: Any, error: type[Exception]
+) -> None:
+    env, twin = PendulumEnv(), PendulumEnv()
+    for each in (env, twin):
+        each.reset(options={"state": [1.0, 2.0]})
+    with pytest.raises(error, match=r"^actions must"):
+        env.step(action)
+    assert env.step(2)[0].tobytes() == twin.step(2)[0].tobytes()
+
+
+@pytest.mark.parametrize("kind", [int, np.int8, np.int32, np.int64, np.uint8, np.array])
+def test_any_integer_is_an_action(kind: Any) -> None:
+    env, twin = PendulumEnv(), PendulumEnv()
+    for each in (env, twin):
+        each.reset(options={"state": [1.0, 2.0]})
+    assert env.step(kind(2))[0].tobytes() == twin.step(2)[0].tobytes()
+
+
+def test_step_needs_a_running_episode() -> None:
+    env = PendulumEnv()
+    with pytest.raises(ResetNeeded, match="not begun"):
+        env.step(1)
+    env.reset(options=UPRIGHT)
+    assert env.step(1)[2]
+    with pytest.raises(ResetNeeded, match="reached its goal"):
+        env.step(1)
+    env.reset()
+    env.step(1)
+
+
+@pytest.mark.parametrize("substeps", [1, 3])
+def test_observations_belong_to_the_space(substeps: int) -> None:
+    env = PendulumEnv(substeps=substeps, **EASY)
+    observation, _ = env.reset(seed=8)
+    finishes = 0
+    for action in random_actions(4000, 2):
+        assert env.observation_space.contains(observation)
+        assert observation[0] < 2 * np.pi
+        observation, reward, terminated, _, info = env.step(action)
+        assert type(reward) is float
+        assert type(terminated) is bool
+        assert info == {}
+        assert -env.system.max_stage_cost <= reward <= 0.0
+        if terminated:
+            finishes += 1
+            observation, _ = env.reset()
+    assert finishes > 3
+
+
+def test_every_observation_is_a_new_array() -> None:
+    env = PendulumEnv()
+    seen = [env.reset(options=HANGING)[0]]
+    seen += [env.step(2)[0] for _ in range(5)]
+    assert len({row.tobytes() for row in seen}) == 6
+    assert not any(np.shares_memory(a, b) for a, b in combinations(seen, 2))
+    kept = [row.copy() for row in seen]
+    expected = copy.deepcopy(env).step(0)[0]
+    for row in seen:
+        np.add(row, 1.0, out=row)
+    assert env.step(0)[0].tobytes() == expected.tobytes()
+    assert all(np.array_equal(a, b + 1.0) for a, b in zip(seen, kept, strict=True))
+
+
+def test_same_seed_same_bits() -> None:
+    envs = [PendulumEnv(**EASY) for _ in range(3)]
+    starts = [
+        env.reset(seed=seed)[0].tobytes()
+        for env, seed in zip(envs, (9, 9, 10), strict=True)
+    ]
+    walks = [walk(env, random_actions(500, 3)) for env in envs]
+    assert sum(row[2] for row in walks[0]) > 1
+    assert (starts[0], walks[0]) == (starts[1], walks[1])
+    assert starts[0] != starts[2]
+    assert walks[0] != walks[2]
+
+
+@pytest.mark.parametrize(
+    "twin", [copy.deepcopy, lambda env: pickle.loads(pickle.dumps(env))]
+)
+def test_copy_continues_alike_and_apart(twin: Any) -> None:
+    env = PendulumEnv(**EASY, substeps=2)
+    env.reset(seed=11)
+    walk(env, random_actions(10, 4))
+    other = twin(env)
+    assert other.system == env.system
+    actions = random_actions(300, 5)
+    walked = walk(env, actions)
+    assert sum(row[2] for row in walked) > 1
+    assert walk(other, actions) == walked
+
+
+def test_render_mode_is_refused_until_there_is_one() -> None:
+    with pytest.raises(ValueError, match="render_mode must be None"):
+        PendulumEnv(render_mode="human")

@@ -1,0 +1,228 @@
+"""The native vector environment: its face, actions, aliasing, determinism, copies."""
+
+import copy
+import pickle
+from itertools import combinations
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from gymnasium import spaces
+from gymnasium.error import ResetNeeded
+from gymnasium.vector import AutoresetMode
+
+from acl_gym.envs.pendulum import Pendulum, PendulumVectorEnv
+from tests.envs.vector_helpers import (
+    EASY,
+    ENV_ID,
+    arrays_in,
+    assert_same_bits,
+    assert_same_step,
+    assert_walk_alike,
+    pair,
+    walk,
+)
+
+NAN = float("nan")
+
+
+@pytest.mark.parametrize("num_envs", [1, 3])
+def test_spaces(num_envs: int) -> None:
+    env = PendulumVectorEnv(num_envs)
+    system = Pendulum()
+    assert env.num_envs == num_envs
+    assert env.single_observation_space == system.observation_space
+    assert env.single_action_space == spaces.Discrete(3)
+    assert env.action_space == spaces.MultiDiscrete([3] * num_envs)
+    assert env.observation_space == spaces.Box(
+        np.tile([0.0, -9.0], (num_envs, 1)),
+        np.tile([2 * np.pi, 9.0], (num_envs, 1)),
+        dtype=np.float64,
+    )
+
+
+def test_what_is_returned(mode: str) -> None:
+    env = PendulumVectorEnv(5, autoreset_mode=mode, max_episode_steps=20, **EASY)
+    observations, infos = env.reset(seed=1)
+    assert infos == {}
+    assert env.observation_space.contains(observations)
+    for observations, rewards, terminated, truncated, infos in walk(env, 400, 1):
+        assert env.observation_space.contains(observations)
+        assert (rewards.shape, rewards.dtype) == ((5,), np.float64)
+        assert np.all((rewards <= 0.0) & (rewards >= -env.system.max_stage_cost))
+        for flags in (terminated, truncated):
+            assert (flags.shape, flags.dtype) == ((5,), np.bool_)
+        ended = mode == "SameStep" and (terminated | truncated).any()
+        assert bool(infos) == ended
+
+
+def test_make_vec_takes_the_mode_as_a_string(mode: str) -> None:
+    env = gym.make_vec(ENV_ID, num_envs=2, autoreset_mode=mode, max_episode_steps=5)
+    assert type(env.unwrapped) is PendulumVectorEnv
+    assert env.metadata["autoreset_mode"] is AutoresetMode(mode)
+    assert env.unwrapped.max_episode_steps == 5
+    assert mode in env.unwrapped.spec.to_json()
+    # The mode of one environment is not that of the class.
+    assert PendulumVectorEnv.metadata["autoreset_mode"] is AutoresetMode.NEXT_STEP
+    assert gym.make_vec(ENV_ID).metadata["autoreset_mode"] is AutoresetMode.NEXT_STEP
+    assert not env.unwrapped.closed
+    env.close()
+    assert env.unwrapped.closed
+
+
+def test_mode_may_be_an_enum_member(mode: str) -> None:
+    env = PendulumVectorEnv(2, autoreset_mode=AutoresetMode(mode))
+    assert env.metadata["autoreset_mode"] is AutoresetMode(mode)
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("num_envs", 0),
+        ("num_envs", 1.0),
+        ("num_envs", "2"),
+        ("num_envs", True),
+        ("max_episode_steps", 0),
+        ("max_episode_steps", -1),
+        ("max_episode_steps", 10.0),
+        ("autoreset_mode", "nextstep"),
+        ("autoreset_mode", None),
+        ("autoreset_mode", ["NextStep"]),
+        ("render_mode", "human"),
+    ],
+)
+def test_bad_argument_is_refused_by_name(name: str, value: Any) -> None:
+    with pytest.raises((TypeError, ValueError), match=rf"^{name} must"):
+        PendulumVectorEnv(**{name: value})
+
+
+BAD_ACTIONS = {
+    "floats": ([0.0, 1.0, 2.0, 0.0], TypeError, "float64"),
+    "nan": ([NAN, 0, 0, 0], TypeError, "float64"),
+    "bools": ([True, False, True, True], TypeError, "bool"),
+    "none": ([0, None, 0, 0], TypeError, "object"),
+    "strings": (["0", "1", "2", "0"], TypeError, "<U1"),
+    "too few": ([0, 1, 2], ValueError, r"\(3,\)"),
+    "too many": ([0] * 5, ValueError, r"\(5,\)"),
+    "one number": (1, ValueError, r"\(\)"),
+    "column": ([[0], [1], [2], [0]], ValueError, r"\(4, 1\)"),
+    "beyond": ([0, 1, 3, 0], ValueError, "got 3 in slot 2"),
+    "negative": ([0, -1, 2, 0], ValueError, "got -1 in slot 1"),
+    "huge": (np.array([0, 2**63, 0, 0], dtype=np.uint64), ValueError, "in slot 1"),
+}
+
+
+@pytest.mark.parametrize(
+    ("actions", "error", "message"), BAD_ACTIONS.values(), ids=BAD_ACTIONS
+)
+def test_bad_actions_are_refused_and_change_nothing(
+    actions: Any, error: type[Exception], message: str, mode: str
+) -> None:
+    env, twin = pair(mode)
+    with pytest.raises(error, match=rf"^actions must.*{message}"):
+        env.step(actions)
+    assert_walk_alike(env, twin)
+
+
+@pytest.mark.parametrize("kind", [list, tuple, np.int8, np.int32, np.int64, np.uint16])
+def test_any_integers_are_actions(kind: Any) -> None:
+    env, twin = pair("NextStep")
+    actions = np.array([0, 1, 2, 1])
+    given = kind(actions.tolist())
+    assert_same_step(env.step(given), twin.step(actions))
+    assert np.array_equal(given, [0, 1, 2, 1])
+
+
+def test_step_needs_a_reset(mode: str) -> None:
+    env = PendulumVectorEnv(2, autoreset_mode=mode)
+    with pytest.raises(ResetNeeded, match="reset"):
+        env.step([1, 1])
+    with pytest.raises(ResetNeeded, match="reset_mask"):
+        env.reset(options={"reset_mask": np.array([True, True])})
+
+
+@pytest.mark.parametrize("wait", [False, True])
+def test_returned_arrays_belong_to_the_caller(wait: bool, mode: str) -> None:
+    env, twin = pair(mode)
+    options = {"finished": "wait"} if wait else None
+    returned = arrays_in(env.reset(options=options))
+    assert_same_bits(returned[0], twin.reset(options=options)[0])
+    rng = np.random.default_rng(4)
+    for _ in range(40):
+        # What the caller writes into the arrays does not come back.
+        for array in returned:
+            array[...] = 1
+        actions = rng.integers(0, 3, 4)
+        result = env.step(actions)
+        assert_same_step(result, twin.step(actions))
+        returned = arrays_in(result)
+        finished = result[2] | result[3]
+        if mode == "Disabled" and not wait and finished.any():
+            mask = {"reset_mask": finished.copy()}
+            returned += arrays_in(env.reset(options=mask))
+            assert_same_bits(returned[-1], twin.reset(options=mask)[0])
+
+
+def test_later_steps_do_not_change_what_was_returned(mode: str) -> None:
+    env = pair(mode)[0]
+    results = [(env.reset()[0], *step) for step in walk(env, 20, 5)]
+    returned = [array for result in results for array in arrays_in(result)]
+    kept = [array.copy() for array in returned]
+    walk(env, 40, 6)
+    env.reset(seed=9)
+    for array, before in zip(returned, kept, strict=True):
+        assert_same_bits(array, before)
+    for one, other in combinations(returned, 2):
+        assert not np.shares_memory(one, other)
+
+
+def test_same_seed_same_bits(mode: str) -> None:
+    env, twin = pair(mode, seed=6)
+    other = pair(mode, seed=7)[0]
+    start = env.reset(seed=6)[0]
+    assert_same_bits(start, twin.reset(seed=6)[0])
+    assert np.all(start != other.reset(seed=7)[0])
+    assert np.unique(start, axis=0).shape == (4, 2)
+    assert_walk_alike(env, twin)
+    # Without a seed the stream goes on instead of starting again.
+    following = env.reset()[0]
+    assert_same_bits(following, twin.reset()[0])
+    assert np.all(following != start)
+
+
+@pytest.mark.parametrize(
+    "twin", [copy.deepcopy, lambda env: pickle.loads(pickle.dumps(env))]
+)
+def test_copy_continues_alike_and_apart(twin: Any, mode: str) -> None:
+    env, untouched = pair(mode)
+    for each in (env, untouched):
+        walk(each, 7, 8)
+    other = twin(env)
+    assert_walk_alike(env, untouched)
+    # The copy has not moved while the original walked.
+    untouched.reset(seed=1)
+    walk(untouched, 7, 8)
+    assert_walk_alike(other, untouched)
+
+
+def test_with_slots_keeps_all_but_the_number(mode: str) -> None:
+    env = PendulumVectorEnv(
+        3, max_episode_steps=5, autoreset_mode=mode, torques=(-1.0, 1.0), mass=0.2
+    )
+    other = env.with_slots(8)
+    assert type(other) is PendulumVectorEnv
+    assert (env.num_envs, other.num_envs) == (3, 8)
+    assert other.system == env.system
+    assert other.max_episode_steps == 5
+    assert other.metadata["autoreset_mode"] is AutoresetMode(mode)
+    assert other.observation_space.shape == (8, 2)
+    with pytest.raises(ResetNeeded):
+        other.step([0] * 8)
+
+
+def test_with_slots_has_the_parameters_of_the_original() -> None:
+    torques = [-1.0, 1.0]
+    env = PendulumVectorEnv(3, torques=torques)
+    torques.append(5.0)
+    assert env.with_slots(2).system == env.system

@@ -10,10 +10,10 @@ from gymnasium.vector import VectorEnv
 from numpy.typing import NDArray
 
 from acl_gym import validation
-from acl_gym.evaluation import PolicyCost, evaluate_policy_cost
+from acl_gym.agents.policy import TablePolicy
+from acl_gym.evaluation import PolicyCost, Predictor, evaluate_policy_cost
 
 if TYPE_CHECKING:
-    from acl_gym.agents.policy import TablePolicy
     from acl_gym.agents.tabular import TabularAgent
 
 Row = dict[str, float]
@@ -84,10 +84,13 @@ class PolicyEvaluation(Callback):
         states: initial states; None takes those of the environment.
         every: evaluate after each so many trials, and after the last, >= 1.
         max_steps: T of the evaluation; None takes that of the environment.
+        policy: what to evaluate, a function of the agent, for instance
+            `lambda colony: colony.soft_policy(seed=0)`; None takes the agent's own
+            greedy policy.
 
     Attributes:
         best: the evaluation of the best policy so far: the lowest cost.
-        best_policy: that policy; `agent.set_table(best_policy.table)` goes back.
+        best_policy: that policy, unchanged by what the agent learns afterwards.
     """
 
     def __init__(
@@ -97,13 +100,15 @@ class PolicyEvaluation(Callback):
         *,
         every: int = 1,
         max_steps: int | None = None,
+        policy: Callable[[Any], Predictor] | None = None,
     ) -> None:
+        self.policy = policy
         self.env = env
         self.states = states
         self.every = validation.integer("every", every, at_least=1)
         self.max_steps = max_steps
         self.best: PolicyCost | None = None
-        self.best_policy: TablePolicy | None = None
+        self.best_policy: Predictor | None = None
 
     def on_trial_end(self, agent: TabularAgent, row: Row) -> bool | None:
         """Evaluate if it is time to."""
@@ -117,11 +122,14 @@ class PolicyEvaluation(Callback):
             self._evaluate(agent, agent.history[-1])
 
     def _evaluate(self, agent: TabularAgent, row: Row) -> None:
+        policy = agent.policy if self.policy is None else self.policy(agent)
         result = evaluate_policy_cost(
-            agent, self.env, self.states, max_steps=self.max_steps
+            policy, self.env, self.states, max_steps=self.max_steps
         )
         row["policy_cost"] = result.cost
         row["success_rate"] = result.success_rate
         if self.best is None or result.cost < self.best.cost:
             self.best = result
-            self.best_policy = agent.policy.copy()
+            self.best_policy = (
+                policy.copy() if isinstance(policy, TablePolicy) else policy
+            )

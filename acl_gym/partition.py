@@ -281,6 +281,27 @@ class _Grid(Partition):
             periods.append(float(high[axis] - low[axis]) if is_round else None)
         return cls(centres, periods)
 
+    def refine(self, axis: int, centres: ArrayLike) -> Self:
+        """Return the partition with more centres along one axis.
+
+        Around a goal that is narrow beside the cells this costs a few cells and can
+        save a policy from hovering (docs/hovering.md).
+
+        Args:
+            axis: the state variable.
+            centres: what to add, in any order; those that are there are skipped.
+
+        Raises:
+            ValueError: there is no such axis, or a centre is not finite.
+        """
+        if not 0 <= axis < len(self.centres):
+            raise ValueError(
+                f"axis must lie in 0..{len(self.centres) - 1}, got {axis}."
+            )
+        axes = list(self.centres)
+        axes[axis] = np.union1d(axes[axis], np.asarray(centres, dtype=np.float64))
+        return type(self)(axes, self.periods)
+
     def locate(
         self,
         states: NDArray[Any],

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import warnings
 from typing import Any, Self
 
@@ -12,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from acl_gym import validation
 from acl_gym.agents.pheromone import Pheromone, Solutions
+from acl_gym.agents.policy import SoftPolicy
 from acl_gym.agents.selection import RULES, choose_actions
 from acl_gym.agents.tabular import TabularAgent
 from acl_gym.agents.training import Training
@@ -181,14 +183,30 @@ class ACL(TabularAgent):
             highest_cost = self.max_steps * base.system.max_stage_cost
             bound = self.global_decay / highest_cost
             if self.tau0 > bound:
+                digit = 10.0 ** math.floor(math.log10(bound))
                 warnings.warn(
                     f"tau0 = {self.tau0:g} exceeds global_decay / J_max = {bound:.3g} "
                     f"(J_max <= {highest_cost:.4g} on this environment), so pheromone "
                     "levels may fall below tau0 (Proposition 4.3); a tau0 of at most "
-                    f"{bound:.1e} rules that out.",
+                    f"{math.floor(bound / digit) * digit:.0e} rules that out.",
                     PheromoneBoundWarning,
                     stacklevel=4,
                 )
+
+    def soft_policy(
+        self, exponent: float = 10.0, seed: int | None = None
+    ) -> SoftPolicy:
+        """A policy that draws its actions, for where the greedy one hovers.
+
+        Args:
+            exponent: takes the place of alpha in (4.11), > 0.
+            seed: of the draws; None draws one from the system.
+
+        Returns:
+            A policy over a copy of the pheromone as it is now.
+        """
+        first_action = self.policy.first_action
+        return SoftPolicy(self.partition, self.table, exponent, seed, first_action)
 
     def parameters(self) -> dict[str, Any]:
         """The keyword arguments of the constructor."""

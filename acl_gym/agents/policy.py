@@ -8,7 +8,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
-from acl_gym.agents.selection import greedy_actions
+from acl_gym import validation
+from acl_gym.agents.pheromone import Pheromone
+from acl_gym.agents.selection import choose_actions, greedy_actions
 from acl_gym.partition import FloatArray, IntArray, Partition
 
 RankArray = NDArray[np.int32]
@@ -87,6 +89,58 @@ class TablePolicy:
         return TablePolicy(
             self.partition, self.table.copy(), self.ranks, self.first_action
         )
+
+
+class SoftPolicy:
+    """Actions drawn from the pheromone as the ants draw them (4.11), only steeper.
+
+    A greedy policy on a coarse table can fall into a cycle beside the goal that it
+    never leaves (docs/hovering.md). Drawing in proportion to tau^exponent follows
+    the same pheromone, and leaves every cycle sooner or later.
+
+    Args:
+        partition: turns observations into cells and degrees.
+        levels: pheromone, `(n_cells, n_actions)`; copied.
+        exponent: > 0; the larger, the closer to the greedy policy.
+        seed: of the draws; None draws one from the system.
+        first_action: the action that column 0 stands for, `Discrete.start`.
+
+    Raises:
+        ValueError: `exponent` is not > 0 and finite.
+    """
+
+    def __init__(
+        self,
+        partition: Partition,
+        levels: FloatArray,
+        exponent: float = 10.0,
+        seed: int | None = None,
+        first_action: int = 0,
+    ) -> None:
+        exponent = validation.number("exponent", exponent, above=0)
+        self.partition = partition
+        self.first_action = first_action
+        n_cells, n_actions = levels.shape
+        self._pheromone = Pheromone(n_cells, n_actions, 1.0, exponent)
+        self._pheromone.set_levels(levels)
+        self._rng = np.random.default_rng(seed)
+
+    def predict(
+        self,
+        observation: ArrayLike,
+        state: Any = None,
+        episode_start: Any = None,
+        deterministic: bool = True,
+    ) -> tuple[NDArray[np.int64], Any]:
+        """Draw actions; see `TablePolicy.predict`. `deterministic` is not used."""
+        batch = np.asarray(observation)
+        single = batch.ndim == self.partition.state_ndim
+        index, degree = self.partition(batch[None] if single else batch)
+        actions = choose_actions(
+            "boltzmann", self._pheromone, index, degree, 0.0, self._rng
+        )
+        actions += self.first_action
+        return (actions[0] if single else actions), state
 
 
 @njit(cache=True)

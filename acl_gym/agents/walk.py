@@ -14,6 +14,7 @@ import gymnasium as gym
 import numpy as np
 from gymnasium import spaces
 from gymnasium.vector import AutoresetMode, VectorEnv
+from numba import njit
 from numpy.typing import NDArray
 
 from acl_gym import validation
@@ -138,27 +139,33 @@ class Walk:
         observation = np.asarray(observation)
         self.steps += 1
 
-        everyone = ants.size == self._all.size
-        cost = np.negative(reward if everyone else reward[ants], dtype=np.float64)
-        if not np.isfinite(cost).all():
-            bad = int(np.flatnonzero(~np.isfinite(cost))[0])
+        m = ants.size
+        cost, reached, stopped = (
+            np.empty(m),
+            np.empty(m, np.bool_),
+            np.empty(m, np.bool_),
+        )
+        n_stopped, bad = _account(
+            ants,
+            np.asarray(reward, dtype=np.float64),
+            np.asarray(terminated, dtype=np.bool_),
+            np.asarray(truncated, dtype=np.bool_),
+            self.cost,
+            self.length,
+            cost,
+            reached,
+            stopped,
+        )
+        if bad >= 0:
             raise ValueError(
-                f"rewards must be finite, got {-cost[bad]} in slot {ants[bad]}; "
-                "check the environment's reward function."
+                f"rewards must be finite, got {reward[bad]} in slot {bad}; check the "
+                "environment's reward function."
             )
-        reached = terminated if everyone else terminated[ants]
-        stopped = reached | (truncated if everyone else truncated[ants])
-        if everyone:
-            self.cost += cost
-            self.length += 1
-        else:
-            self.cost[ants] += cost
-            self.length[ants] += 1
         if self._mode is AutoresetMode.DISABLED and not self._waits:
             # Idle slots that finish once more are reset with the others.
             done = np.logical_or(terminated, truncated)
             self._stale = done if done.any() else None
-        if stopped.any():
+        if n_stopped:
             observation = self._finish(ants, reached, stopped, observation, infos)
         if self.steps >= self.max_steps:
             self.ants = ants[:0]
@@ -181,3 +188,45 @@ class Walk:
             for slot in ants[stopped]:
                 observation[slot] = infos["final_obs"][slot]
         return observation
+
+
+@njit(cache=True)
+def _account(
+    ants: IntArray,
+    reward: FloatArray,
+    terminated: BoolArray,
+    truncated: BoolArray,
+    total_cost: FloatArray,
+    length: IntArray,
+    cost: FloatArray,
+    reached: BoolArray,
+    stopped: BoolArray,
+) -> tuple[int, int]:
+    """Add a step of the walking ants to their totals.
+
+    Args:
+        ants: the slots that walk, `(m,)`.
+        reward: of all slots.
+        terminated: of all slots.
+        truncated: of all slots.
+        total_cost: J so far of all slots, added to.
+        length: steps so far of all slots, added to.
+        cost: receives the stage cost of each walking ant, `(m,)`.
+        reached: receives whether it is in a terminal state, `(m,)`.
+        stopped: receives whether its episode has ended in any way, `(m,)`.
+
+    Returns:
+        How many ants stopped, and a slot whose reward is not finite, or -1.
+    """
+    n_stopped = 0
+    for j in range(ants.size):
+        ant = ants[j]
+        if not np.isfinite(reward[ant]):
+            return n_stopped, int(ant)
+        cost[j] = -reward[ant]
+        total_cost[ant] += cost[j]
+        length[ant] += 1
+        reached[j] = terminated[ant]
+        stopped[j] = terminated[ant] or truncated[ant]
+        n_stopped += stopped[j]
+    return n_stopped, -1

@@ -14,6 +14,7 @@ import numpy as np
 from gymnasium.error import ResetNeeded
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
+from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from acl_gym import validation
@@ -244,12 +245,9 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
             if self.max_episode_steps is not None:
                 np.greater_equal(self._steps, self.max_episode_steps, out=truncated)
         elif self._walking.size:
-            self._advance_walking(self._walking, checked, rewards, terminated)
-            self._steps[self._walking] += 1
-            if self.max_episode_steps is not None:
-                truncated[self._walking] = (
-                    self._steps[self._walking] >= self.max_episode_steps
-                )
+            self._advance_walking(
+                self._walking, checked, rewards, terminated, truncated
+            )
         if restarting is not None:
             self._start(restarting, None)
 
@@ -304,16 +302,28 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
         walking: IntArray,
         actions: IntArray,
         rewards: FloatArray,
-        reached: BoolArray,
+        terminated: BoolArray,
+        truncated: BoolArray,
     ) -> None:
         """Advance some slots only: gather them, run the kernel, put them back."""
-        states = self._states[:, walking]
-        part_rewards = np.empty(walking.size)
-        part_reached = np.empty(walking.size, dtype=np.bool_)
-        self._advance(states, actions[walking], part_rewards, part_reached)
-        self._states[:, walking] = states
-        rewards[walking] = part_rewards
-        reached[walking] = part_reached
+        m = walking.size
+        states, part = self._states, np.empty((self._states.shape[0], m))
+        part_actions = np.empty(m, dtype=np.int64)
+        part_rewards, part_reached = np.empty(m), np.empty(m, dtype=np.bool_)
+        _gather(walking, states, actions, part, part_actions)
+        self._advance(part, part_actions, part_rewards, part_reached)
+        _put_back(
+            walking,
+            part,
+            part_rewards,
+            part_reached,
+            self.max_episode_steps or 0,
+            states,
+            self._steps,
+            rewards,
+            terminated,
+            truncated,
+        )
 
     def _start(self, slots: IntArray, states: FloatArray | None) -> None:
         """Put `slots` at the given `(state_size, n)` states, or at random ones."""
@@ -385,6 +395,45 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
                 "the first reset must start all slots; leave 'reset_mask' out."
             )
         return mask
+
+
+@njit(cache=True)
+def _gather(
+    slots: IntArray,
+    states: FloatArray,
+    actions: IntArray,
+    part: FloatArray,
+    part_actions: IntArray,
+) -> None:
+    """Copy the columns of `slots` side by side."""
+    for j in range(slots.size):
+        part_actions[j] = actions[slots[j]]
+        for row in range(states.shape[0]):
+            part[row, j] = states[row, slots[j]]
+
+
+@njit(cache=True)
+def _put_back(
+    slots: IntArray,
+    part: FloatArray,
+    part_rewards: FloatArray,
+    part_reached: BoolArray,
+    limit: int,
+    states: FloatArray,
+    steps: IntArray,
+    rewards: FloatArray,
+    terminated: BoolArray,
+    truncated: BoolArray,
+) -> None:
+    """Undo `_gather` after a step, and count it; `limit` 0 means none."""
+    for j in range(slots.size):
+        slot = slots[j]
+        for row in range(states.shape[0]):
+            states[row, slot] = part[row, j]
+        steps[slot] += 1
+        rewards[slot] = part_rewards[j]
+        terminated[slot] = part_reached[j]
+        truncated[slot] = limit > 0 and steps[slot] >= limit
 
 
 def _uniforms(

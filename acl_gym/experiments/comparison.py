@@ -71,6 +71,9 @@ def compare(
     if fresh:
         for task in tasks:
             (runs_directory / f"{task.name}.json").unlink(missing_ok=True)
+    # Here once, not in every process: Numba's cache is no place for a race.
+    with console.status("Compiling the kernels (some 30 seconds, the first time)"):
+        contestants.compile_all(env_id)
     with _Bar(console, [task.name for task in tasks]) as bar:
         reference, *runs = run_tasks(
             tasks, runs_directory, workers=workers, progress=bar.tell

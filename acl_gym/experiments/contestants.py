@@ -277,6 +277,16 @@ def compile_kernels(
     agent.learn(trials=1, callback=PolicyEvaluation(env))
 
 
+def compile_all(env_id: str) -> None:
+    """Compile the kernels of every tabular contestant and of the reference."""
+    env = make_env(env_id, 2)
+    for partition in (Fuzzy, Crisp):
+        grid = make_partition(env, partition, (3, 3))
+        for kind in (ACL, QLearning):
+            compile_kernels(kind, env, grid)
+        fuzzy_q_iteration(env, grid, max_iterations=1)
+
+
 class _Progress(Callback):
     def __init__(self, report: Report, trials: int) -> None:
         self._report = report

@@ -17,10 +17,9 @@ ROW = Crisp([np.arange(6.0)])
 BOTH = pytest.mark.parametrize("kind", [ACL, QLearning])
 
 
-def make(kind: type[TabularAgent] = ACL, slots: int = 3, **parameters: Any) -> Any:
-    if kind is ACL:
-        parameters = {"tau0": 1e-3, **parameters}
-    return kind(chains(slots), ROW, max_steps=8, seed=0, **parameters)
+def make(kind: type[TabularAgent] = ACL, slots: int = 3, seed: int = 0) -> Any:
+    parameters = {"tau0": 1e-3} if kind is ACL else {}
+    return kind(chains(slots), ROW, max_steps=8, seed=seed, **parameters)
 
 
 class Recorder(Callback):
@@ -106,7 +105,7 @@ def test_bad_budgets(name: str, value: Any, error: type[Exception]) -> None:
 
 @BOTH
 def test_rows_hold_the_measures_of_their_trial(kind: type) -> None:
-    agent = make(kind, slots=5)
+    agent = make(kind, slots=5, seed=2)
     policies = [agent.policy.best_actions()]
     seen: list[tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]] = []
 

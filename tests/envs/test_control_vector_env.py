@@ -164,6 +164,18 @@ def test_returned_arrays_belong_to_the_caller(wait: bool, mode: str) -> None:
             assert_same_bits(returned[-1], twin.reset(options=mask)[0])
 
 
+def test_states_are_copies(mode: str) -> None:
+    env, twin = pair(mode)
+    with pytest.raises(ResetNeeded):
+        PendulumVectorEnv(2).states  # noqa: B018
+    for each in (env, twin):
+        each.reset(options={"state": np.zeros((4, 2))})
+    env.states[:] = 1.0
+    observations = env.step([0, 1, 2, 2])[0]
+    assert_same_bits(observations, twin.step([0, 1, 2, 2])[0])
+    assert_same_bits(env.states, observations)
+
+
 def test_later_steps_do_not_change_what_was_returned(mode: str) -> None:
     env = pair(mode)[0]
     results = [(env.reset()[0], *step) for step in walk(env, 20, 5)]

@@ -1,0 +1,198 @@
+"""Why some learned policies hover beside the goal, and what helps.
+
+Trains fuzzy colonies on the pendulum and follows, after every trial of the second
+half, the greedy policy (4.16) and the soft one (`ACL.soft_policy`) from the evaluation
+states; and the greedy policy of colonies whose partition is finer around the goal.
+Writes a figure of the worst greedy policy near the goal and of how often each kind of
+policy fails, and prints the figures that docs/hovering.md quotes.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import warnings
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colors import ListedColormap
+from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
+from tqdm.auto import tqdm
+
+from acl_gym import ACL, Fuzzy, evaluate_policy_cost
+from acl_gym.agents.acl import PheromoneBoundWarning
+from acl_gym.agents.policy import TablePolicy
+from acl_gym.evaluation import actions_in, record_trajectory
+
+TRIALS = 100
+FIRST_TRIAL = 51
+COLOURS = {"greedy": "#0072B2", "soft": "#D55E00", "refined": "#009E73"}
+LABELS = {
+    "greedy": "greedy (4.16)",
+    "soft": "soft, exponent 10",
+    "refined": "greedy, finer cells at the goal",
+}
+
+
+@dataclass
+class Outcome:
+    """Cost and success rate of every policy, `(n, 2)`, and the worst greedy one."""
+
+    policies: dict[str, np.ndarray]
+    worst: TablePolicy
+    worst_success: float
+    worst_name: str
+
+
+def study(seeds: int) -> Outcome:
+    """Train colonies and follow every reading of every policy."""
+    found: dict[str, list[tuple[float, float]]] = {name: [] for name in COLOURS}
+    worst: tuple[float, str, TablePolicy] | None = None
+
+    def follow(name: str, policy: Any, env: Any) -> float:
+        result = evaluate_policy_cost(policy, env)
+        found[name].append((result.cost, result.success_rate))
+        return result.success_rate
+
+    for seed in tqdm(range(seeds), desc="pairs of colonies"):
+        env = gym.make_vec("acl_gym/Pendulum-v0", num_envs=250)
+        grid = Fuzzy.from_box(env.single_observation_space, (40, 41), circular=[0])
+        fine = grid.refine(0, math.pi + np.array([-0.1, -0.05, 0.05, 0.1]))
+        fine = fine.refine(1, [-0.3, -0.15, 0.15, 0.3])
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", PheromoneBoundWarning)
+            colony, refined = ACL(env, grid, seed=seed), ACL(env, fine, seed=seed)
+        for each in (colony, refined):
+            each.learn(trials=FIRST_TRIAL - 1)
+        for trial in range(FIRST_TRIAL, TRIALS + 1):
+            colony.learn(trials=1)
+            refined.learn(trials=1)
+            success = follow("greedy", colony.policy, env)
+            follow("soft", colony.soft_policy(seed=trial), env)
+            follow("refined", refined.policy, env)
+            if worst is None or success < worst[0]:
+                worst = success, f"seed {seed}, trial {trial}", colony.policy.copy()
+    if worst is None:
+        raise ValueError("seeds must be at least 1.")
+    policies = {name: np.array(rows) for name, rows in found.items()}
+    return Outcome(policies, worst[2], worst[0], worst[1])
+
+
+def figures_of(outcome: Outcome) -> dict[str, Any]:
+    """The figures that the text quotes."""
+    return {
+        "worst": outcome.worst_name,
+        "worst_success_rate": outcome.worst_success,
+        **{
+            name: {
+                "policies": len(data),
+                "median_cost": float(np.median(data[:, 0])),
+                "max_cost": float(data[:, 0].max()),
+                "share_below_95_percent": float((data[:, 1] < 0.95).mean()),
+                "lowest_success_rate": float(data[:, 1].min()),
+                "median_final_cost": float(
+                    np.median(data[TRIALS - FIRST_TRIAL :: TRIALS - FIRST_TRIAL + 1, 0])
+                ),
+            }
+            for name, data in outcome.policies.items()
+        },
+    }
+
+
+def draw(outcome: Outcome) -> Figure:
+    """The worst greedy policy near the goal, and how often each reading fails."""
+    figure = Figure(figsize=(10, 4.2), layout="constrained")
+    FigureCanvasAgg(figure)
+    near, often = figure.subplots(1, 2, width_ratios=(1.15, 1))
+    env = gym.make_vec("acl_gym/Pendulum-v0", num_envs=1).unwrapped
+    angle, speed = np.linspace(-0.4, 0.4, 161), np.linspace(-1.8, 1.8, 161)
+    mesh = np.stack(np.meshgrid(angle + math.pi, speed), axis=-1).reshape(-1, 2)
+    policy_map = actions_in(outcome.worst, env.with_slots(len(mesh)), mesh)
+    near.pcolormesh(
+        angle,
+        speed,
+        policy_map.reshape(161, 161),
+        cmap=ListedColormap(["#9a9a9a", "#cfcfcf", "#f7f7f7"]),
+        shading="nearest",
+        rasterized=True,
+    )
+    start = _a_start_that_hovers(outcome.worst, env)
+    path = record_trajectory(outcome.worst, env, start).states[-60:]
+    near.plot(
+        path[:, 0] - math.pi,
+        path[:, 1],
+        "o-",
+        color=COLOURS["greedy"],
+        lw=0.7,
+        ms=3.5,
+        label="last 60 of 300 steps",
+    )
+    near.add_patch(
+        Rectangle(
+            (-0.1, -0.1), 0.2, 0.2, fill=False, ec=COLOURS["soft"], lw=2, label="goal"
+        )
+    )
+    near.set(
+        xlabel="angle from upright (rad)",
+        ylabel="angular velocity (rad/s)",
+        title=(
+            f"a greedy policy that hovers ({outcome.worst_name}:\n"
+            f"{outcome.worst_success:.0%} of the starts reach the goal)"
+        ),
+    )
+    near.legend(loc="upper right", framealpha=0.95)
+
+    for name, data in outcome.policies.items():
+        rates = np.sort(data[:, 1])
+        share = np.arange(1, len(rates) + 1) / len(rates)
+        often.step(
+            100 * rates,
+            100 * share,
+            where="post",
+            color=COLOURS[name],
+            label=LABELS[name],
+        )
+    often.set(
+        xlabel="starts that reach the goal (%)",
+        ylabel="policies with no more than that (%)",
+        yscale="log",
+        xlim=(0, 101),
+        title=f"policies of trials {FIRST_TRIAL} to {TRIALS}, all seeds",
+    )
+    often.grid(alpha=0.3)
+    often.legend(loc="upper left")
+    return figure
+
+
+def _a_start_that_hovers(policy: TablePolicy, env: Any) -> np.ndarray:
+    states = env.system.evaluation_states()
+    success = evaluate_policy_cost(policy, env).success
+    return np.asarray(states[int(np.argmin(success))])
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Study, draw and print; returns the exit code."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--seeds", type=int, default=10, help="colonies to train")
+    parser.add_argument(
+        "--out",
+        type=Path,
+        default=Path("docs/figures/hovering.png"),
+        help="where the figure goes (default: %(default)s)",
+    )
+    options = parser.parse_args(arguments)
+    outcome = study(options.seeds)
+    options.out.parent.mkdir(parents=True, exist_ok=True)
+    draw(outcome).savefig(options.out, dpi=150)
+    print(json.dumps(figures_of(outcome), indent=1))
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

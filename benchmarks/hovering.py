@@ -147,6 +147,8 @@ def draw(outcome: Outcome) -> Figure:
         ),
     )
     near.legend(loc="upper right", framealpha=0.95)
+    for x, y, torque in ((0.3, 0.2, "-0.8"), (-0.17, 0.75, "0"), (-0.3, -0.4, "+0.8")):
+        near.text(x, y, f"{torque} N m", ha="center", style="italic")
 
     for name, data in outcome.policies.items():
         rates = np.sort(data[:, 1])
@@ -162,6 +164,8 @@ def draw(outcome: Outcome) -> Figure:
         xlabel="starts that reach the goal (%)",
         ylabel="policies with no more than that (%)",
         yscale="log",
+        yticks=(0.2, 1, 10, 100),
+        yticklabels=("0.2", "1", "10", "100"),
         xlim=(0, 101),
         title=f"policies of trials {FIRST_TRIAL} to {TRIALS}, all seeds",
     )

@@ -93,6 +93,29 @@ def test_it_keeps_the_best_policy(kind: type) -> None:
     np.testing.assert_array_equal(back.costs, evaluation.best.costs)
 
 
+def test_another_policy_of_the_agent_can_be_evaluated() -> None:
+    """Also one that draws: it has a generator of its own, and learning is the same."""
+    quiet, watched = make(), make()
+    quiet.learn(trials=6)
+    evaluation = PolicyEvaluation(
+        pendulums(),
+        STATES,
+        max_steps=25,
+        policy=lambda colony: colony.soft_policy(seed=3),
+    )
+    costs = []
+
+    def note(agent: Any, row: dict[str, float]) -> None:
+        soft = agent.soft_policy(seed=3)
+        costs.append(evaluate_policy_cost(soft, pendulums(), STATES, max_steps=25).cost)
+
+    watched.learn(trials=6, callback=[evaluation, note])
+    assert quiet.table.tobytes() == watched.table.tobytes()
+    assert [row["policy_cost"] for row in watched.history] == costs
+    assert evaluation.best is not None
+    assert evaluation.best.cost == min(costs)
+
+
 @BOTH
 def test_of_equally_good_policies_the_first_is_kept(kind: type) -> None:
     agent = make(kind)

@@ -166,12 +166,15 @@ def test_a_tau0_above_the_bound_warns_with_both_figures() -> None:
         ACL(env, pendulum_grid(env), tau0=0.01, global_decay=0.0)
 
 
-def test_the_remedy_of_the_warning_works() -> None:
+@pytest.mark.parametrize("global_decay", [0.001, 0.07, 0.1, 1.0])
+@pytest.mark.parametrize("max_steps", [1, 77, 300, 1000])
+def test_the_remedy_of_the_warning_works(global_decay: float, max_steps: int) -> None:
     env = pendulums(3)
+    parameters: dict[str, Any] = {"global_decay": global_decay, "max_steps": max_steps}
     with pytest.warns(PheromoneBoundWarning) as record:
-        ACL(env, pendulum_grid(env), tau0=0.01, global_decay=0.07, max_steps=77)
+        ACL(env, pendulum_grid(env), tau0=0.9, **parameters)
     remedy = str(record[0].message).split("a tau0 of at most ")[1].split(" ")[0]
-    ACL(env, pendulum_grid(env), tau0=float(remedy), global_decay=0.07, max_steps=77)
+    ACL(env, pendulum_grid(env), tau0=float(remedy), **parameters)
 
 
 def test_zero_decays_leave_the_pheromone() -> None:

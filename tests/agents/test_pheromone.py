@@ -112,6 +112,7 @@ def trials(draw: st.DrawFn, revisits: bool = True) -> Trial:
 
 
 @given(trials())
+@settings(max_examples=50)
 def test_local_update_is_that_of_the_ants_one_after_another(trial: Trial) -> None:
     expected = trial.tau.copy()
     for ant in range(len(trial.length)):
@@ -131,6 +132,7 @@ def test_local_update_is_that_of_the_ants_one_after_another(trial: Trial) -> Non
 
 
 @given(trials())
+@settings(max_examples=50)
 def test_global_update_is_that_of_the_equations(trial: Trial) -> None:
     expected = reference.global_update(
         trial.tau, trial.solutions, trial.costs, trial.rho
@@ -140,6 +142,7 @@ def test_global_update_is_that_of_the_equations(trial: Trial) -> None:
 
 
 @given(trials(), st.integers(0, 2**32 - 1))
+@settings(max_examples=50)
 def test_the_order_of_the_ants_does_not_matter(trial: Trial, seed: int) -> None:
     """Theorems 4.1 and 4.2, over several steps and the deposit that follows them."""
     start = trial.tau.copy()
@@ -155,6 +158,7 @@ def test_the_order_of_the_ants_does_not_matter(trial: Trial, seed: int) -> None:
 
 
 @given(trials(revisits=False))
+@settings(max_examples=50)
 def test_total_update_is_local_then_global(trial: Trial) -> None:
     """(4.21) presumes that an ant visits a pair once."""
     expected = reference.total_update(
@@ -172,6 +176,7 @@ def test_total_update_is_local_then_global(trial: Trial) -> None:
 
 
 @given(trials())
+@settings(max_examples=50)
 def test_untouched_pairs_stay_bit_identical(trial: Trial) -> None:
     before = trial.tau.copy()
     touched = reference.indicator([*chain(*trial.solutions)], trial.tau.shape) > 0
@@ -182,6 +187,7 @@ def test_untouched_pairs_stay_bit_identical(trial: Trial) -> None:
 
 
 @given(trials())
+@settings(max_examples=50)
 def test_zero_rates_leave_every_level(trial: Trial) -> None:
     before = trial.tau.copy()
     trial.gamma = trial.rho = 0.0
@@ -192,6 +198,7 @@ def test_zero_rates_leave_every_level(trial: Trial) -> None:
 
 
 @given(trials(), st.integers(1, 10), st.floats(0.01, 1.0))
+@settings(max_examples=50)
 def test_levels_stay_above_tau0(trial: Trial, rounds: int, share: float) -> None:
     """Proposition 4.3, at the bound (share = 1) and below it."""
     rho = max(trial.rho, 1e-3)
@@ -255,7 +262,7 @@ def test_the_decay_of_a_deposit_weighs_with_the_largest_degree_of_all_ants() -> 
 
 
 @given(trials())
-@settings(max_examples=30)
+@settings(max_examples=50)
 def test_scratch_and_solutions_leave_nothing_behind(trial: Trial) -> None:
     """The same update from the same levels twice is the same to the last bit."""
     start = trial.tau.copy()
@@ -293,7 +300,7 @@ def test_a_cost_whose_inverse_overflows_is_refused() -> None:
 
 
 @given(trials())
-@settings(max_examples=30)
+@settings(max_examples=50)
 def test_kernels_agree_with_themselves_as_plain_python(trial: Trial) -> None:
     rows = trial.index[:, 0], trial.degree[:, 0], trial.action[:, 0]
     levels, again = trial.tau.copy(), trial.tau.copy()

@@ -8,7 +8,7 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from acl_gym import Crisp, Fuzzy, QLearning
@@ -50,6 +50,7 @@ def transitions(draw: st.DrawFn) -> dict[str, Any]:
 
 
 @given(transitions())
+@settings(max_examples=50)
 def test_updates_are_those_of_the_slots_one_after_another(case: dict[str, Any]) -> None:
     expected = case["values"].copy()
     n_cells = len(expected)

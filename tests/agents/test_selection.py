@@ -39,6 +39,7 @@ def colonies(draw: st.DrawFn) -> tuple[Pheromone, Array, Array, np.random.Genera
 
 
 @given(colonies(), st.sampled_from(RULES), st.sampled_from([0.0, 0.3, 1.0]))
+@settings(max_examples=50)
 def test_choices_are_those_of_the_reference(
     colony: tuple[Pheromone, Array, Array, np.random.Generator],
     rule: str,
@@ -63,6 +64,7 @@ def test_choices_are_those_of_the_reference(
 
 
 @given(colonies())
+@settings(max_examples=50)
 def test_probabilities_are_those_of_the_equation(
     colony: tuple[Pheromone, Array, Array, np.random.Generator],
 ) -> None:
@@ -156,6 +158,7 @@ Operations = st.lists(
 
 
 @given(colonies(), Operations)
+@settings(max_examples=50)
 def test_remembered_probabilities_are_never_out_of_date(
     colony: tuple[Pheromone, Array, Array, np.random.Generator], operations: list[str]
 ) -> None:
@@ -193,6 +196,7 @@ def test_remembered_probabilities_are_never_out_of_date(
 
 
 @given(colonies(), st.booleans())
+@settings(max_examples=50)
 def test_the_policy_maximises_the_weighted_level(
     colony: tuple[Pheromone, Array, Array, np.random.Generator], rounded: bool
 ) -> None:
@@ -218,6 +222,7 @@ def test_the_policy_maximises_the_weighted_level(
 
 
 @given(colonies())
+@settings(max_examples=50)
 def test_the_best_action_of_a_cell_is_its_policy(
     colony: tuple[Pheromone, Array, Array, np.random.Generator],
 ) -> None:

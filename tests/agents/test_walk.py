@@ -11,7 +11,7 @@ from gymnasium.vector import AsyncVectorEnv, AutoresetMode, SyncVectorEnv, Vecto
 from gymnasium.wrappers.vector import RecordEpisodeStatistics
 
 import acl_gym  # noqa: F401
-from acl_gym.agents.walk import Walk
+from acl_gym.agents.walk import Walk, _account
 from tests.agents.reference_colony import Chain, chains
 
 MODES = ("NextStep", "SameStep", "Disabled")
@@ -220,6 +220,25 @@ def test_the_rewards_of_finished_slots_are_not_looked_at(mode: str) -> None:
     assert walk.cost.tolist() == [1.0, 12.0]
     assert walk.length.tolist() == [1, 6]
     assert walk.success.tolist() == [True, False]
+
+
+@pytest.mark.parametrize("bad", [-1, 2])
+def test_the_kernel_agrees_with_itself_as_plain_python(bad: int) -> None:
+    rng = np.random.default_rng(0)
+    ants = np.array([1, 2, 5, 6])
+    reward = rng.normal(size=8)
+    if bad >= 0:
+        reward[bad] = np.nan
+    flags = rng.random((2, 8)) < 0.5
+    results = []
+    for kernel in (_account, _account.py_func):
+        totals, length = np.zeros(8), np.zeros(8, dtype=np.int64)
+        cost, reached, stopped = np.zeros(4), *np.zeros((2, 4), dtype=np.bool_)
+        counts = kernel(ants, reward, *flags, totals, length, cost, reached, stopped)
+        assert counts[1] == bad
+        results.append((counts, totals, length, cost, reached, stopped))
+    for compiled, plain in zip(*results, strict=True):
+        np.testing.assert_array_equal(compiled, plain)
 
 
 def test_costs_are_summed_in_double_precision() -> None:

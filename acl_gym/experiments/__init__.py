@@ -1,0 +1,1 @@
+"""The experiments: runs, their statistics, figures and reports."""

@@ -1,0 +1,144 @@
+"""The runner keeps every finished result and never makes one twice."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from acl_gym.experiments import runner
+from acl_gym.experiments.runner import Task, TaskFailedError, run_tasks
+
+
+def square(number: int, calls: str, report) -> dict:
+    """A task that leaves a mark each time it is run."""
+    with open(calls, "a") as file:
+        file.write(f"{number}\n")
+    report(0.5)
+    return {"square": number * number}
+
+
+def refuse(report) -> dict:
+    raise ValueError("three is not a number")
+
+
+def die(report) -> dict:
+    os.kill(os.getpid(), signal.SIGKILL)
+    return {}
+
+
+def tasks(calls: Path, numbers=range(4), **settings: int) -> list[Task]:
+    return [
+        Task(f"square-{n}", square, (n, str(calls)), {"n": n, **settings})
+        for n in numbers
+    ]
+
+
+def calls_in(path: Path) -> list[str]:
+    return sorted(path.read_text().split()) if path.exists() else []
+
+
+def test_results_come_in_order_and_are_made_once(tmp_path: Path) -> None:
+    calls, told = tmp_path / "calls", []
+    for _ in range(2):
+        results = run_tasks(
+            tasks(calls),
+            tmp_path / "runs",
+            workers=2,
+            progress=lambda name, fraction: told.append((name, fraction)),
+        )
+        assert [result["square"] for result in results] == [0, 1, 4, 9]
+    assert calls_in(calls) == ["0", "1", "2", "3"]
+    assert told.count(("square-2", 1.0)) == 2
+    assert not list((tmp_path / "runs").glob(".*")), "no temporary file may stay"
+
+
+def test_other_settings_or_other_code_run_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    calls = tmp_path / "calls"
+    run_tasks(tasks(calls, [1]), tmp_path / "runs", workers=1)
+    run_tasks(tasks(calls, [1], trials=7), tmp_path / "runs", workers=1)
+    assert calls_in(calls) == ["1", "1"]
+    monkeypatch.setattr(runner, "code_fingerprint", lambda: "other code")
+    run_tasks(tasks(calls, [1], trials=7), tmp_path / "runs", workers=1)
+    assert calls_in(calls) == ["1", "1", "1"]
+
+
+@pytest.mark.parametrize("damage", [b"", b"{", b"[]", b"\xff\xfe", b'{"key": 1}'])
+def test_a_damaged_result_is_made_again(tmp_path: Path, damage: bytes) -> None:
+    calls, runs = tmp_path / "calls", tmp_path / "runs"
+    run_tasks(tasks(calls, [3]), runs, workers=1)
+    (runs / "square-3.json").write_bytes(damage)
+    assert run_tasks(tasks(calls, [3]), runs, workers=1) == [{"square": 9}]
+    assert calls_in(calls) == ["3", "3"]
+
+
+@pytest.mark.parametrize(
+    ("function", "message"),
+    [(refuse, "bad failed: three is not a number"), (die, "a worker process died")],
+)
+def test_a_failure_is_one_clear_error_and_loses_nothing(
+    tmp_path: Path, function, message: str
+) -> None:
+    calls, runs = tmp_path / "calls", tmp_path / "runs"
+    run_tasks(tasks(calls, [1, 2]), runs, workers=1)
+    with pytest.raises(TaskFailedError, match=message):
+        run_tasks(
+            [*tasks(calls, [1, 2]), Task("bad", function, (), {})], runs, workers=1
+        )
+    run_tasks(tasks(calls, [1, 2]), runs, workers=1)
+    assert calls_in(calls) == ["1", "2"]
+
+
+KILLED = """
+import time
+from pathlib import Path
+from acl_gym.experiments.runner import Task, run_tasks
+from tests.experiments.test_runner import square, tasks
+
+def slow(report):
+    time.sleep(600)
+
+if __name__ == "__main__":
+    folder = Path({folder!r})
+    run_tasks(
+        [*tasks(folder / "calls"), Task("slow", slow, (), {{}})],
+        folder / "runs",
+        workers=1,
+    )
+"""
+
+
+def test_killed_at_any_moment_it_goes_on(tmp_path: Path) -> None:
+    script = tmp_path / "killed.py"
+    script.write_text(KILLED.format(folder=str(tmp_path)))
+    root = Path(__file__).resolve().parents[2]
+    process = subprocess.Popen(
+        [sys.executable, str(script)],
+        env={**os.environ, "PYTHONPATH": str(root)},
+        stderr=subprocess.DEVNULL,
+        start_new_session=True,
+    )
+    runs = tmp_path / "runs"
+    give_up = time.monotonic() + 120
+    while len(list(runs.glob("square-*.json"))) < 4 and time.monotonic() < give_up:
+        time.sleep(0.05)
+    os.killpg(process.pid, signal.SIGKILL)
+    process.wait()
+    for path in runs.glob("square-*.json"):
+        assert "result" in json.loads(path.read_text())
+    results = run_tasks(tasks(tmp_path / "calls"), runs, workers=1)
+    assert [result["square"] for result in results] == [0, 1, 4, 9]
+    assert calls_in(tmp_path / "calls") == ["0", "1", "2", "3"]
+
+
+def test_fingerprint_is_of_the_source() -> None:
+    assert runner.code_fingerprint() == runner.code_fingerprint()
+    assert len(runner.code_fingerprint()) == 64

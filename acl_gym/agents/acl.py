@@ -130,29 +130,25 @@ class ACL(TabularAgent):
         solutions = self._solutions = self._fresh_solutions()
         budget = (total_timesteps, trials, callback, log_interval, progress_bar)
         with Training(self, *budget) as training:
-            while training.goes_on:  # 2, 22
-                observation = walk.start(seed=self._next_seed())  # 3, 6
-                solutions.clear()  # 5
-                while walk.ants.size:  # 4, 7, 17
+            while training.goes_on:  # 2, 22: repeat until k = K
+                # 3-6: every ant begins in a random state with an empty solution
+                observation = walk.start(seed=self._next_seed())
+                solutions.clear()
+                while walk.ants.size:  # 7, 17: repeat until t = T or C is empty
                     ants = walk.ants
-                    index, degree = self._locate(observation, ants)  # 8
-                    actions = choose_actions(  # 9
-                        self.selection,
-                        pheromone,
-                        index,
-                        degree,
-                        self.epsilon,
-                        self.rng,
-                    )
-                    solutions.append(ants, index, degree, actions)  # 10
-                    observation = walk.step(actions).observation  # 11, 13-16
-                    pheromone.local_update(
-                        index, degree, actions, self.local_decay
-                    )  # 12
-                pheromone.global_update(
-                    solutions, walk.cost, self.global_decay
-                )  # 18-20
-                training.end_trial()  # 21
+                    # 8: fuzzify the states
+                    index, degree = self._locate(observation, ants)
+                    # 9: select actions, all on the same pheromone
+                    actions = self._choose(index, degree, self.rng)
+                    # 10: add the pairs to the partial solutions
+                    solutions.append(ants, index, degree, actions)
+                    # 11, 13-16: apply the actions; who is at the goal leaves C
+                    observation = walk.step(actions).observation
+                    # 12: local pheromone update (4.12)
+                    pheromone.local_update(index, degree, actions, self.local_decay)
+                # 18-20: global pheromone update with all solutions (4.15)
+                pheromone.global_update(solutions, walk.cost, self.global_decay)
+                training.end_trial()  # 21: k <- k + 1
         return self
 
     @property
@@ -226,13 +222,13 @@ class ACL(TabularAgent):
         return {"sensitivity": float(_mean_sensitivity(self.table, policy, self.alpha))}
 
     def _explore(self, index: CellArray, degree: FloatArray) -> IntArray:
+        return self._choose(index, degree, self._predict_rng)
+
+    def _choose(
+        self, index: CellArray, degree: FloatArray, rng: np.random.Generator
+    ) -> IntArray:
         return choose_actions(
-            self.selection,
-            self.pheromone,
-            index,
-            degree,
-            self.epsilon,
-            self._predict_rng,
+            self.selection, self.pheromone, index, degree, self.epsilon, rng
         )
 
     def _fresh_solutions(self) -> Solutions:

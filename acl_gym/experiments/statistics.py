@@ -147,11 +147,8 @@ def _estimate(values: Sequence[float], seed: int) -> Estimate:
             method="percentile",
             rng=np.random.default_rng(seed),
         ).confidence_interval
-    return {
-        "median": _or_none(np.median(data)),
-        "low": _or_none(low),
-        "high": _or_none(high),
-    }
+    ends = {"median": np.median(data), "low": low, "high": high}
+    return {name: _or_none(value) for name, value in ends.items()}
 
 
 def _or_none(value: float | np.floating[Any]) -> float | None:

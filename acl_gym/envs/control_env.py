@@ -18,6 +18,7 @@ from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from acl_gym import validation
+from acl_gym.envs.rendering import Frame, Renderer
 from acl_gym.envs.system import BoolArray, ControlSystem, FloatArray, IntArray
 
 Observation = NDArray[Any]
@@ -43,11 +44,15 @@ class ControlEnv(gym.Env[Observation, np.int64]):
     It has no time limit of its own: `gym.make(id, max_episode_steps=T)` adds one.
 
     Args:
-        render_mode: None; rendering is not available yet.
+        render_mode: "human" shows a window, "rgb_array" lets `render` return frames,
+            None draws nothing.
         parameters: the parameters of the system, see its class.
     """
 
-    metadata: dict[str, Any] = {"render_modes": [], "render_fps": 10}  # noqa: RUF012
+    metadata: dict[str, Any] = {  # noqa: RUF012
+        "render_modes": ["human", "rgb_array"],
+        "render_fps": 10,
+    }
     system_type: ClassVar[type[ControlSystem]]
 
     def __init__(self, render_mode: str | None = None, **parameters: Any) -> None:
@@ -56,6 +61,7 @@ class ControlEnv(gym.Env[Observation, np.int64]):
         self.observation_space = self.system.observation_space
         self.action_space = self.system.action_space
         self._n_actions = int(self.system.action_space.n)
+        self._renderer: Renderer | None = None
         self._state: FloatArray | None = None
         self._finished = False
 
@@ -85,6 +91,9 @@ class ControlEnv(gym.Env[Observation, np.int64]):
             state = self.system.sample_states(self.np_random, 1)
         self._state = state
         self._finished = False
+        self._action: int | None = None
+        if self.render_mode == "human":
+            self.render()
         return self.system.observe(state)[0], {}
 
     def step(
@@ -111,8 +120,39 @@ class ControlEnv(gym.Env[Observation, np.int64]):
         uniforms = _uniforms(self.system, self.np_random, 1)
         self.system.advance(self._state, actions, uniforms, rewards, reached)
         self._finished = bool(reached[0])
+        self._action = int(actions[0])
+        if self.render_mode == "human":
+            self.render()
         observation = self.system.observe(self._state)[0]
         return observation, float(rewards[0]), self._finished, False, {}
+
+    def render(self) -> Frame | None:
+        """A frame `(480, 480, 3)` for "rgb_array"; shows it for "human".
+
+        Raises:
+            ResetNeeded: there was no `reset` yet.
+            DependencyNotInstalled: pygame is missing.
+        """
+        if self.render_mode is None:
+            gym.logger.warn(
+                "render() draws nothing without a render_mode; make the environment "
+                'with render_mode="rgb_array" or "human".'
+            )
+            return None
+        if self._state is None:
+            raise ResetNeeded("render() needs a state; call reset() first.")
+        if self._renderer is None:
+            self._renderer = Renderer(self.system, self.metadata["render_fps"])
+        state = self._state[:, 0]
+        if self.render_mode == "human":
+            self._renderer.show(state, self._action)
+            return None
+        return self._renderer.frame(state, self._action)
+
+    def close(self) -> None:
+        """Close the window if there is one."""
+        if self._renderer is not None:
+            self._renderer.close()
 
 
 class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
@@ -126,7 +166,8 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
             on the next step, whose action is ignored), "SameStep" (reset at once,
             last observation in `infos["final_obs"]`) or "Disabled" (the caller
             resets, `reset(options={"reset_mask": finished})`).
-        render_mode: None; rendering is not available yet.
+        render_mode: "rgb_array" lets `render` return a frame of each slot, None
+            draws nothing. For a window use `gymnasium.wrappers.vector.HumanRendering`.
         parameters: the parameters of the system, see its class.
 
     Note:
@@ -135,7 +176,7 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
     """
 
     metadata: dict[str, Any] = {  # noqa: RUF012
-        "render_modes": [],
+        "render_modes": ["rgb_array"],
         "render_fps": 10,
         "autoreset_mode": AutoresetMode.NEXT_STEP,
     }
@@ -168,6 +209,8 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
         )
         self.action_space = batch_space(self.single_action_space, self.num_envs)
         self._n_actions = int(self.system.action_space.n)
+        self._renderer: Renderer | None = None
+        self._actions: IntArray | None = None  # the last ones, to be drawn
 
         self._state: FloatArray | None = None  # (state_size, num_envs)
         self._steps = np.zeros(self.num_envs, dtype=np.int64)
@@ -235,6 +278,7 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
         if self._state is None:
             raise ResetNeeded("step() needs states; call reset() first.")
         checked = _checked_actions(actions, self.num_envs, self._n_actions)
+        self._actions = checked
         restarting = self._slots_to_restart()
         rewards = np.zeros(self.num_envs)
         terminated = np.zeros(self.num_envs, dtype=np.bool_)
@@ -264,6 +308,32 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
                 self._finished |= finished
                 self._walking = np.flatnonzero(~self._finished)
         return self._observe(), rewards, terminated, truncated, infos
+
+    def render(self) -> tuple[Frame, ...] | None:
+        """A frame `(480, 480, 3)` of each slot.
+
+        Raises:
+            ResetNeeded: there was no `reset` yet.
+            DependencyNotInstalled: pygame is missing.
+        """
+        if self.render_mode is None:
+            gym.logger.warn(
+                "render() draws nothing without a render_mode; make the environment "
+                'with render_mode="rgb_array".'
+            )
+            return None
+        if self._renderer is None:
+            self._renderer = Renderer(self.system, self.metadata["render_fps"])
+        started = self._steps == 0
+        return tuple(
+            self._renderer.frame(
+                self._states[:, slot],
+                None
+                if self._actions is None or started[slot]
+                else int(self._actions[slot]),
+            )
+            for slot in range(self.num_envs)
+        )
 
     def with_slots(self, num_envs: int) -> Self:
         """Make a new environment of the same system and limits with other slots."""

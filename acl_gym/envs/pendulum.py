@@ -308,6 +308,57 @@ class Pendulum(ControlSystem):
             -1, 2
         )
 
+    def draw(
+        self, pygame: Any, canvas: Any, state: FloatArray, action: int | None
+    ) -> None:
+        """The pole, the goal region behind it, and an arc for the torque."""
+        size = canvas.get_width()
+        pivot = np.array([0.5, 0.5]) * size
+        length = 0.36 * size
+
+        def point(angle: float, radius: float) -> tuple[float, float]:
+            """theta = 0 hangs down, positive angles turn counter-clockwise."""
+            x, y = math.sin(angle), math.cos(angle)
+            return float(pivot[0] + radius * x), float(pivot[1] + radius * y)
+
+        canvas.fill((255, 255, 255))
+        bound = self.goal_bounds[0]
+        edge = np.linspace(math.pi - bound, math.pi + bound, 9)
+        sector = [tuple(pivot), *(point(a, 1.12 * length) for a in edge)]
+        pygame.draw.polygon(canvas, (205, 232, 216), sector)
+        theta = float(state[0])
+        width = 0.035 * size
+        side = 0.5 * width
+        normal = np.array([math.cos(theta), -math.sin(theta)]) * side
+        tip = np.array(point(theta, length))
+        corners = [pivot - normal, pivot + normal, tip + normal, tip - normal]
+        pygame.draw.polygon(canvas, (0, 114, 178), [tuple(c) for c in corners])
+        pygame.draw.circle(canvas, (0, 114, 178), tuple(tip), 1.6 * width)
+        pygame.draw.circle(canvas, (40, 40, 40), tuple(pivot), 0.8 * width)
+        torque = 0.0 if action is None else self.torques[action]
+        if torque:
+            self._draw_torque(pygame, canvas, point, torque, size)
+
+    def _draw_torque(
+        self, pygame: Any, canvas: Any, point: Any, torque: float, size: int
+    ) -> None:
+        """An arc around the pivot, as long as the torque is large, with a head."""
+        share = torque / max(abs(u) for u in self.torques)
+        radius, thickness = 0.1 * size, max(2, round(0.012 * size))
+        angles = math.pi / 2 * np.linspace(0.0, 1.0, 25) * share
+        middle = math.pi  # the arc is centred above the pivot
+        arc = middle + angles - angles[-1] / 2
+        pygame.draw.lines(
+            canvas, (213, 94, 0), False, [point(a, radius) for a in arc], thickness
+        )
+        forward = math.copysign(0.35, torque)
+        head = [
+            point(arc[-1], radius + 0.025 * size),
+            point(arc[-1], radius - 0.025 * size),
+            point(arc[-1] + forward, radius),
+        ]
+        pygame.draw.polygon(canvas, (213, 94, 0), head)
+
     def _in_goal(self, states: FloatArray) -> BoolArray:
         bound_theta, bound_omega = self.goal_bounds
         theta, omega = states

@@ -92,6 +92,19 @@ class ControlSystem(ABC):
     def evaluation_states(self) -> FloatArray:
         """The fixed initial states of the policy cost (3.47), `(n, state_size)`."""
 
+    @abstractmethod
+    def draw(
+        self, pygame: Any, canvas: Any, state: FloatArray, action: int | None
+    ) -> None:
+        """Draw a state.
+
+        Args:
+            pygame: the module.
+            canvas: a square pygame surface to fill.
+            state: `(state_size,)`.
+            action: what was done to reach it; None at the start of an episode.
+        """
+
     def observe(self, states: FloatArray) -> NDArray[Any]:
         """Return what is seen of `states` `(state_size, n)`: a new array `(n, ...)`."""
         return states.T.copy()

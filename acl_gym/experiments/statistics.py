@@ -164,9 +164,8 @@ def curve_band(
 ) -> Band:
     """Policy cost of one agent as training goes on, over its seeds.
 
-    A policy counts from its evaluation to the next one. The band begins where every
-    seed has been evaluated and ends where the first seed ends; it is empty if these
-    do not meet.
+    A policy counts from its evaluation to the next one, the last one to the end. The
+    band begins where every seed has been evaluated, and ends with the longest.
 
     Args:
         runs: of one agent.
@@ -182,8 +181,7 @@ def curve_band(
         return Band(*(np.empty(0) for _ in Band._fields))
     grid = np.unique(np.concatenate([at for at, _ in curves]))
     begin = max(at[0] for at, _ in curves)
-    end = min(at[-1] for at, _ in curves)
-    grid = grid[(grid >= begin) & (grid <= end)]
+    grid = grid[grid >= begin]
     values = np.array(
         [cost[np.searchsorted(at, grid, side="right") - 1] for at, cost in curves]
     )

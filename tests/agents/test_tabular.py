@@ -11,14 +11,13 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 import pytest
-from scipy import stats
 from stable_baselines3.common.evaluation import evaluate_policy
 from stable_baselines3.common.monitor import Monitor
 
 from acl_gym import ACL, Crisp, Fuzzy, QLearning
 from acl_gym.agents.policy import TablePolicy
 from acl_gym.agents.tabular import TabularAgent
-from tests.agents.reference_colony import Chain, boltzmann, chains
+from tests.agents.reference_colony import Chain, chains
 
 ROW = Crisp([np.arange(6.0)])
 PENDULUM = "acl_gym/Pendulum-v0"
@@ -183,15 +182,6 @@ def test_evaluate_policy_of_stable_baselines3(kind: type, deterministic: bool) -
     assert -5.0 <= mean <= -1.0
 
 
-def test_a_copied_policy_no_longer_follows_the_table() -> None:
-    agent = on_chain(ACL).learn(trials=30)
-    live, kept = agent.policy, agent.policy.copy()
-    states = np.arange(5.0)[:, None]
-    agent.set_table(agent.table[:, ::-1].copy())
-    assert live.predict(states)[0].tolist() == [0] * 5
-    assert kept.predict(states)[0].tolist() == [1] * 5
-
-
 def test_a_policy_of_a_bare_table_breaks_ties_by_a_fixed_order() -> None:
     grid = Crisp([np.arange(40.0)])
     one, other = (
@@ -202,18 +192,6 @@ def test_a_policy_of_a_bare_table_breaks_ties_by_a_fixed_order() -> None:
     np.testing.assert_array_equal(actions, other.predict(grid.cell_states())[0])
 
 
-def test_a_soft_policy_draws_in_proportion_to_a_power_of_the_pheromone() -> None:
-    agent = on_chain(ACL).learn(trials=5)
-    state, exponent = np.full((50_000, 1), 3.0), 1.5
-    soft = agent.soft_policy(exponent, seed=1)
-    expected = boltzmann(agent.table, np.eye(6)[3], exponent)
-    agent.set_table(np.ones((6, 2)))  # it is a copy
-    counts = np.bincount(soft.predict(state, deterministic=True)[0])
-    assert stats.chisquare(counts, 50_000 * expected).pvalue > 1e-3
-    one, other = (agent.soft_policy(seed=1).predict(state)[0] for _ in range(2))
-    np.testing.assert_array_equal(one, other)
-
-
 def test_a_soft_policy_calls_the_actions_as_its_agent_does() -> None:
     agent = ACL(chains(2, first_action=5), ROW, seed=0)
     memory = object()
@@ -221,12 +199,6 @@ def test_a_soft_policy_calls_the_actions_as_its_agent_does() -> None:
     assert passed is memory
     assert np.ndim(action) == 0
     assert action in (5, 6)
-
-
-@pytest.mark.parametrize("exponent", [0, -1.0, np.nan, np.inf])
-def test_bad_exponents(exponent: float) -> None:
-    with pytest.raises(ValueError, match="exponent"):
-        on_chain(ACL).soft_policy(exponent)
 
 
 # --- environments --------------------------------------------------------------

@@ -1,0 +1,117 @@
+"""Frames of the pendulum, single and vector, without a screen."""
+
+from __future__ import annotations
+
+import sys
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from gymnasium.error import DependencyNotInstalled, ResetNeeded
+from gymnasium.utils.env_checker import check_env
+
+from acl_gym.envs.pendulum import PendulumEnv, PendulumVectorEnv
+
+ID = "acl_gym/Pendulum-v0"
+POLE = np.array([0, 114, 178])
+TORQUE = np.array([213, 94, 0])
+
+
+def pixels(frame: np.ndarray, colour: np.ndarray) -> np.ndarray:
+    """Rows and columns of the pixels that are nearly of a colour, `(n, 2)`."""
+    near = (np.abs(frame.astype(int) - colour) < 20).all(axis=-1)
+    return np.argwhere(near)
+
+
+def frame_at(theta: float, action: int | None = None) -> np.ndarray:
+    env = gym.make(ID, render_mode="rgb_array")
+    env.reset(options={"state": [theta, 0.0]})
+    if action is not None:
+        env.step(action)
+    return env.render()
+
+
+@pytest.mark.parametrize(
+    ("theta", "row", "column"),
+    [(0.0, 1, 0), (np.pi / 2, 0, 1), (np.pi, -1, 0), (3 * np.pi / 2, 0, -1)],
+)
+def test_the_pole_points_where_the_angle_says(theta, row, column) -> None:
+    frame = frame_at(theta)
+    assert frame.shape == (480, 480, 3)
+    assert frame.dtype == np.uint8
+    centre = pixels(frame, POLE).mean(axis=0) - 240
+    np.testing.assert_allclose(centre, [row * 120, column * 120], atol=25)
+
+
+def test_the_torque_is_drawn_on_the_side_it_turns_to() -> None:
+    assert len(pixels(frame_at(0.0), TORQUE)) == 0
+    assert len(pixels(frame_at(0.0, action=1), TORQUE)) == 0
+    left, right = frame_at(0.0, action=2), frame_at(0.0, action=0)
+    # The arc runs over the pivot; its head is the heavier end.
+    assert pixels(left, TORQUE)[:, 1].mean() < 239 < pixels(right, TORQUE)[:, 1].mean()
+
+
+def test_vector_frames_are_those_of_single_environments() -> None:
+    env = gym.make_vec(ID, num_envs=2, render_mode="rgb_array")
+    states = np.array([[0.3, 0.0], [2.0, 1.0]])
+    env.reset(options={"state": states})
+    env.step([0, 2])
+    frames = env.render()
+    assert isinstance(frames, tuple)
+    for state, action, frame in zip(states, [0, 2], frames, strict=True):
+        single = gym.make(ID, render_mode="rgb_array")
+        single.reset(options={"state": state})
+        single.step(action)
+        np.testing.assert_array_equal(frame, single.render())
+
+
+def test_frames_are_new_arrays() -> None:
+    env = gym.make(ID, render_mode="rgb_array")
+    env.reset(seed=0)
+    first = env.render()
+    first[:] = 0
+    assert env.render().any()
+
+
+def test_a_window_opens_and_closes() -> None:
+    env = gym.make(ID, render_mode="human")
+    env.reset(seed=0)
+    env.step(0)
+    env.close()
+    env.close()
+
+
+def test_checked_by_gymnasium() -> None:
+    check_env(gym.make(ID, render_mode="rgb_array").unwrapped)
+
+
+def test_recorded_by_gymnasium(tmp_path) -> None:
+    env = gym.wrappers.RenderCollection(gym.make(ID, render_mode="rgb_array"))
+    env.reset(seed=0)
+    for _ in range(3):
+        env.step(2)
+    assert len(env.render()) == 4
+
+
+@pytest.mark.parametrize("kind", [PendulumEnv, PendulumVectorEnv])
+def test_an_unknown_mode_is_refused(kind) -> None:
+    with pytest.raises(ValueError, match="render_mode must be None or one of"):
+        kind(render_mode="ansi")
+
+
+@pytest.mark.parametrize("make", [gym.make, gym.make_vec])
+def test_mistakes(make) -> None:
+    env = make(ID)
+    env.reset(seed=0)
+    with pytest.warns(UserWarning, match="render"):
+        env.unwrapped.render()
+    with pytest.raises(ResetNeeded):
+        make(ID, render_mode="rgb_array").unwrapped.render()
+
+
+def test_without_pygame_the_error_says_what_to_install(monkeypatch) -> None:
+    monkeypatch.setitem(sys.modules, "pygame", None)
+    env = gym.make(ID, render_mode="rgb_array").unwrapped
+    env.reset(seed=0)
+    with pytest.raises(DependencyNotInstalled, match=r"acl-gym\[render\]"):
+        env.render()

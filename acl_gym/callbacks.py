@@ -48,8 +48,12 @@ class _FunctionCallback(Callback):
         self._function = function
 
     def on_trial_end(self, agent: TabularAgent, row: Row) -> bool | None:
-        result = self._function(agent, row)
-        return result is not False
+        return not is_stop(self._function(agent, row))
+
+
+def is_stop(result: Any) -> bool:
+    """Whether what a callback returned means to stop: False, Python's or NumPy's."""
+    return isinstance(result, (bool, np.bool_)) and not result
 
 
 def as_callbacks(callback: Callbacks) -> list[Callback]:
@@ -64,7 +68,7 @@ def as_callbacks(callback: Callbacks) -> list[Callback]:
         return [callback]
     if callable(callback):
         return [_FunctionCallback(callback)]
-    if isinstance(callback, Iterable):
+    if isinstance(callback, Iterable) and not isinstance(callback, str):
         return [one for each in callback for one in as_callbacks(each)]
     raise TypeError(
         "callback must be a Callback, a function of (agent, row) or a list of those, "
@@ -84,6 +88,8 @@ class PolicyEvaluation(Callback):
         states: initial states; None takes those of the environment.
         every: evaluate after each so many trials, and after the last, >= 1.
         max_steps: T of the evaluation; None takes that of the environment.
+        seed: of an environment that is random: every evaluation is from the same
+            initial states, with the same luck.
         policy: what to evaluate, a function of the agent, for instance
             `lambda colony: colony.soft_policy(seed=0)`; None takes the agent's own
             greedy policy.
@@ -100,12 +106,16 @@ class PolicyEvaluation(Callback):
         *,
         every: int = 1,
         max_steps: int | None = None,
+        seed: int | None = 0,
         policy: Callable[[Any], Predictor] | None = None,
     ) -> None:
+        self.seed = seed
         self.policy = policy
         self.env = env
         self.states = states
         self.every = validation.integer("every", every, at_least=1)
+        if max_steps is not None:
+            max_steps = validation.integer("max_steps", max_steps, at_least=1)
         self.max_steps = max_steps
         self.best: PolicyCost | None = None
         self.best_policy: Predictor | None = None
@@ -117,14 +127,18 @@ class PolicyEvaluation(Callback):
         return True
 
     def on_training_end(self, agent: TabularAgent) -> None:
-        """Evaluate the last policy if the last trial was not."""
+        """Evaluate the last policy if the last trial was not, and is whole."""
+        if agent.in_trial:
+            return
         if agent.history and "policy_cost" not in agent.history[-1]:
             self._evaluate(agent, agent.history[-1])
 
     def _evaluate(self, agent: TabularAgent, row: Row) -> None:
-        policy = agent.policy if self.policy is None else self.policy(agent)
+        policy = agent if self.policy is None else self.policy(agent)
+        if policy is agent:
+            policy = agent.policy
         result = evaluate_policy_cost(
-            policy, self.env, self.states, max_steps=self.max_steps
+            policy, self.env, self.states, max_steps=self.max_steps, seed=self.seed
         )
         row["policy_cost"] = result.cost
         row["success_rate"] = result.success_rate

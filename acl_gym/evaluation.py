@@ -9,7 +9,7 @@ import numpy as np
 from gymnasium.vector import VectorEnv
 from numpy.typing import NDArray
 
-from acl_gym.agents.walk import Walk
+from acl_gym.agents.walk import Walk, require_vector_env
 from acl_gym.envs.control_env import ControlVectorEnv
 
 FloatArray = NDArray[np.float64]
@@ -90,6 +90,7 @@ def evaluate_policy_cost(
     Raises:
         ValueError: the number of slots and of states differ and `env` is wrapped.
     """
+    require_vector_env(env)
     base = env.unwrapped
     wrapped = base is not env
     if isinstance(base, ControlVectorEnv):

@@ -9,18 +9,15 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Sequence
+from numbers import Integral
 from typing import Any, ClassVar, Self
 
 import numpy as np
 from gymnasium import spaces
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from acl_gym import validation
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
-CellArray = NDArray[np.int32]
+from acl_gym.membership import CellArray, FloatArray, IntArray, locate
 
 
 class Partition(ABC):
@@ -69,108 +66,15 @@ class Partition(ABC):
         Raises:
             ValueError: a state is not finite or does not belong to the partition.
         """
-        batch = np.asarray(states)
+        try:
+            batch = np.asarray(states)
+        except ValueError as error:
+            raise ValueError(f"states must be an array: {error}.") from error
         n = len(batch) if batch.ndim else 0
         index = np.zeros((n, self.cells_per_state), dtype=np.int32)
         degree = np.zeros((n, self.cells_per_state))
         self.locate(batch, np.arange(n), index, degree)
         return index, degree
-
-
-@njit(cache=True, error_model="numpy")
-def _locate_on_axis(
-    x: float, edges: FloatArray, first: int, count: int, period: float, rate: float
-) -> tuple[int, float]:
-    """Find the interval of `x` between centres, and how far along it x lies.
-
-    Args:
-        x: one state variable, finite.
-        edges: the centres of all axes in a row; this axis owns
-            `edges[first : first + count]`. A circular axis repeats its first centre
-            at the end, one period on.
-        first: see `edges`.
-        count: see `edges`.
-        period: of a circular axis, 0 for any other.
-        rate: 1 / spacing of a regular axis, 0 for an irregular one.
-
-    Returns:
-        `(i, fraction)`: x lies between centres i and i + 1, and the membership (4.7)
-        is 1 - fraction to the former, fraction to the latter. Outside the centres
-        the fraction saturates at 0 or 1.
-    """
-    if count == 1:
-        return 0, 0.0
-    if period > 0.0:
-        turns = np.floor((x - edges[first]) / period)
-        x -= period * turns
-    last = count - 2
-    if x <= edges[first]:
-        return 0, 0.0
-    if x >= edges[first + count - 1]:
-        return last, 1.0
-    if rate > 0.0:
-        # On a regular axis the interval is known but for the rounding of the guess.
-        low = min(int((x - edges[first]) * rate), last)
-        while x < edges[first + low]:
-            low -= 1
-        while x >= edges[first + low + 1]:
-            low += 1
-    else:
-        low, high = 0, count - 1
-        while high - low > 1:
-            middle = (low + high) // 2
-            if x < edges[first + middle]:
-                high = middle
-            else:
-                low = middle
-    left = edges[first + low]
-    return low, (x - left) / (edges[first + low + 1] - left)
-
-
-@njit(cache=True, error_model="numpy")
-def _locate(
-    states: FloatArray,
-    slots: IntArray,
-    edges: FloatArray,
-    first: IntArray,
-    count: IntArray,
-    cells: IntArray,
-    periods: FloatArray,
-    rates: FloatArray,
-    fuzzy: bool,
-    index: CellArray,
-    degree: FloatArray,
-) -> int:
-    """Fill rows of `index` and `degree`; return a slot that is not finite, or -1."""
-    dimensions = cells.size
-    for j in range(slots.size):
-        slot = slots[j]
-        index[j, 0] = 0
-        degree[j, 0] = 1.0
-        corners = 1
-        for axis in range(dimensions):
-            x = states[slot, axis]
-            if not np.isfinite(x):
-                return int(slot)
-            low, fraction = _locate_on_axis(
-                x, edges, first[axis], count[axis], periods[axis], rates[axis]
-            )
-            n = cells[axis]
-            # A circular axis ends where it begins; one cell alone is its own end.
-            high = (low + 1) % n
-            if not fuzzy:
-                index[j, 0] = index[j, 0] * n + (high if fraction >= 0.5 else low)
-                continue
-            # Each corner splits in two along this axis: product of memberships (4.8).
-            for c in range(corners - 1, -1, -1):
-                cell = index[j, c] * n
-                weight = degree[j, c]
-                index[j, 2 * c] = cell + low
-                degree[j, 2 * c] = weight * (1.0 - fraction)
-                index[j, 2 * c + 1] = cell + high
-                degree[j, 2 * c + 1] = weight * fraction
-            corners *= 2
-    return -1
 
 
 class _Grid(Partition):
@@ -194,10 +98,12 @@ class _Grid(Partition):
         centres: Sequence[ArrayLike],
         periods: Sequence[float | None] | None = None,
     ) -> None:
-        if isinstance(centres, np.ndarray) and centres.ndim == 1:
+        if not isinstance(centres, Iterable) or (
+            isinstance(centres, np.ndarray) and centres.ndim == 1
+        ):
             raise ValueError(
-                "centres must be one sequence for each state variable, got a flat "
-                "array; pass [array] for a single variable."
+                "centres must be one sequence for each state variable, got "
+                f"{centres!r}; pass [sequence] for a single variable."
             )
         axes = [_checked_centres(axis, values) for axis, values in enumerate(centres)]
         if not axes:
@@ -259,18 +165,23 @@ class _Grid(Partition):
                 f"space must be bounded in every variable, got {space}; "
                 "give the centres of an unbounded variable yourself."
             )
-        counts = [cells] * low.size if isinstance(cells, int) else list(cells)
+        counts: list[Any] = []
+        if isinstance(cells, Integral):
+            counts = [cells] * low.size
+        elif isinstance(cells, Iterable):
+            counts = list(cells)
         if len(counts) != low.size:
             raise ValueError(
                 f"cells must be an int or {low.size} ints, one a variable, "
                 f"got {cells!r}."
             )
-        round_axes = set(circular)
-        if not round_axes <= set(range(low.size)):
-            raise ValueError(
-                f"circular must hold variables 0..{low.size - 1}, "
-                f"got {sorted(round_axes)}."
-            )
+        round_axes = list(circular) if isinstance(circular, Iterable) else [None]
+        for axis in round_axes:
+            whole = isinstance(axis, Integral) and not isinstance(axis, bool)
+            if not whole or not 0 <= axis < low.size:
+                raise ValueError(
+                    f"circular must hold variables 0..{low.size - 1}, got {circular!r}."
+                )
         centres, periods = [], []
         for axis, count in enumerate(counts):
             validation.integer(f"cells[{axis}]", count, at_least=1)
@@ -294,12 +205,17 @@ class _Grid(Partition):
         Raises:
             ValueError: there is no such axis, or a centre is not finite.
         """
-        if not 0 <= axis < len(self.centres):
+        if validation.integer("axis", axis, at_least=0) >= len(self.centres):
             raise ValueError(
                 f"axis must lie in 0..{len(self.centres) - 1}, got {axis}."
             )
         axes = list(self.centres)
-        axes[axis] = np.union1d(axes[axis], np.asarray(centres, dtype=np.float64))
+        there = axes[axis]
+        added = validation.real_array("centres", centres, ndim=1)
+        # What differs by rounding only is the same centre.
+        distance = np.abs(added[:, None] - there).min(axis=1)
+        new = added[distance > 1e-9 * max(np.ptp(there), np.ptp(added))]
+        axes[axis] = np.union1d(there, new)
         return type(self)(axes, self.periods)
 
     def locate(
@@ -317,7 +233,7 @@ class _Grid(Partition):
             )
         if states.dtype != np.float64:
             states = _as_float64(states)
-        bad = _locate(
+        bad = locate(
             states,
             slots,
             self._edges,
@@ -407,20 +323,20 @@ def _as_float64(states: NDArray[Any]) -> FloatArray:
 
 
 def _checked_centres(axis: int, values: ArrayLike) -> FloatArray:
-    try:
-        centres = np.array(values, dtype=np.float64)
-    except (TypeError, ValueError):
-        centres = np.empty((0, 0))
-    if centres.ndim != 1 or centres.size == 0 or not np.isfinite(centres).all():
-        raise ValueError(
-            f"centres[{axis}] must be a sequence of one or more finite numbers, "
-            f"got {values!r}."
-        )
-    if (falls := np.flatnonzero(np.diff(centres) <= 0)).size:
+    centres = validation.real_array(f"centres[{axis}]", values, ndim=1)
+    with np.errstate(over="ignore", divide="ignore"):
+        gaps = np.diff(centres)
+        usable = np.isfinite(gaps) & np.isfinite(1.0 / gaps)
+    if (falls := np.flatnonzero(gaps <= 0)).size:
         i = int(falls[0])
         raise ValueError(
             f"centres[{axis}] must increase strictly, got {centres[i]:g} followed by "
             f"{centres[i + 1]:g} at position {i}; sort them and drop duplicates."
+        )
+    if not usable.all():
+        raise ValueError(
+            f"centres[{axis}] must be further apart than 1e-307 and closer than "
+            f"1e307, got {values!r}."
         )
     return centres
 
@@ -430,10 +346,10 @@ def _checked_periods(
 ) -> list[float | None]:
     if periods is None:
         return [None] * len(axes)
-    if len(periods) != len(axes):
+    if not isinstance(periods, Sequence) or len(periods) != len(axes):
         raise ValueError(
             f"periods must hold one entry for each of the {len(axes)} variables, "
-            f"got {len(periods)}."
+            f"got {periods!r}."
         )
     lengths: list[float | None] = []
     for axis, period in enumerate(periods):

@@ -9,7 +9,6 @@ from __future__ import annotations
 import io
 import json
 import os
-import zipfile
 from pathlib import Path
 from typing import Any
 
@@ -35,7 +34,9 @@ def save(
         The path written.
     """
     target = with_suffix(path)
-    text = json.dumps({"format": FORMAT, "version": VERSION, **header})
+    text = json.dumps(
+        {"format": FORMAT, "version": VERSION, **header}, default=_plain_number
+    )
     buffer = io.BytesIO()
     content = np.frombuffer(text.encode(), dtype=np.uint8)
     np.savez_compressed(buffer, header=content, **arrays)  # type: ignore[arg-type]
@@ -63,32 +64,34 @@ def load(path: str | Path) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
         FileNotFoundError: there is no such file.
         ValueError: it is not ours, is cut short or damaged, or is of a later version.
     """
-    source = Path(path)
+    source = with_suffix(path)
     if not source.is_file():
-        source = with_suffix(path)
+        source = Path(path)
     if not source.is_file():
-        raise FileNotFoundError(f"no agent file at {source}.")
+        raise FileNotFoundError(f"no agent file at {with_suffix(path)}.")
     try:
-        with np.load(source, allow_pickle=False) as file:
-            arrays = {name: file[name] for name in file.files}
+        with source.open("rb") as file, np.load(file, allow_pickle=False) as archive:
+            arrays = {name: archive[name] for name in archive.files}
         header = json.loads(arrays.pop("header").tobytes())
-        ours = header["format"] == FORMAT
-    except (
-        # What NumPy, zipfile, zlib and json raise for files that are something else.
-        AttributeError,
-        EOFError,
-        KeyError,
-        OSError,
-        TypeError,
-        ValueError,
-        zipfile.BadZipFile,
-    ) as error:
+        kind, number = header.get("format"), header.get("version")
+    except Exception as error:
+        # Whatever NumPy, zipfile, zlib and json may raise, and that is a dozen kinds,
+        # means one thing here.
         raise ValueError(
             f"{source} is not an agent saved by acl-gym, or is cut short: {error}."
         ) from error
-    if not ours or header["version"] != VERSION:
+    if kind != FORMAT or number != VERSION:
         raise ValueError(
             f"{source} must be of format {FORMAT!r} version {VERSION}, got "
-            f"{header['format']!r} version {header.get('version')!r}."
+            f"{kind!r} version {number!r}."
         )
     return header, arrays
+
+
+def _plain_number(value: Any) -> Any:
+    """NumPy's numbers, which a callback may have left in a row, as Python's."""
+    if isinstance(value, np.generic):
+        return value.item()
+    raise TypeError(
+        f"an agent's settings and history must be numbers and strings, got {value!r}."
+    )

@@ -7,6 +7,9 @@ from collections.abc import Collection
 from numbers import Integral, Real
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 
 def number(
     name: str,
@@ -36,7 +39,10 @@ def number(
             f"{name} must be a real number, got {value!r} of type "
             f"{type(value).__name__}; pass an int or a float."
         )
-    result = float(value)
+    try:
+        result = float(value)
+    except OverflowError:  # an int beyond all floats
+        result = math.inf
     inside = (
         math.isfinite(result)
         and (above is None or result > above)
@@ -55,6 +61,28 @@ def number(
     return result
 
 
+class Number:
+    """An attribute that is a number in a range, checked whenever it is set.
+
+    Args:
+        bounds: the range, keywords of `number`.
+    """
+
+    def __init__(self, **bounds: float) -> None:
+        self._bounds = bounds
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self._name = name
+
+    def __get__(self, instance: Any, owner: type | None = None) -> float:
+        if instance is None:
+            raise AttributeError(f"{self._name} is set on instances only.")
+        return float(instance.__dict__[self._name])
+
+    def __set__(self, instance: Any, value: Any) -> None:
+        instance.__dict__[self._name] = number(self._name, value, **self._bounds)
+
+
 def integer(name: str, value: Any, *, at_least: int) -> int:
     """Return `value` as an int of at least `at_least`.
 
@@ -69,6 +97,39 @@ def integer(name: str, value: Any, *, at_least: int) -> int:
     if value < at_least:
         raise ValueError(f"{name} must be at least {at_least}, got {value}.")
     return int(value)
+
+
+def real_array(
+    name: str, values: Any, *, ndim: int | None = None, finite: bool = True
+) -> NDArray[np.float64]:
+    """Return `values` as a new float64 array that is not empty.
+
+    Strings, complex numbers and ragged lists are refused, not converted.
+
+    Args:
+        name: what the array is called in the error message.
+        values: the candidate.
+        ndim: how many axes it must have; None allows any number.
+        finite: refuse NaN and infinity.
+
+    Raises:
+        ValueError: `values` are not such an array.
+    """
+    try:
+        array = np.asarray(values)
+    except ValueError:  # ragged
+        array = np.empty(0)
+    valid = (
+        array.dtype.kind in "iuf"
+        and array.size > 0
+        and ndim in (None, array.ndim)
+        and (not finite or bool(np.isfinite(array).all()))
+    )
+    if not valid:
+        kind = "an array" if ndim is None else f"an array of {ndim} axes"
+        numbers = "finite real numbers" if finite else "real numbers"
+        raise ValueError(f"{name} must be {kind} of {numbers}, got {values!r}.")
+    return array.astype(np.float64)
 
 
 def one_of(name: str, value: Any, allowed: Collection[str]) -> str:

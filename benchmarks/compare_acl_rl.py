@@ -25,7 +25,7 @@ def build_parser() -> argparse.ArgumentParser:
     )
     parser.add_argument(
         "--preset",
-        choices=sorted(PRESETS),
+        choices=list(PRESETS),
         default="quick",
         help="how much to run: "
         + "; ".join(

@@ -12,7 +12,6 @@ from __future__ import annotations
 import argparse
 import json
 import math
-import warnings
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -26,7 +25,6 @@ from matplotlib.patches import Rectangle
 from tqdm.auto import tqdm
 
 from acl_gym import ACL, Fuzzy, evaluate_policy_cost
-from acl_gym.agents.acl import PheromoneBoundWarning
 from acl_gym.agents.policy import TablePolicy
 from acl_gym.evaluation import actions_in, record_trajectory
 
@@ -65,9 +63,7 @@ def study(seeds: int) -> Outcome:
         grid = Fuzzy.from_box(env.single_observation_space, (40, 41), circular=[0])
         fine = grid.refine(0, math.pi + np.array([-0.1, -0.05, 0.05, 0.1]))
         fine = fine.refine(1, [-0.3, -0.15, 0.15, 0.3])
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", PheromoneBoundWarning)
-            colony, refined = ACL(env, grid, seed=seed), ACL(env, fine, seed=seed)
+        colony, refined = ACL(env, grid, seed=seed), ACL(env, fine, seed=seed)
         for each in (colony, refined):
             each.learn(trials=FIRST_TRIAL - 1)
         for trial in range(FIRST_TRIAL, TRIALS + 1):

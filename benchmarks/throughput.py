@@ -10,7 +10,6 @@ import argparse
 import json
 import statistics
 import time
-import warnings
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 
@@ -21,7 +20,7 @@ from rich.table import Table
 from tqdm.auto import tqdm
 
 import acl_gym
-from acl_gym.agents.acl import ACL, PheromoneBoundWarning
+from acl_gym.agents.acl import ACL
 from acl_gym.partition import Crisp, Fuzzy
 
 PENDULUM = "acl_gym/Pendulum-v0"
@@ -106,10 +105,7 @@ def learn(kind: type[Crisp] | type[Fuzzy], n_ants: int, trials: int) -> Work:
     def work() -> int:
         env = gym.make_vec(PENDULUM, num_envs=n_ants)
         grid = kind.from_box(env.single_observation_space, CELLS, circular=[0])
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", PheromoneBoundWarning)
-            colony = ACL(env, grid, seed=0)
-        return colony.learn(trials=trials).num_timesteps
+        return ACL(env, grid, seed=0).learn(trials=trials).num_timesteps
 
     return work
 

@@ -9,7 +9,7 @@ from gymnasium import spaces
 from hypothesis import given
 from hypothesis import strategies as st
 
-from acl_gym import partition as module
+from acl_gym import membership as module
 from acl_gym.envs.pendulum import Pendulum
 from acl_gym.partition import Crisp, Fuzzy, partition_from_settings
 from tests import reference_partition as reference
@@ -175,6 +175,24 @@ def test_cells_are_in_the_order_of_the_equations(kind: Any) -> None:
     np.testing.assert_array_equal(reference.dense(partition, states), np.eye(20))
 
 
+@pytest.mark.parametrize("kind", [Crisp, Fuzzy])
+def test_refine_adds_centres_along_one_axis(kind: Any) -> None:
+    partition = kind(CENTRES, PERIODS)
+    refined = partition.refine(1, [0.25, -0.5, -0.25, 0.25])
+    assert type(refined) is kind
+    assert refined.centres[1].tolist() == [-2.0, -0.5, -0.25, 0.0, 0.25, 3.0]
+    for axis in (0, 2):
+        assert refined.centres[axis].tolist() == CENTRES[axis].tolist()
+    assert refined.periods == partition.periods
+    assert partition.centres[1].tolist() == CENTRES[1].tolist()
+
+
+@pytest.mark.parametrize("cells", [40, 50, 82])
+def test_refine_skips_centres_that_are_there_but_for_rounding(cells: int) -> None:
+    partition = Fuzzy.from_box(Pendulum().observation_space, [cells, 3], circular=[0])
+    assert partition.refine(0, [np.pi]).centres[0].size == cells
+
+
 def some_states(n: int, seed: int) -> np.ndarray:
     return np.random.default_rng(seed).uniform(-8.0, 8.0, (n, 3))
 
@@ -255,7 +273,7 @@ def test_shortcut_of_regular_axes_is_the_search(
     rate = float(1.0 / gaps.mean()) if gaps.size else 0.0
     x = data.draw(reference.positions(edges))
     for near in (x, np.nextafter(x, -np.inf), np.nextafter(x, np.inf)):
-        find = module._locate_on_axis
+        find = module.locate_on_axis
         searched = find(near, edges, 0, edges.size, length, 0.0)
         assert find(near, edges, 0, edges.size, length, rate) == searched
         # Without the compiler it is the same.
@@ -295,12 +313,12 @@ def test_kernel_runs_the_same_without_the_compiler(fuzzy: bool) -> None:
         partition._rates,
         fuzzy,
     )
-    bad = module._locate.py_func(states, np.arange(12), *settings, index, degree)
+    bad = module.locate.py_func(states, np.arange(12), *settings, index, degree)
     assert bad == -1
     np.testing.assert_array_equal(index, partition(states)[0])
     np.testing.assert_allclose(degree, partition(states)[1], rtol=1e-14)
     states[7, 1] = np.inf
-    bad = module._locate.py_func(states, np.arange(12), *settings, index, degree)
+    bad = module.locate.py_func(states, np.arange(12), *settings, index, degree)
     assert bad == 7
 
 

@@ -128,6 +128,25 @@ def test_bad_circular_is_refused(circular: Any) -> None:
         Fuzzy.from_box(SQUARE, 3, circular=circular)
 
 
+@pytest.mark.parametrize(
+    ("axis", "centres"),
+    [
+        (2, [0.5]),
+        (-1, [0.5]),
+        (0, [NAN]),
+        (0, [INF]),
+        (0, [-1.0, 3.0]),  # as far apart as the period
+        (0, ["low"]),
+        (0, ["0.5"]),
+        ("0", [0.5]),
+    ],
+)
+def test_bad_refinement_is_refused(axis: Any, centres: Any) -> None:
+    partition = Fuzzy([[0.0, 1.0], [0.0, 2.0]], [4.0, None])
+    with pytest.raises(REFUSED, match=r"^(axis|centres(\[\d\])?) must"):
+        partition.refine(axis, centres)
+
+
 BAD_STATES = {
     "one state": [0.0, 0.0],
     "number": 0.0,
@@ -183,5 +202,5 @@ def test_no_states_have_no_cells() -> None:
     ids=str,
 )
 def test_settings_of_something_else_are_refused(settings: Any) -> None:
-    with pytest.raises(ValueError, match=r"^(settings|centres\[0\]|periods) must"):
+    with pytest.raises(ValueError, match=r"^(settings|centres(\[0\])?|periods) must"):
         partition_from_settings(settings)

@@ -32,6 +32,12 @@ def agent_file(path: Path, kind: type = ACL) -> bytes:
     return agent.save(path).read_bytes()
 
 
+@pytest.fixture(scope="module")
+def saved(tmp_path_factory: pytest.TempPathFactory) -> bytes:
+    """The content of a file."""
+    return agent_file(tmp_path_factory.mktemp("saved") / "a")
+
+
 def refuse_or_load(path: Path, content: bytes) -> bool:
     """Whether the content loads; if not, that is a ValueError that names the file."""
     path.write_bytes(content)
@@ -46,16 +52,24 @@ def refuse_or_load(path: Path, content: bytes) -> bool:
     return False
 
 
-def rewrite(path: Path, change: Callable[[dict[str, Any]], None]) -> bytes:
+def unpacked(content: bytes) -> dict[str, np.ndarray]:
+    with np.load(io.BytesIO(content)) as file:
+        return {name: file[name] for name in file.files}
+
+
+def packed(**arrays: Any) -> bytes:
+    buffer = io.BytesIO()
+    np.savez(buffer, **arrays)
+    return buffer.getvalue()
+
+
+def rewrite(content: bytes, change: Callable[[dict[str, Any]], None]) -> bytes:
     """The content of an agent's file with another header."""
-    with np.load(path) as file:
-        arrays = {name: file[name] for name in file.files}
+    arrays = unpacked(content)
     header = json.loads(arrays.pop("header").tobytes())
     change(header)
-    buffer = io.BytesIO()
-    text = json.dumps(header).encode()
-    np.savez(buffer, header=np.frombuffer(text, dtype=np.uint8), **arrays)
-    return buffer.getvalue()
+    text = np.frombuffer(json.dumps(header).encode(), dtype=np.uint8)
+    return packed(header=text, **arrays)
 
 
 # --- round trip ----------------------------------------------------------------
@@ -159,37 +173,33 @@ def test_a_missing_file(tmp_path: Path) -> None:
         ACL.load(tmp_path)
 
 
-def test_every_cut_is_refused(tmp_path: Path) -> None:
-    content = agent_file(tmp_path / "a")
-    for length in [*range(0, len(content), 7), *range(len(content) - 30, len(content))]:
-        assert not refuse_or_load(tmp_path / "cut.npz", content[:length])
+def test_every_cut_is_refused(saved: bytes, tmp_path: Path) -> None:
+    for length in [*range(0, len(saved), 7), *range(len(saved) - 30, len(saved))]:
+        assert not refuse_or_load(tmp_path / "cut.npz", saved[:length])
 
 
-def test_every_changed_byte_is_refused_or_harmless(tmp_path: Path) -> None:
+def test_every_changed_byte_is_refused_or_harmless(
+    saved: bytes, tmp_path: Path
+) -> None:
     """Most changes meet a checksum; some are in fields of the zip that nobody reads."""
-    content = agent_file(tmp_path / "a")
     refused = 0
-    for position in range(len(content)):
-        changed = bytearray(content)
+    for position in range(len(saved)):
+        changed = bytearray(saved)
         changed[position] ^= 0xFF if position % 2 else 1 << (position % 8)
         refused += not refuse_or_load(tmp_path / "b.npz", bytes(changed))
-    assert refused > len(content) / 2
+    assert refused > len(saved) / 2
 
 
 @given(st.lists(st.tuples(st.integers(0, 10**6), st.binary(max_size=8)), min_size=1))
 @PATH
 def test_bytes_written_over_a_file(
-    tmp_path_factory: pytest.TempPathFactory, changes: list[tuple[int, bytes]]
+    saved: bytes, tmp_path: Path, changes: list[tuple[int, bytes]]
 ) -> None:
-    directory = tmp_path_factory.getbasetemp()
-    original = directory / "original.npz"
-    content = bytearray(
-        original.read_bytes() if original.exists() else agent_file(original)
-    )
+    content = bytearray(saved)
     for position, patch in changes:
         start = position % len(content)
         content[start : start + len(patch)] = patch
-    refuse_or_load(directory / "patched.npz", bytes(content))
+    refuse_or_load(tmp_path / "a.npz", bytes(content))
 
 
 @given(
@@ -211,18 +221,12 @@ class Malice:
 
 
 @pytest.mark.parametrize("name", ["header", "table", "ranks", "more", None])
-def test_pickles_are_never_run(name: str | None, tmp_path: Path) -> None:
+def test_pickles_are_never_run(name: str | None, saved: bytes, tmp_path: Path) -> None:
     trap, path = tmp_path / "trapped", tmp_path / "a.npz"
-    malice = np.array([Malice(trap)], dtype=object)
-    if name is None:
-        content = pickle.dumps(Malice(trap))
-    else:
-        agent_file(path)
-        with np.load(path) as file:
-            arrays = {key: file[key] for key in file.files}
-        buffer = io.BytesIO()
-        np.savez(buffer, **{**arrays, name: malice})
-        content = buffer.getvalue()
+    content = pickle.dumps(Malice(trap))
+    if name is not None:
+        malice = np.array([Malice(trap)], dtype=object)
+        content = packed(**{**unpacked(saved), name: malice})
     assert not refuse_or_load(path, content)
     assert not trap.exists()
 
@@ -252,10 +256,7 @@ def foreign_files() -> dict[str, bytes]:
     ):
         array = np.frombuffer(text.encode(), dtype=np.uint8)
         archives[f"header {text[:20]}"] = {"header": array}
-    for name, arrays in archives.items():
-        buffer = io.BytesIO()
-        np.savez(buffer, **arrays)
-        files[name] = buffer.getvalue()
+    files |= {name: packed(**arrays) for name, arrays in archives.items()}
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w") as file:
         file.writestr("notes.txt", "a zip")
@@ -274,9 +275,10 @@ def test_foreign_files_are_refused(name: str, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "version", [2, 0, "1", None, 1.5, [1], pytest.param(..., id="none")]
 )
-def test_other_versions_are_refused_by_number(version: Any, tmp_path: Path) -> None:
-    agent_file(tmp_path / "a.npz")
-    content = rewrite(tmp_path / "a.npz", lambda old: put(old, "version", version))
+def test_other_versions_are_refused_by_number(
+    version: Any, saved: bytes, tmp_path: Path
+) -> None:
+    content = rewrite(saved, lambda old: put(old, "version", version))
     (tmp_path / "a.npz").write_bytes(content)
     with pytest.raises(ValueError, match=r"a\.npz must be of format .* version 1, got"):
         ACL.load(tmp_path / "a")
@@ -325,12 +327,11 @@ def put(header: dict[str, Any], place: str, value: Any) -> None:
 
 @pytest.mark.parametrize("place", PLACES)
 def test_nonsense_in_the_header_is_a_value_error_if_anything(
-    place: str, tmp_path: Path
+    place: str, saved: bytes, tmp_path: Path
 ) -> None:
-    agent_file(tmp_path / "a.npz")
     failures = []
     for value in [*NONSENSE, ...]:
-        content = rewrite(tmp_path / "a.npz", lambda old, v=value: put(old, place, v))
+        content = rewrite(saved, lambda old, v=value: put(old, place, v))
         (tmp_path / "b.npz").write_bytes(content)
         try:
             ACL.load(tmp_path / "b")
@@ -344,25 +345,19 @@ def test_nonsense_in_the_header_is_a_value_error_if_anything(
 @pytest.mark.parametrize("place", ["num_timesteps", "trials", "seconds", "history"])
 @pytest.mark.parametrize("value", [None, "text", {}, -1], ids=repr)
 def test_a_record_of_the_wrong_kind_is_refused(
-    place: str, value: Any, tmp_path: Path
+    place: str, value: Any, saved: bytes, tmp_path: Path
 ) -> None:
     """Else it would be found out in the next `learn`, after a trial."""
-    agent_file(tmp_path / "a.npz")
-    content = rewrite(tmp_path / "a.npz", lambda old: put(old, place, value))
+    content = rewrite(saved, lambda old: put(old, place, value))
     assert not refuse_or_load(tmp_path / "b.npz", content)
 
 
 @pytest.mark.parametrize("name", ["table", "ranks"])
 @pytest.mark.parametrize("shape", [(1, 2), (6, 1), (), (12,), (6, 3), (0,)])
 def test_arrays_of_another_shape_are_refused(
-    name: str, shape: tuple[int, ...], tmp_path: Path
+    name: str, shape: tuple[int, ...], saved: bytes, tmp_path: Path
 ) -> None:
-    path = tmp_path / "a.npz"
-    agent_file(path)
-    with np.load(path) as file:
-        arrays = {key: file[key] for key in file.files}
-    for replacement in ({name: np.ones(shape, dtype=arrays[name].dtype)}, {}):
-        buffer = io.BytesIO()
-        kept = {key: value for key, value in arrays.items() if key != name}
-        np.savez(buffer, **kept, **replacement)
-        assert not refuse_or_load(path, buffer.getvalue())
+    arrays = unpacked(saved)
+    other = np.ones(shape, dtype=arrays.pop(name).dtype)
+    for content in (packed(**arrays, **{name: other}), packed(**arrays)):
+        assert not refuse_or_load(tmp_path / "a.npz", content)

@@ -19,11 +19,12 @@ from acl_gym.agents.tabular import TabularAgent
 from acl_gym.agents.training import Training
 from acl_gym.callbacks import Callbacks, Row
 from acl_gym.envs.control_env import ControlVectorEnv
-from acl_gym.partition import CellArray, FloatArray, IntArray, Partition
+from acl_gym.membership import CellArray, FloatArray, IntArray
+from acl_gym.partition import Partition
 
 
 class PheromoneBoundWarning(UserWarning):
-    """tau0 exceeds rho / J_max, so levels may fall below it (Proposition 4.3)."""
+    """tau0 exceeds 1 / J_max, so levels may fall below it (Proposition 4.3)."""
 
 
 class ACL(TabularAgent):
@@ -37,9 +38,10 @@ class ACL(TabularAgent):
     Args:
         env: a vector environment with `Discrete` actions; its slots are the M ants.
         partition: turns observations into cells and degrees.
-        tau0: initial pheromone level tau_0, > 0. Levels stay above it if it is at
-            most rho / J_max (Proposition 4.3). Where J_max is known and it is more,
-            a `PheromoneBoundWarning` says so (a decision; Table 5.2 exceeds it).
+        tau0: initial pheromone level tau_0, > 0. Levels never fall below it if it is
+            at most 1 / J_max (the proof of Proposition 4.3; its text asks for
+            rho / J_max, which Table 5.2 exceeds). Where J_max is known and tau0 is
+            more, a `PheromoneBoundWarning` says so (a decision).
         local_decay: gamma, in [0, 1), the decay of each visited pair (4.12).
         global_decay: rho, in [0, 1], weight of the deposits of a trial (4.15). The
             thesis requires rho > 0; 0, where nothing is learned, is among its
@@ -61,10 +63,14 @@ class ACL(TabularAgent):
         >>> from acl_gym import ACL, Fuzzy
         >>> env = gym.make_vec("acl_gym/Pendulum-v0", num_envs=250)
         >>> grid = Fuzzy.from_box(env.single_observation_space, (40, 41), circular=[0])
-        >>> colony = ACL(env, grid, tau0=1e-5, seed=0).learn(trials=3)
+        >>> colony = ACL(env, grid, seed=0).learn(trials=3)
         >>> colony.trials
         3
     """
+
+    local_decay = validation.Number(at_least=0, below=1)
+    global_decay = validation.Number(at_least=0, at_most=1)
+    epsilon = validation.Number(at_least=0, at_most=1)
 
     def __init__(
         self,
@@ -81,23 +87,18 @@ class ACL(TabularAgent):
         seed: int | None = None,
         n_actions: int | None = None,
     ) -> None:
-        self.tau0 = validation.number("tau0", tau0, above=0)
-        self.local_decay = validation.number(
-            "local_decay", local_decay, at_least=0, below=1
-        )
-        self.global_decay = validation.number(
-            "global_decay", global_decay, at_least=0, at_most=1
-        )
-        self.alpha = validation.number("alpha", alpha, above=0)
-        self.epsilon = validation.number("epsilon", epsilon, at_least=0, at_most=1)
-        self.selection = validation.one_of("selection", selection, RULES)
+        tau0 = validation.number("tau0", tau0, above=0)
+        alpha = validation.number("alpha", alpha, above=0)
+        self.local_decay = local_decay
+        self.global_decay = global_decay
+        self.epsilon = epsilon
+        self._selection = validation.one_of("selection", selection, RULES)
         super().__init__(
             env, partition, max_steps=max_steps, seed=seed, n_actions=n_actions
         )
-        self.pheromone = Pheromone(
-            partition.n_cells, self.n_actions, self.tau0, self.alpha
-        )
+        self.pheromone = Pheromone(partition.n_cells, self.n_actions, tau0, alpha)
         self._solutions: Solutions | None = None
+        self._warn_if_tau0_is_high()
 
     def learn(
         self,
@@ -126,14 +127,13 @@ class ACL(TabularAgent):
         Raises:
             ValueError: a solution's cost is not positive and finite.
         """
-        walk, pheromone = self.walk, self.pheromone
-        solutions = self._solutions = self._fresh_solutions()
+        pheromone = self.pheromone
         budget = (total_timesteps, trials, callback, log_interval, progress_bar)
         with Training(self, *budget) as training:
-            while training.goes_on:  # 2, 22: repeat until k = K
+            while training.next_trial():  # 2, 22: repeat until k = K
                 # 3-6: every ant begins in a random state with an empty solution
+                walk, solutions = self.walk, self._empty_solutions()
                 observation = walk.start(seed=self._next_seed())
-                solutions.clear()
                 while walk.ants.size:  # 7, 17: repeat until t = T or C is empty
                     ants = walk.ants
                     # 8: fuzzify the states
@@ -152,8 +152,26 @@ class ACL(TabularAgent):
         return self
 
     @property
-    def table(self) -> FloatArray:
-        """The pheromone levels tau, `(n_cells, n_actions)`, a live array."""
+    def tau0(self) -> float:
+        """Initial pheromone level tau_0; fixed once the colony is made."""
+        return self.pheromone.tau0
+
+    @property
+    def alpha(self) -> float:
+        """Exponent of the selection rule, > 0; may be changed at any time."""
+        return self.pheromone.alpha
+
+    @alpha.setter
+    def alpha(self, value: float) -> None:
+        self.pheromone.alpha = validation.number("alpha", value, above=0)
+
+    @property
+    def selection(self) -> str:
+        """The selection rule; fixed once the colony is made."""
+        return self._selection
+
+    @property
+    def _table(self) -> FloatArray:
         return self.pheromone.levels
 
     def set_table(self, table: ArrayLike) -> None:
@@ -162,32 +180,41 @@ class ACL(TabularAgent):
         Raises:
             ValueError: the shape differs, or a level is not positive and finite.
         """
-        levels = np.asarray(table, dtype=np.float64)
-        if levels.shape != self.table.shape:
+        levels = self._checked_table(table)
+        if not (levels > 0.0).all():
             raise ValueError(
-                f"table must have shape {self.table.shape}, got {levels.shape}."
+                f"table must hold positive levels only, got {levels.min():g}."
             )
-        if not (np.isfinite(levels) & (levels > 0.0)).all():
-            raise ValueError("table must hold positive finite levels only.")
         self.pheromone.set_levels(levels)
 
     def set_env(self, env: VectorEnv[Any, Any, Any]) -> None:
-        """See `TabularAgent.set_env`; checks tau0 against Proposition 4.3."""
+        """See `TabularAgent.set_env`; warns if tau0 is too high for `env`."""
         super().set_env(env)
-        base = env.unwrapped
-        if isinstance(base, ControlVectorEnv) and self.global_decay > 0.0:
-            highest_cost = self.max_steps * base.system.max_stage_cost
-            bound = self.global_decay / highest_cost
-            if self.tau0 > bound:
-                digit = 10.0 ** math.floor(math.log10(bound))
-                warnings.warn(
-                    f"tau0 = {self.tau0:g} exceeds global_decay / J_max = {bound:.3g} "
-                    f"(J_max <= {highest_cost:.4g} on this environment), so pheromone "
-                    "levels may fall below tau0 (Proposition 4.3); a tau0 of at most "
-                    f"{math.floor(bound / digit) * digit:.0e} rules that out.",
-                    PheromoneBoundWarning,
-                    stacklevel=4,
-                )
+        self._warn_if_tau0_is_high()
+
+    def _warn_if_tau0_is_high(self) -> None:
+        """Hold tau0 against Proposition 4.3 where the environment tells J_max.
+
+        The proposition asks for tau0 <= rho / J_max, but its proof needs no more than
+        tau0 <= 1 / J_max: the level after a deposit is at least
+        (1 - rho I) tau0 + rho I / J_max. Table 5.2 keeps the latter, not the former,
+        so the latter is what is checked.
+        """
+        base = None if self.env is None else self.env.unwrapped
+        if not isinstance(base, ControlVectorEnv) or self.global_decay == 0.0:
+            return
+        highest_cost = self.max_steps * base.system.max_stage_cost
+        bound = 1.0 / highest_cost
+        if self.tau0 > bound:
+            digit = 10.0 ** math.floor(math.log10(bound))
+            warnings.warn(
+                f"tau0 = {self.tau0:g} exceeds 1 / J_max = {bound:.3g} (J_max <= "
+                f"{highest_cost:.4g} on this environment), so pheromone levels may "
+                "fall below tau0 (Proposition 4.3); a tau0 of at most "
+                f"{math.floor(bound / digit) * digit:.0e} rules that out.",
+                PheromoneBoundWarning,
+                stacklevel=3,
+            )
 
     def soft_policy(
         self, exponent: float = 10.0, seed: int | None = None
@@ -202,7 +229,7 @@ class ACL(TabularAgent):
             A policy over a copy of the pheromone as it is now.
         """
         first_action = self.policy.first_action
-        return SoftPolicy(self.partition, self.table, exponent, seed, first_action)
+        return SoftPolicy(self.partition, self._table, exponent, seed, first_action)
 
     def parameters(self) -> dict[str, Any]:
         """The keyword arguments of the constructor."""
@@ -219,7 +246,9 @@ class ACL(TabularAgent):
 
     def measures(self, policy: IntArray) -> Row:
         """The sensitivity of the policy (3.48), averaged over the cells, in [0, 1]."""
-        return {"sensitivity": float(_mean_sensitivity(self.table, policy, self.alpha))}
+        return {
+            "sensitivity": float(_mean_sensitivity(self._table, policy, self.alpha))
+        }
 
     def _explore(self, index: CellArray, degree: FloatArray) -> IntArray:
         return self._choose(index, degree, self._predict_rng)
@@ -231,12 +260,14 @@ class ACL(TabularAgent):
             self.selection, self.pheromone, index, degree, self.epsilon, rng
         )
 
-    def _fresh_solutions(self) -> Solutions:
-        """Memory for a trial, kept from one call of `learn` to the next."""
-        kept = self._solutions
-        if kept is not None and kept.action.shape == (self.num_envs, self.max_steps):
-            return kept
-        return Solutions(self.num_envs, self.max_steps, self.partition.cells_per_state)
+    def _empty_solutions(self) -> Solutions:
+        """Memory for a trial, the same for one after the other."""
+        kept, shape = self._solutions, (self.num_envs, self.max_steps)
+        if kept is None or kept.action.shape != shape:
+            kept = Solutions(*shape, self.partition.cells_per_state)
+            self._solutions = kept
+        kept.clear()
+        return kept
 
 
 @njit(cache=True)

@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from acl_gym.partition import CellArray, FloatArray, IntArray
+from acl_gym.membership import CellArray, FloatArray, IntArray
 
 ActionArray = NDArray[np.int32]
 BoolArray = NDArray[np.bool_]

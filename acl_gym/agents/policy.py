@@ -11,7 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 from acl_gym import validation
 from acl_gym.agents.pheromone import Pheromone
 from acl_gym.agents.selection import choose_actions, greedy_actions
-from acl_gym.partition import FloatArray, IntArray, Partition
+from acl_gym.membership import FloatArray, IntArray
+from acl_gym.partition import Partition
 
 RankArray = NDArray[np.int32]
 

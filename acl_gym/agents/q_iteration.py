@@ -18,7 +18,8 @@ from tqdm.auto import tqdm
 from acl_gym import validation
 from acl_gym.agents.policy import TablePolicy
 from acl_gym.envs.control_env import ControlVectorEnv
-from acl_gym.partition import CellArray, FloatArray, Partition
+from acl_gym.membership import CellArray, FloatArray
+from acl_gym.partition import Partition
 
 BoolArray = NDArray[np.bool_]
 

@@ -14,7 +14,8 @@ from acl_gym.agents.selection import epsilon_greedy_actions
 from acl_gym.agents.tabular import TabularAgent
 from acl_gym.agents.training import Training
 from acl_gym.callbacks import Callbacks
-from acl_gym.partition import CellArray, FloatArray, IntArray, Partition
+from acl_gym.membership import CellArray, FloatArray, IntArray
+from acl_gym.partition import Partition
 
 
 class QLearning(TabularAgent):
@@ -40,6 +41,10 @@ class QLearning(TabularAgent):
         ValueError: a parameter is out of range.
     """
 
+    learning_rate = validation.Number(above=0, at_most=1)
+    discount = validation.Number(at_least=0, at_most=1)
+    epsilon = validation.Number(at_least=0, at_most=1)
+
     def __init__(
         self,
         env: VectorEnv[Any, Any, Any] | None,
@@ -52,11 +57,9 @@ class QLearning(TabularAgent):
         seed: int | None = None,
         n_actions: int | None = None,
     ) -> None:
-        self.learning_rate = validation.number(
-            "learning_rate", learning_rate, above=0, at_most=1
-        )
-        self.discount = validation.number("discount", discount, at_least=0, at_most=1)
-        self.epsilon = validation.number("epsilon", epsilon, at_least=0, at_most=1)
+        self.learning_rate = learning_rate
+        self.discount = discount
+        self.epsilon = epsilon
         super().__init__(
             env, partition, max_steps=max_steps, seed=seed, n_actions=n_actions
         )
@@ -71,20 +74,20 @@ class QLearning(TabularAgent):
         progress_bar: bool = False,
     ) -> Self:
         """Learn; a trial is one episode in every slot. Arguments as in `ACL.learn`."""
-        walk = self.walk
         budget = (total_timesteps, trials, callback, log_interval, progress_bar)
         with Training(self, *budget) as training:
-            while training.goes_on:
+            while training.next_trial():
+                walk = self.walk
                 observation = walk.start(seed=self._next_seed())
                 index, degree = self.partition(observation)
                 while walk.ants.size:
                     actions = epsilon_greedy_actions(
-                        self.table, index, degree, self.epsilon, self.rng
+                        self._table, index, degree, self.epsilon, self.rng
                     )
                     step = walk.step(actions)
                     next_index, next_degree = self._locate(step.observation, step.ants)
                     _update(
-                        self.table,
+                        self._table,
                         index,
                         degree,
                         actions,
@@ -101,8 +104,7 @@ class QLearning(TabularAgent):
         return self
 
     @property
-    def table(self) -> FloatArray:
-        """The action values Q, `(n_cells, n_actions)`, a live array."""
+    def _table(self) -> FloatArray:
         return self._values
 
     def set_table(self, table: ArrayLike) -> None:
@@ -111,13 +113,7 @@ class QLearning(TabularAgent):
         Raises:
             ValueError: the shape differs, or a value is not finite.
         """
-        values = np.asarray(table, dtype=np.float64)
-        if values.shape != self.table.shape:
-            raise ValueError(
-                f"table must have shape {self.table.shape}, got {values.shape}."
-            )
-        if not np.isfinite(values).all():
-            raise ValueError("table must hold finite values only.")
+        values = self._checked_table(table)
         self._values[:] = values
 
     def parameters(self) -> dict[str, Any]:
@@ -132,7 +128,7 @@ class QLearning(TabularAgent):
 
     def _explore(self, index: CellArray, degree: FloatArray) -> IntArray:
         return epsilon_greedy_actions(
-            self.table, index, degree, self.epsilon, self._predict_rng
+            self._table, index, degree, self.epsilon, self._predict_rng
         )
 
 

@@ -10,7 +10,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from acl_gym.agents.pheromone import BoolArray, Pheromone
-from acl_gym.partition import CellArray, FloatArray, IntArray
+from acl_gym.membership import CellArray, FloatArray, IntArray
 
 RULES = ("boltzmann", "epsilon_greedy", "max_boltzmann")
 

@@ -14,13 +14,8 @@ from acl_gym import storage, validation
 from acl_gym.agents.policy import RankArray, TablePolicy, random_ranks
 from acl_gym.agents.walk import Walk
 from acl_gym.callbacks import Callbacks, Row
-from acl_gym.partition import (
-    CellArray,
-    FloatArray,
-    IntArray,
-    Partition,
-    partition_from_settings,
-)
+from acl_gym.membership import CellArray, FloatArray, IntArray
+from acl_gym.partition import Partition, partition_from_settings
 
 
 class TabularAgent(ABC):
@@ -40,6 +35,8 @@ class TabularAgent(ABC):
             cumulated), `ants_cost` (mean J of the ants), `ants_success_rate`,
             `policy_variation` (§3.6.1), what the agent adds in `measures`, and,
             where a `PolicyEvaluation` ran, `policy_cost` (3.47) and `success_rate`.
+        in_trial: whether a trial is under way, or was when an exception ended it: the
+            table is then that of no whole trial.
     """
 
     def __init__(
@@ -58,24 +55,32 @@ class TabularAgent(ABC):
                 "env.single_observation_space, cells)."
             )
         self.partition = partition
-        self.max_steps = validation.integer("max_steps", max_steps, at_least=1)
+        self._max_steps = validation.integer("max_steps", max_steps, at_least=1)
         if seed is not None:
             seed = validation.integer("seed", seed, at_least=0)
         self.env: VectorEnv[Any, Any, Any] | None = None
         self._walk: Walk | None = None
+        self._first_action = 0
+        if n_actions is not None:
+            n_actions = validation.integer("n_actions", n_actions, at_least=1)
+        elif env is None:
+            raise ValueError(
+                "an agent needs env, or n_actions if it is only to predict; got neither."
+            )
         self._n_actions = n_actions
         if env is not None:
-            self.set_env(env)
+            self._attach(env)
         self.num_timesteps = 0
         self.trials = 0
         self.seconds = 0.0
         self.history: list[Row] = []
+        self.in_trial = False
         self.set_random_seed(seed)
 
     @property
     @abstractmethod
-    def table(self) -> FloatArray:
-        """The values the policy maximises, `(n_cells, n_actions)`, a live array."""
+    def _table(self) -> FloatArray:
+        """The values the policy maximises, `(n_cells, n_actions)`."""
 
     @abstractmethod
     def set_table(self, table: ArrayLike) -> None:
@@ -109,9 +114,24 @@ class TabularAgent(ABC):
         """Choose actions as in learning, with `self._predict_rng`."""
 
     @property
+    def table(self) -> FloatArray:
+        """The table as it is now, `(n_cells, n_actions)`.
+
+        It follows learning, and cannot be written to: see `set_table`.
+        """
+        view = self._table.view()
+        view.flags.writeable = False
+        return view
+
+    @property
+    def max_steps(self) -> int:
+        """T, the longest an episode may last; fixed once the agent is made."""
+        return self._max_steps
+
+    @property
     def n_actions(self) -> int:
-        """The number of actions."""
-        if self._n_actions is None:
+        """The number of actions, the columns of the table."""
+        if self._n_actions is None:  # pragma: no cover - the constructor sees to it
             raise ValueError("the agent has no environment; call set_env(env) first.")
         return self._n_actions
 
@@ -132,8 +152,17 @@ class TabularAgent(ABC):
 
         Raises:
             TypeError: `env` is not a vector environment.
-            ValueError: its actions are not as many as the table has.
+            ValueError: its actions are not those of the table.
         """
+        walk = Walk(env, self.max_steps)
+        if walk.first_action != self._first_action:
+            raise ValueError(
+                f"env's actions must begin at {self._first_action} as the table's do, "
+                f"got {walk.first_action}."
+            )
+        self._attach(env)
+
+    def _attach(self, env: VectorEnv[Any, Any, Any]) -> None:
         walk = Walk(env, self.max_steps)
         if self._n_actions not in (None, walk.n_actions):
             raise ValueError(
@@ -141,6 +170,7 @@ class TabularAgent(ABC):
                 f"{walk.n_actions}."
             )
         self._n_actions = walk.n_actions
+        self._first_action = walk.first_action
         self.env = env
         self._walk = walk
         k = self.partition.cells_per_state
@@ -165,8 +195,7 @@ class TabularAgent(ABC):
     @property
     def policy(self) -> TablePolicy:
         """The policy as it is now; it follows the table until you `copy()` it."""
-        first_action = 0 if self._walk is None else self._walk.first_action
-        return TablePolicy(self.partition, self.table, self._ranks, first_action)
+        return TablePolicy(self.partition, self._table, self._ranks, self._first_action)
 
     def predict(
         self,
@@ -211,17 +240,31 @@ class TabularAgent(ABC):
         """The seed of the next trial: environments follow the agent's own stream."""
         return int(self.rng.integers(2**31))
 
+    def _checked_table(self, table: ArrayLike) -> FloatArray:
+        values = validation.real_array("table", table, ndim=2)
+        if values.shape != self._table.shape:
+            raise ValueError(
+                f"table must have shape {self._table.shape}, got {values.shape}."
+            )
+        return values
+
     def save(self, path: str | Path) -> Path:
         """Write the agent to one `.npz` file, without pickle, in one piece.
 
         Returns:
             The path written, with `.npz` added where it was missing.
+
+        Raises:
+            ValueError: the partition is of a kind that `load` could not build again.
         """
+        partition = self.partition.settings()
+        partition_from_settings(partition)
         header = {
             "agent": type(self).__name__,
             "parameters": self.parameters(),
-            "partition": self.partition.settings(),
+            "partition": partition,
             "n_actions": self.n_actions,
+            "first_action": self._first_action,
             "num_timesteps": self.num_timesteps,
             "trials": self.trials,
             "seconds": self.seconds,
@@ -230,7 +273,7 @@ class TabularAgent(ABC):
                 rng.bit_generator.state for rng in (self.rng, self._predict_rng)
             ],
         }
-        arrays: dict[str, NDArray[Any]] = {"table": self.table, "ranks": self._ranks}
+        arrays: dict[str, NDArray[Any]] = {"table": self._table, "ranks": self._ranks}
         return storage.save(path, header, arrays)
 
     @classmethod
@@ -255,21 +298,41 @@ class TabularAgent(ABC):
                 "load it with that class."
             )
         try:
-            agent = cls(
-                env,
-                partition_from_settings(header["partition"]),
-                n_actions=header["n_actions"],
-                **header["parameters"],
-            )
-            agent.set_table(arrays["table"])
-            agent._ranks[:] = arrays["ranks"]
-            agent.num_timesteps = header["num_timesteps"]
-            agent.trials = header["trials"]
-            agent.seconds = header["seconds"]
-            agent.history = header["history"]
-            generators = (agent.rng, agent._predict_rng)
-            for rng, state in zip(generators, header["generators"], strict=True):
-                rng.bit_generator.state = state
-        except (KeyError, TypeError) as error:
+            partition = partition_from_settings(header["partition"])
+            shape = partition.n_cells, int(header["n_actions"])
+            if arrays["table"].shape != shape or arrays["ranks"].shape != shape:
+                raise ValueError(f"its arrays must have shape {shape}")
+            agent = cls(None, partition, n_actions=shape[1], **header["parameters"])
+            agent._restore(header, arrays)
+        except (KeyError, OverflowError, TypeError, ValueError) as error:
             raise ValueError(f"{path} is damaged: {error}.") from error
+        if env is not None:
+            agent.set_env(env)
         return agent
+
+    def _restore(self, header: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> None:
+        """Take over what a file holds beside the constructor's arguments."""
+        self.set_table(arrays["table"])
+        ranks = arrays["ranks"]
+        if (np.sort(ranks, axis=1) != np.arange(self.n_actions)).any():
+            raise ValueError("ranks must be permutations of the actions")
+        self._ranks = ranks.astype(np.int32)
+        first_action = header["first_action"]
+        if not isinstance(first_action, int):
+            raise TypeError(f"first_action must be an integer, got {first_action!r}")
+        self._first_action = first_action
+        for name in ("num_timesteps", "trials"):
+            count = validation.integer(name, header[name], at_least=0)
+            setattr(self, name, count)
+        self.seconds = validation.number("seconds", header["seconds"], at_least=0)
+        history = header["history"]
+        if not isinstance(history, list) or not all(
+            isinstance(row, dict)
+            and all(isinstance(value, (int, float)) for value in row.values())
+            for row in history
+        ):
+            raise TypeError("history must be a list of rows of numbers")
+        self.history = history
+        generators = (self.rng, self._predict_rng)
+        for rng, state in zip(generators, header["generators"], strict=True):
+            rng.bit_generator.state = state

@@ -10,7 +10,7 @@ import numpy as np
 from tqdm.auto import tqdm
 
 from acl_gym import validation
-from acl_gym.callbacks import Callbacks, Row, as_callbacks
+from acl_gym.callbacks import Callbacks, Row, as_callbacks, is_stop
 
 if TYPE_CHECKING:
     from acl_gym.agents.tabular import TabularAgent
@@ -87,14 +87,14 @@ class Training:
         finally:
             self._bar.close()
 
-    @property
-    def goes_on(self) -> bool:
-        """Whether there is another trial to make."""
-        return (
+    def next_trial(self) -> bool:
+        """Whether there is another trial to make; if so, it has begun."""
+        self._agent.in_trial = (
             not self._stopped
             and self._agent.num_timesteps < self._last_step
             and self._agent.trials < self._last_trial
         )
+        return self._agent.in_trial
 
     def end_trial(self) -> None:
         """Count the trial, measure it (§3.6.1) and tell the callbacks."""
@@ -114,9 +114,10 @@ class Training:
             **agent.measures(policy),
         }
         self._policy = policy
+        agent.in_trial = False
         agent.history.append(row)
         for callback in self._callbacks:
-            if callback.on_trial_end(agent, row) is False:
+            if is_stop(callback.on_trial_end(agent, row)):
                 self._stopped = True
         self._report(row, 1 if self._bar_counts_trials else steps)
         self._clock = time.perf_counter()

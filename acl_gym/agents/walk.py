@@ -66,14 +66,7 @@ class Walk:
     """
 
     def __init__(self, env: VectorEnv[Any, Any, Any], max_steps: int) -> None:
-        if not isinstance(env, VectorEnv):
-            remedy = "make it with gym.make_vec(id, num_envs=...)"
-            if isinstance(env, gym.Env):
-                remedy += " or wrap it in gym.vector.SyncVectorEnv([lambda: env])"
-            raise TypeError(
-                "env must be a gymnasium.vector.VectorEnv, got "
-                f"{type(env).__name__}; {remedy}."
-            )
+        require_vector_env(env)
         space = env.single_action_space
         if not isinstance(space, spaces.Discrete):
             raise ValueError(
@@ -84,7 +77,9 @@ class Walk:
         self.max_steps = validation.integer("max_steps", max_steps, at_least=1)
         self.n_actions = int(space.n)
         self._waits = isinstance(env.unwrapped, ControlVectorEnv)
-        self._mode = env.metadata.get("autoreset_mode", AutoresetMode.NEXT_STEP)
+        self._mode = AutoresetMode(
+            env.metadata.get("autoreset_mode", AutoresetMode.NEXT_STEP)
+        )
         self._actions = np.full(env.num_envs, space.start, dtype=np.int64)
         self.first_action = int(space.start)
         self._all = np.arange(env.num_envs)
@@ -188,6 +183,22 @@ class Walk:
             for slot in ants[stopped]:
                 observation[slot] = infos["final_obs"][slot]
         return observation
+
+
+def require_vector_env(env: Any) -> None:
+    """Refuse what is not a vector environment.
+
+    Raises:
+        TypeError: `env` is not a `gymnasium.vector.VectorEnv`.
+    """
+    if not isinstance(env, VectorEnv):
+        remedy = "make it with gym.make_vec(id, num_envs=...)"
+        if isinstance(env, gym.Env):
+            remedy += " or wrap it in gym.vector.SyncVectorEnv([lambda: env])"
+        raise TypeError(
+            "env must be a gymnasium.vector.VectorEnv, got "
+            f"{type(env).__name__}; {remedy}."
+        )
 
 
 @njit(cache=True)

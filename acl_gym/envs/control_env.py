@@ -7,6 +7,7 @@ out. Every array that leaves `reset` or `step` is a new one.
 
 from __future__ import annotations
 
+import copy
 from typing import Any, ClassVar, Self
 
 import gymnasium as gym
@@ -14,28 +15,23 @@ import numpy as np
 from gymnasium.error import ResetNeeded
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from acl_gym import validation
+from acl_gym.envs.bookkeeping import (
+    checked_actions,
+    checked_autoreset_mode,
+    checked_options,
+    checked_render_mode,
+    draw_uniforms,
+    gather_slots,
+    put_slots_back,
+)
 from acl_gym.envs.rendering import Frame, Renderer
 from acl_gym.envs.system import BoolArray, ControlSystem, FloatArray, IntArray
 
 Observation = NDArray[Any]
 StepResult = tuple[Observation, FloatArray, BoolArray, BoolArray, dict[str, Any]]
-
-
-def _checked_options(
-    options: dict[str, Any] | None, allowed: tuple[str, ...]
-) -> dict[str, Any]:
-    """Refuse reset options that would otherwise be ignored in silence."""
-    unknown = sorted(set(options or ()) - set(allowed))
-    if unknown:
-        raise ValueError(
-            f"reset options must be among {list(allowed)}, got {unknown}; "
-            "check the spelling."
-        )
-    return dict(options or {})
 
 
 class ControlEnv(gym.Env[Observation, np.int64]):
@@ -56,7 +52,7 @@ class ControlEnv(gym.Env[Observation, np.int64]):
     system_type: ClassVar[type[ControlSystem]]
 
     def __init__(self, render_mode: str | None = None, **parameters: Any) -> None:
-        self.render_mode = _checked_render_mode(render_mode, self.metadata)
+        self.render_mode = checked_render_mode(render_mode, self.metadata)
         self.system = self.system_type(**parameters)
         self.observation_space = self.system.observation_space
         self.action_space = self.system.action_space
@@ -81,11 +77,12 @@ class ControlEnv(gym.Env[Observation, np.int64]):
         Raises:
             ValueError: the state or a key of `options` is not valid.
         """
-        options = _checked_options(options, ("state",))
+        options = checked_options(options, ("state",))
         given = options.get("state")
         state = None
         if given is not None:
-            state = self.system.checked_states(_as_row(given)).T.copy()
+            row = validation.real_array("options['state']", given, finite=False)
+            state = self.system.checked_states(row[None]).T.copy()
         super().reset(seed=seed)
         if state is None:
             state = self.system.sample_states(self.np_random, 1)
@@ -115,9 +112,9 @@ class ControlEnv(gym.Env[Observation, np.int64]):
                 + ("has not begun" if self._state is None else "reached its goal")
                 + "; call reset() first."
             )
-        actions = _checked_actions(np.asarray([action]), 1, self._n_actions)
+        actions = checked_actions(np.asarray([action]), 1, self._n_actions)
         rewards, reached = np.empty(1), np.empty(1, dtype=np.bool_)
-        uniforms = _uniforms(self.system, self.np_random, 1)
+        uniforms = draw_uniforms(self.system, self.np_random, 1)
         self.system.advance(self._state, actions, uniforms, rewards, reached)
         self._finished = bool(reached[0])
         self._action = int(actions[0])
@@ -197,10 +194,10 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
                 "max_episode_steps", max_episode_steps, at_least=1
             )
         self.max_episode_steps = max_episode_steps
-        self.autoreset_mode = _checked_autoreset_mode(autoreset_mode)
+        self.autoreset_mode = checked_autoreset_mode(autoreset_mode)
         self.metadata = {**self.metadata, "autoreset_mode": self.autoreset_mode}
-        self.render_mode = _checked_render_mode(render_mode, self.metadata)
-        self.parameters = parameters
+        self.render_mode = checked_render_mode(render_mode, self.metadata)
+        self.parameters = copy.deepcopy(parameters)  # the caller may change a list
         self.system = self.system_type(**parameters)
         self.single_observation_space = self.system.observation_space
         self.single_action_space = self.system.action_space
@@ -245,7 +242,7 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
             TypeError: the mask is not a bool array.
             ResetNeeded: a mask was given before the first full reset.
         """
-        options = _checked_options(options, ("state", "reset_mask", "finished"))
+        options = checked_options(options, ("state", "reset_mask", "finished"))
         mask = self._checked_mask(options.get("reset_mask"))
         slots = np.arange(self.num_envs) if mask is None else np.flatnonzero(mask)
         given = options.get("state")
@@ -277,7 +274,7 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
         """
         if self._state is None:
             raise ResetNeeded("step() needs states; call reset() first.")
-        checked = _checked_actions(actions, self.num_envs, self._n_actions)
+        checked = checked_actions(actions, self.num_envs, self._n_actions)
         self._actions = checked
         restarting = self._slots_to_restart()
         rewards = np.zeros(self.num_envs)
@@ -325,11 +322,12 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
         if self._renderer is None:
             self._renderer = Renderer(self.system, self.metadata["render_fps"])
         started = self._steps == 0
+        idle = self._finished & self._wait_when_finished
         return tuple(
             self._renderer.frame(
                 self._states[:, slot],
                 None
-                if self._actions is None or started[slot]
+                if self._actions is None or started[slot] or idle[slot]
                 else int(self._actions[slot]),
             )
             for slot in range(self.num_envs)
@@ -364,7 +362,7 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
         rewards: FloatArray,
         reached: BoolArray,
     ) -> None:
-        uniforms = _uniforms(self.system, self.np_random, actions.size)
+        uniforms = draw_uniforms(self.system, self.np_random, actions.size)
         self.system.advance(states, actions, uniforms, rewards, reached)
 
     def _advance_walking(
@@ -380,9 +378,9 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
         states, part = self._states, np.empty((self._states.shape[0], m))
         part_actions = np.empty(m, dtype=np.int64)
         part_rewards, part_reached = np.empty(m), np.empty(m, dtype=np.bool_)
-        _gather(walking, states, actions, part, part_actions)
+        gather_slots(walking, states, actions, part, part_actions)
         self._advance(part, part_actions, part_rewards, part_reached)
-        _put_back(
+        put_slots_back(
             walking,
             part,
             part_rewards,
@@ -439,13 +437,17 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
         return self.system.observe(self._states)
 
     def _given_states(self, given: Any, slots: IntArray) -> FloatArray:
-        rows = np.asarray(given)
+        rows = validation.real_array("options['state']", given, finite=False)
         if rows.shape[:1] != (self.num_envs,):
             raise ValueError(
                 "options['state'] must hold one row for each slot, shape "
                 f"({self.num_envs}, ...), got shape {rows.shape}."
             )
-        return self.system.checked_states(rows[slots]).T.copy()
+        if self._state is not None and rows.shape == (current := self.states).shape:
+            # Rows outside the mask may hold anything, so they are not looked at.
+            current[slots] = rows[slots]
+            rows = current
+        return self.system.checked_states(rows)[slots].T.copy()
 
     def _checked_mask(self, mask: Any) -> BoolArray | None:
         if mask is None:
@@ -465,101 +467,3 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
                 "the first reset must start all slots; leave 'reset_mask' out."
             )
         return mask
-
-
-@njit(cache=True)
-def _gather(
-    slots: IntArray,
-    states: FloatArray,
-    actions: IntArray,
-    part: FloatArray,
-    part_actions: IntArray,
-) -> None:
-    """Copy the columns of `slots` side by side."""
-    for j in range(slots.size):
-        part_actions[j] = actions[slots[j]]
-        for row in range(states.shape[0]):
-            part[row, j] = states[row, slots[j]]
-
-
-@njit(cache=True)
-def _put_back(
-    slots: IntArray,
-    part: FloatArray,
-    part_rewards: FloatArray,
-    part_reached: BoolArray,
-    limit: int,
-    states: FloatArray,
-    steps: IntArray,
-    rewards: FloatArray,
-    terminated: BoolArray,
-    truncated: BoolArray,
-) -> None:
-    """Undo `_gather` after a step, and count it; `limit` 0 means none."""
-    for j in range(slots.size):
-        slot = slots[j]
-        for row in range(states.shape[0]):
-            states[row, slot] = part[row, j]
-        steps[slot] += 1
-        rewards[slot] = part_rewards[j]
-        terminated[slot] = part_reached[j]
-        truncated[slot] = limit > 0 and steps[slot] >= limit
-
-
-def _uniforms(
-    system: ControlSystem, rng: np.random.Generator, count: int
-) -> FloatArray | None:
-    if system.draws_per_step == 0:
-        return None
-    return rng.random((system.draws_per_step, count))
-
-
-def _as_row(state: Any) -> NDArray[Any]:
-    row = np.asarray(state)
-    if row.ndim != 1:
-        raise ValueError(
-            f"options['state'] must be one state, shape (state_size,), got shape "
-            f"{row.shape}."
-        )
-    return row[None, :]
-
-
-def _checked_actions(actions: ArrayLike, count: int, n_actions: int) -> IntArray:
-    array = np.asarray(actions)
-    if array.dtype.kind not in "iu":
-        raise TypeError(
-            f"actions must be integers, got dtype {array.dtype}; "
-            "cast with .astype(np.int64)."
-        )
-    if array.shape != (count,):
-        raise ValueError(
-            f"actions must have shape ({count},), one a slot, got {array.shape}."
-        )
-    checked = array.astype(np.int64)
-    # As unsigned numbers, negative actions are huge: one pass checks both ends.
-    if checked.view(np.uint64).max() >= n_actions:
-        slot = int(checked.view(np.uint64).argmax())
-        raise ValueError(
-            f"actions must lie in 0..{n_actions - 1}, got {checked[slot]} "
-            f"in slot {slot}."
-        )
-    return checked
-
-
-def _checked_autoreset_mode(mode: str | AutoresetMode) -> AutoresetMode:
-    try:
-        return AutoresetMode(mode)
-    except ValueError:
-        choices = ", ".join(repr(choice.value) for choice in AutoresetMode)
-        raise ValueError(
-            f"autoreset_mode must be one of {choices}, got {mode!r}."
-        ) from None
-
-
-def _checked_render_mode(mode: str | None, metadata: dict[str, Any]) -> str | None:
-    if mode is not None and mode not in metadata["render_modes"]:
-        raise ValueError(
-            f"render_mode must be None or one of {metadata['render_modes']}, "
-            f"got {mode!r}."
-        )
-    return mode

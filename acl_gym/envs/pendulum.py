@@ -13,37 +13,10 @@ from numba import njit
 
 from acl_gym import validation
 from acl_gym.envs.control_env import ControlEnv, ControlVectorEnv
+from acl_gym.envs.fast_math import sine
 from acl_gym.envs.system import BoolArray, ControlSystem, FloatArray, IntArray
 
 TWO_PI = 2.0 * math.pi
-
-# pi as the sum of two floats, the first with trailing zeros: n * PI_HIGH is exact for
-# the small n that occur, which keeps the reduced argument of the sine accurate.
-_PI_HIGH = 3.1415926218032837
-_PI_LOW = 3.178650954705639e-08
-
-
-@njit(cache=True, inline="always")
-def sine(x: float) -> float:
-    """Sine without branches, so that LLVM vectorises the loop it is called in.
-
-    The argument is reduced to [-pi/2, pi/2], where the Taylor series through r^19
-    leaves 3e-16. Valid for |x| < 1e5; a test holds it to 1e-15 there for |x| < 100.
-    """
-    turns = math.floor(x * (1.0 / math.pi) + 0.5)
-    r = (x - turns * _PI_HIGH) - turns * _PI_LOW
-    sign = 1.0 - 2.0 * (turns - 2.0 * math.floor(0.5 * turns))
-    s = r * r
-    series = -8.22063524662433e-18
-    series = series * s + 2.8114572543455206e-15
-    series = series * s - 7.647163731819816e-13
-    series = series * s + 1.6059043836821613e-10
-    series = series * s - 2.505210838544172e-08
-    series = series * s + 2.7557319223985893e-06
-    series = series * s - 0.0001984126984126984
-    series = series * s + 0.008333333333333333
-    series = series * s - 0.16666666666666666
-    return sign * (r + r * s * series)
 
 
 @njit(cache=True, error_model="numpy")
@@ -131,7 +104,7 @@ class Pendulum(ControlSystem):
         sampling_time: T_s, s, > 0; the torque is constant over it.
         substeps: Runge-Kutta steps in one sampling time, >= 1. Measured against
             DOP853 over the whole state space, one step of the default 0.1 s is off
-            by at most 5e-3 rad and 6e-3 rad/s with 1 substep, 3e-5 and 4e-4 with
+            by at most 5e-4 rad and 6e-3 rad/s with 1 substep, 3e-5 and 4e-4 with
             2, 2e-6 and 2e-5 with 4.
         omega_max: rad / s, > 0. Not given in the thesis; a decision: falling freely
             from upright reaches 8.86. omega is clipped to it after each step.
@@ -167,13 +140,8 @@ class Pendulum(ControlSystem):
             validation.number(name, getattr(self, name), at_least=0)
         validation.number("omega_max", self.omega_max, above=0)
         validation.integer("substeps", self.substeps, at_least=1)
-        torques = _vector("torques", self.torques)
-        bounds = _vector("goal_bounds", self.goal_bounds)
-        if bounds.size != 2 or (bounds <= 0).any():
-            raise ValueError(
-                "goal_bounds must be two half-widths > 0 (rad, rad/s), got "
-                f"{self.goal_bounds!r}."
-            )
+        torques = validation.real_array("torques", self.torques, ndim=1)
+        bounds = self._checked_bounds()
         weight = _weight_matrix(self.state_weight)
         # Plain tuples and floats: the parameters stay immutable, hashable and JSON.
         canonical: dict[str, Any] = {
@@ -187,6 +155,7 @@ class Pendulum(ControlSystem):
             if value is None:
                 value = float(getattr(self, field.name))
             object.__setattr__(self, field.name, value)
+        self._check_step()
 
     @cached_property
     def _acceleration(self) -> FloatArray:
@@ -238,10 +207,7 @@ class Pendulum(ControlSystem):
         Raises:
             ValueError: wrong shape, not finite, or omega beyond omega_max.
         """
-        try:
-            array = np.array(states, dtype=np.float64)
-        except (TypeError, ValueError) as error:
-            raise ValueError(f"a state must be two real numbers: {error}") from error
+        array = validation.real_array("states", states, finite=False)
         if array.ndim != 2 or array.shape[1] != 2:
             raise ValueError(
                 f"states must be rows [theta, omega], shape (n, 2), got {array.shape}."
@@ -359,6 +325,34 @@ class Pendulum(ControlSystem):
         ]
         pygame.draw.polygon(canvas, (213, 94, 0), head)
 
+    def _checked_bounds(self) -> FloatArray:
+        bounds = validation.real_array("goal_bounds", self.goal_bounds, ndim=1)
+        if bounds.size != 2 or (bounds <= 0).any():
+            raise ValueError(
+                "goal_bounds must be two half-widths > 0 (rad, rad/s), got "
+                f"{self.goal_bounds!r}."
+            )
+        share = np.minimum(bounds / (math.pi, self.omega_max), 1.0).prod()
+        if share > 0.99:
+            raise ValueError(
+                "goal_bounds must leave 1% or more of the state space to start from, "
+                f"got {self.goal_bounds!r}, which leave {1 - share:.2%}."
+            )
+        return bounds
+
+    def _check_step(self) -> None:
+        """Refuse parameters for which Runge-Kutta would diverge (limit: 2.78)."""
+        step = self.sampling_time / self.substeps
+        stiffness = self.mass * self.gravity * self.length / self.inertia
+        fastest = max(math.sqrt(stiffness), self.damping / self.inertia)
+        pushes = np.array(self.torques) * self.motor_gain / self.inertia
+        if not (step * fastest < 2.5 and np.isfinite(pushes).all()):
+            raise ValueError(
+                "sampling_time / substeps must be well below the fastest time constant "
+                f"of the pendulum, {1 / fastest:.3g} s, got {step:g} s; use more "
+                "substeps or check inertia, mass, length, gravity and damping."
+            )
+
     def _in_goal(self, states: FloatArray) -> BoolArray:
         bound_theta, bound_omega = self.goal_bounds
         theta, omega = states
@@ -368,28 +362,14 @@ class Pendulum(ControlSystem):
         return np.asarray(inside, dtype=np.bool_)
 
 
-def _vector(name: str, values: Any) -> FloatArray:
-    try:
-        array = np.array(values, dtype=np.float64)
-    except (TypeError, ValueError):
-        array = np.empty((0, 0))
-    if array.ndim != 1 or array.size == 0 or not np.isfinite(array).all():
-        raise ValueError(
-            f"{name} must be a sequence of one or more finite numbers, got {values!r}."
-        )
-    return array
-
-
 def _weight_matrix(values: Any) -> FloatArray:
-    try:
-        weight = np.array(values, dtype=np.float64)
-    except (TypeError, ValueError):
-        weight = np.empty(0)
+    weight = validation.real_array("state_weight", values, ndim=2)
+    # Rounding may leave the smaller eigenvalue of v v' a hair below zero.
+    slack = 1e-12 * float(np.abs(weight).max())
     valid = (
         weight.shape == (2, 2)
-        and np.isfinite(weight).all()
         and weight[0, 1] == weight[1, 0]
-        and np.linalg.eigvalsh(weight)[0] >= 0.0
+        and np.linalg.eigvalsh(weight)[0] >= -slack
     )
     if not valid:
         raise ValueError(

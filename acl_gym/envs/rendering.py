@@ -22,12 +22,20 @@ class Renderer:
     Args:
         system: what is drawn; its `draw` does the work.
         frames_per_second: of the window.
-
-    Raises:
-        DependencyNotInstalled: pygame is missing.
     """
 
     def __init__(self, system: ControlSystem, frames_per_second: int) -> None:
+        self._system = system
+        self._frames_per_second = frames_per_second
+        self._window: Any = None
+        self._clock: Any = None
+
+    def __getstate__(self) -> dict[str, Any]:
+        """A copy has no window until it shows something."""
+        return {**self.__dict__, "_window": None, "_clock": None}
+
+    @property
+    def _pygame(self) -> Any:
         try:
             # Only here: environments must work without pygame.
             import pygame
@@ -35,11 +43,7 @@ class Renderer:
             raise DependencyNotInstalled(
                 'rendering needs pygame; install it with `pip install "acl-gym[render]"`.'
             ) from error
-        self._pygame: Any = pygame
-        self._system = system
-        self._frames_per_second = frames_per_second
-        self._window: Any = None
-        self._clock: Any = None
+        return pygame
 
     def frame(self, state: FloatArray, action: int | None) -> Frame:
         """The picture of a state, `(height, width, 3)`.
@@ -47,6 +51,9 @@ class Renderer:
         Args:
             state: `(state_size,)`.
             action: what was done to reach it; None at the start of an episode.
+
+        Raises:
+            DependencyNotInstalled: pygame is missing.
         """
         pixels = self._pygame.surfarray.array3d(self._surface(state, action))
         return np.ascontiguousarray(pixels.transpose(1, 0, 2))

@@ -205,7 +205,7 @@ def write_results(
     report.write_report(comparison, summary, found, drawn, path)
     report.print_summary(summary, reference, console)
     for sentence in found:
-        console.print(f"- {sentence}")
+        console.print(f"- {sentence}", markup=False, highlight=False)
     console.print(f"\nReport: {path}\nResults: {directory / 'results.json'}")
     return results
 

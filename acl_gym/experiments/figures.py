@@ -13,7 +13,7 @@ from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
-from matplotlib.ticker import MaxNLocator
+from matplotlib.ticker import MaxNLocator, NullFormatter
 
 from acl_gym.experiments import drawing, statistics, wording
 from acl_gym.experiments.drawing import SMALL, TINY
@@ -31,6 +31,12 @@ _OPTIMUM: dict[str, Any] = {
     "linewidth": 3.5,
     "linestyle": "-",
     "zorder": 1.5,
+}
+_ARRIVAL: dict[str, Any] = {
+    "marker": "o",
+    "markersize": 4,
+    "zorder": 3,
+    "clip_on": False,
 }
 _GOAL: dict[str, Any] = {
     "color": "#D55E00",
@@ -84,9 +90,10 @@ def summary_dots(comparison: Comparison) -> Figure:
     for ax, (title, key, which, names) in zip(axes, panels, strict=True):
         drawing.prepare(ax)
         ax.set_xscale("log")
-        ax.set_title(title, fontsize=SMALL, loc="left", pad=16)
+        ax.set_title(title, fontsize=SMALL, loc="left", pad=19)
         keys = [key.format(name) for name in which]
         end = _horizon(ax, summary, keys)
+        ax.xaxis.set_minor_formatter(NullFormatter())
         for row, entry in enumerate(summary):
             for shift, name in zip((-0.16, 0.16), keys, strict=True):
                 _dot(ax, row + shift, entry, name, end=end, hollow=name == keys[0])
@@ -99,7 +106,7 @@ def summary_dots(comparison: Comparison) -> Figure:
             handles,
             ncols=2,
             loc="lower left",
-            bbox_to_anchor=(0.0, 0.99),
+            bbox_to_anchor=(0.0, 1.03),
             borderpad=0.0,
             borderaxespad=0.3,
             handlelength=1.0,
@@ -110,7 +117,7 @@ def summary_dots(comparison: Comparison) -> Figure:
     drawing.plain_log(axes[0].xaxis)
     drawing.plain_numbers(axes[1].xaxis)
     axes[0].set_yticks(range(len(summary)), [entry["label"] for entry in summary])
-    axes[0].set_ylim(len(summary) - 0.5, -0.6)
+    axes[0].set_ylim(len(summary) - 0.5, -0.7)
     return figure
 
 
@@ -124,6 +131,10 @@ def _horizon(ax: Axes, summary: list[dict[str, Any]], keys: list[str]) -> float:
         if each[end] is not None
     ]
     low, high = (min(finite), max(finite)) if finite else (1.0, 10.0)
+    if "cost" not in keys[0] and high < 10 * low:
+        # Whole powers of ten, so that the axis has ticks to read it by.
+        low = 10.0 ** math.floor(math.log10(low))
+        high = 10.0 ** (math.floor(math.log10(high)) + 1)
     margin = max(high / low, 1.5) ** 0.06
     end = high * margin
     unreached = any(
@@ -307,7 +318,7 @@ def trajectories(comparison: Comparison) -> Figure:
             ax.plot(path["time"], path[key], **look)
             if path["reached"]:
                 last = path["time"][-1], path[key][-1]
-                ax.plot(*last, color=look["color"], marker="o", markersize=4, zorder=3)
+                ax.plot(*last, **_ARRIVAL, color=look["color"])
     _torque_rows(axes[2], drawn, comparison["torques"])
     axes[2].set_yticks(range(len(drawn)), ["Optimum", *(r["label"] for r in runs)])
 

@@ -175,12 +175,20 @@ def _write(task: Task, result: Result, directory: Path) -> None:
     write_atomically(_file(task, directory), text.encode())
 
 
+# Modules that draw and tell what has been run, and change nothing in it.
+_PRESENTATION = frozenset(
+    {"comparison", "drawing", "figures", "intervals", "report", "statistics", "wording"}
+)
+
+
 @cache
 def code_fingerprint() -> str:
-    """A hash over the source of the package: other code, other results."""
+    """A hash over the source that results depend on: other code, other results."""
     digest = hashlib.sha256()
     package = Path(acl_gym.__file__).parent
     for source in sorted(package.rglob("*.py")):
+        if source.stem in _PRESENTATION:
+            continue
         digest.update(source.relative_to(package).as_posix().encode())
         digest.update(source.read_bytes())
     return digest.hexdigest()

@@ -12,10 +12,16 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
 
 from acl_gym import validation
 from acl_gym.experiments import wording
+from acl_gym.experiments.intervals import (
+    FEW_VALUES,
+    Estimate,
+    estimate,
+    or_infinity,
+    overlap,
+)
 
 FloatArray = NDArray[np.float64]
 Run = dict[str, Any]
@@ -24,18 +30,8 @@ Run = dict[str, Any]
 Entry = dict[str, Any]
 """What `summarise` says of one agent."""
 
-Estimate = dict[str, Any]
-"""`median`, `low`, `high` (None: infinite, or with one seed no interval); estimates
-of when a mark was reached also have `reached`, the number of seeds that did."""
-
 MARKS = (25, 10)
 """Percent above J* that count as close, the wider first."""
-
-RESAMPLES = 9999
-FEW_SEEDS = 5
-"""Up to so many seeds the interval of a median is the range of the runs."""
-
-_NEVER = 1e100  # stands for infinity where arithmetic must stay free of NaN
 
 
 class Band(NamedTuple):
@@ -116,13 +112,13 @@ def summarise(
         values["env_steps"] = [row["env_steps"] for row in final]
         values["seconds"] = [row["seconds"] for row in final]
         entry = {"agent": agent, "label": own[0]["label"], "seeds": len(own)}
-        entry |= {name: _estimate(each, seed) for name, each in values.items()}
+        entry |= {name: estimate(each, seed=seed) for name, each in values.items()}
         for mark in MARKS:
             bound = mark_cost(optimal_cost, mark)
             for x in ("env_steps", "seconds"):
                 times = [time_to(run, bound, x) for run in own]
                 entry[f"{x}_to_{mark}"] = {
-                    **_estimate(times, seed),
+                    **estimate(times, seed=seed),
                     "reached": sum(map(math.isfinite, times)),
                 }
         summary.append(entry)
@@ -132,28 +128,6 @@ def summarise(
 def mark_cost(optimal_cost: float, mark: float) -> float:
     """The cost that lies `mark` percent above J*."""
     return optimal_cost * (1 + mark / 100)
-
-
-def _estimate(values: Sequence[float], seed: int) -> Estimate:
-    """Median and 95% interval; infinities allowed, None instead of them."""
-    data = np.minimum(np.asarray(values, dtype=np.float64), _NEVER)
-    low = high = math.inf
-    if data.size > 1:
-        low, high = stats.bootstrap(
-            (data,),
-            np.median,
-            n_resamples=RESAMPLES,
-            confidence_level=0.95,
-            method="percentile",
-            rng=np.random.default_rng(seed),
-        ).confidence_interval
-    ends = {"median": np.median(data), "low": low, "high": high}
-    return {name: _or_none(value) for name, value in ends.items()}
-
-
-def _or_none(value: float | np.floating[Any]) -> float | None:
-    # Half of _NEVER, and any other share that an average left of it, is infinite too.
-    return float(value) if value < math.sqrt(_NEVER) else None
 
 
 def curve_band(
@@ -188,17 +162,6 @@ def curve_band(
     return Band(grid, np.median(values, axis=0), values.min(axis=0), values.max(axis=0))
 
 
-def interval_overlap(first: Estimate, second: Estimate) -> bool:
-    """Whether two intervals have a point in common; without intervals, False."""
-    # Both ends None: one seed, or reached in so few that there is nothing to compare.
-    if first["low"] is None or second["low"] is None:
-        return False
-    ends = [
-        math.inf if each["high"] is None else each["high"] for each in (first, second)
-    ]
-    return bool(first["low"] <= ends[1] and second["low"] <= ends[0])
-
-
 class _Measure(NamedTuple):
     """A figure by which agents are ranked, the lowest first, and how to tell it."""
 
@@ -214,6 +177,12 @@ class _Measure(NamedTuple):
             return wording.seconds(value, unit=unit if value is not None else "")
         return wording.cost(value)
 
+    def of(self, entry: Entry) -> str:
+        estimate = entry[self.key]
+        if estimate["median"] is None and estimate.get("reached"):
+            return f"only in {estimate['reached']} of {entry['seeds']} seeds"
+        return self.value(estimate)
+
     def with_interval(self, estimate: Estimate) -> str:
         if estimate["low"] is None:
             return self.value(estimate)
@@ -222,13 +191,12 @@ class _Measure(NamedTuple):
 
     def excess(self, low: Estimate, high: Estimate) -> str:
         """By how much the median of `high` exceeds that of `low`."""
-        if high["median"] is None or low["median"] <= 0:
+        if high["median"] in (None, low["median"]) or low["median"] <= 0:
             return ""
         ratio = high["median"] / low["median"]
         if "cost" in self.key:
             return f"{100 * (ratio - 1):.1f}% more"
-        number = f"{ratio:.3g}" if ratio < 999.5 else f"{ratio:,.0f}"
-        return f"{number} times as {'many' if 'steps' in self.key else 'much'}"
+        return f"{wording.ratio(ratio)} as {'many' if 'steps' in self.key else 'much'}"
 
 
 _COSTS = (
@@ -280,22 +248,14 @@ def findings(
         above = f", {wording.percent_above(gap)} J* ({optimal_cost:.1f})"
         sentences.append(wording.sentence(_ranking(summary, measure, above)))
     sentences.append(_successes(summary))
-    colonies = [entry for entry in summary if entry["agent"].startswith("acl")]
-    if colonies:
-        champion = _ranked(colonies, _COSTS[0])[0]
-        for entry in summary:
-            if entry is not champion:
-                sentences += _duel(champion, entry)
+    champion, rivals = _rivals(summary)
+    for rival in rivals:
+        sentences += _duel(champion, rival)
     return sentences + _circumstances(summary, reference, preset)
 
 
-def _median(entry: Entry, measure: _Measure) -> float:
-    value = entry[measure.key]["median"]
-    return math.inf if value is None else float(value)
-
-
 def _ranked(summary: Sequence[Entry], measure: _Measure) -> list[Entry]:
-    return sorted(summary, key=lambda entry: _median(entry, measure))
+    return sorted(summary, key=lambda entry: or_infinity(entry[measure.key]["median"]))
 
 
 def _ranking(summary: Sequence[Entry], measure: _Measure, note: str = "") -> str:
@@ -308,7 +268,7 @@ def _ranking(summary: Sequence[Entry], measure: _Measure, note: str = "") -> str
         text += f", then {others[0]['label']} with {measure.with_interval(second)}"
         if excess := measure.excess(best, second):
             text += f", {excess}"
-        if interval_overlap(best, second):
+        if overlap(best, second):
             text += "; the intervals overlap"
     return text
 
@@ -342,6 +302,24 @@ def _successes(summary: Sequence[Entry]) -> str:
     return f"In the median the last policy reaches the goal {'; '.join(parts)}."
 
 
+def _rivals(summary: Sequence[Entry]) -> tuple[Entry, list[Entry]]:
+    """The colony that ends lowest; its other variants, and the best of each family.
+
+    The family is what the agent's name begins with. Without colonies, no rivals.
+    """
+    colonies: list[Entry] = []
+    families: dict[str, Entry] = {}
+    for entry in _ranked(summary, _COSTS[0]):
+        family = entry["agent"].split("-")[0]
+        if family == "acl":
+            colonies.append(entry)
+        else:
+            families.setdefault(family, entry)
+    if not colonies:
+        return {}, []
+    return colonies[0], [*families.values(), *colonies[1:]]
+
+
 def _duel(champion: Entry, other: Entry) -> list[str]:
     """Where the better colony loses to another method, and where it is ahead."""
     losses: list[str] = []
@@ -350,10 +328,11 @@ def _duel(champion: Entry, other: Entry) -> list[str]:
         mine, yours = champion[measure.key], other[measure.key]
         if mine["median"] == yours["median"]:
             continue
-        ahead = _median(champion, measure) < _median(other, measure)
-        text = f"{measure.name}, {measure.value(mine)} against {measure.value(yours)}"
+        ahead = or_infinity(mine["median"]) < or_infinity(yours["median"])
+        values = (measure.of(champion), measure.of(other))
+        text = f"{measure.name}, {' against '.join(values)}"
         notes = [] if ahead else [measure.excess(yours, mine)]
-        if interval_overlap(mine, yours):
+        if overlap(mine, yours):
             notes.append("the intervals overlap")
         if any(notes):
             text += f" ({', '.join(filter(None, notes))})"
@@ -386,11 +365,13 @@ def _circumstances(
             f"methods have, and reaches the goal from "
             f"{wording.share(coarse['success_rate'])} of the starts."
         )
-    seeds = min(int(entry["seeds"]) for entry in summary)
-    if seeds <= FEW_SEEDS:
-        known = "nothing is known about the spread, so there are no intervals"
-        if seeds > 1:
-            known = "an interval is the range of the runs, a rough measure of spread"
-        number = "one seed" if seeds == 1 else f"{seeds} seeds"
-        sentences.append(f"With {number} (preset {preset}) {known}.")
+    seeds = [int(entry["seeds"]) for entry in summary]
+    number = " to ".join(map(str, sorted({min(seeds), max(seeds)})))
+    if max(seeds) == 1:
+        text = "With one seed nothing is known about the spread"
+    else:
+        text = f"In brackets: 95% bootstrap intervals of the median over {number} seeds"
+        if min(seeds) <= FEW_VALUES:
+            text += ", with so few the range of the runs, a rough measure of spread"
+    sentences.append(f"{text} (preset {preset}).")
     return sentences

@@ -34,6 +34,11 @@ def share(value: float) -> str:
     return f"{100 * value:.3g}%"
 
 
+def ratio(value: float) -> str:
+    """How many times: 1.61 times, 1,240 times."""
+    return f"{value:.3g} times" if value < 999.5 else f"{value:,.0f} times"
+
+
 def percent_above(value: float) -> str:
     """Percent above, or of a negative value below."""
     return f"{abs(value):.1f}% {'above' if value >= 0 else 'below'}"

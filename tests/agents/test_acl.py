@@ -156,7 +156,7 @@ def test_a_tau0_above_the_bound_warns_with_both_figures() -> None:
     highest = 300 * env.unwrapped.system.max_stage_cost
     with pytest.warns(PheromoneBoundWarning, match="tau0 = 0.01 exceeds") as record:
         colony = ACL(env, pendulum_grid(env), tau0=0.01, seed=0)
-    assert f"{0.1 / highest:.3g}" in str(record[0].message)
+    assert f"{1 / highest:.3g}" in str(record[0].message)
     assert record[0].filename == __file__
     with pytest.warns(PheromoneBoundWarning):
         colony.set_env(pendulums(2))

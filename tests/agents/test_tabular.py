@@ -254,6 +254,16 @@ def test_a_file_holds_all_of_the_agent(kind: type, make: Any, tmp_path: Path) ->
 
 
 @BOTH
+def test_the_way_ties_are_broken_is_in_the_file(kind: type, tmp_path: Path) -> None:
+    """Also without a seed, from which it could be had again."""
+    agent = on_pendulum(kind, None)
+    states = agent.partition.cell_states()
+    loaded = kind.load(agent.save(tmp_path / "agent"))
+    assert loaded.seed is None
+    np.testing.assert_array_equal(loaded.predict(states)[0], agent.predict(states)[0])
+
+
+@BOTH
 @pytest.mark.parametrize("make", [on_chain, on_pendulum])
 def test_a_loaded_agent_learns_on_as_if_nothing_had_happened(
     kind: type, make: Any, tmp_path: Path

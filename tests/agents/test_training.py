@@ -69,6 +69,15 @@ def test_a_budget_of_steps_is_a_lower_bound_met_by_the_last_trial(kind: type) ->
     assert before < more <= after
 
 
+def test_a_budget_of_steps_that_is_met_exactly_ends_training() -> None:
+    """Three ants that cannot reach the goal take 8 steps each."""
+    grid = Crisp([np.arange(50.0)])
+    agent = QLearning(chains(3, length=50, limit=8), grid, epsilon=0.0, seed=0)
+    agent.set_table(np.tile([1.0, 0.0], (50, 1)))
+    agent.learn(total_timesteps=48)
+    assert (agent.trials, agent.num_timesteps) == (2, 48)
+
+
 @pytest.mark.parametrize(("steps", "trials"), [(1, 5), (10**9, 2), (1, 1)])
 def test_of_two_budgets_the_smaller_rules(steps: int, trials: int) -> None:
     agent = make().learn(steps, trials)

@@ -260,6 +260,18 @@ def test_copy_continues_alike_and_apart(twin: Any) -> None:
     assert walk(other, actions) == walked
 
 
-def test_render_mode_is_refused_until_there_is_one() -> None:
-    with pytest.raises(ValueError, match="render_mode must be None"):
-        PendulumEnv(render_mode="human")
+@pytest.mark.parametrize(
+    "twin", [copy.deepcopy, lambda env: pickle.loads(pickle.dumps(env))]
+)
+def test_environment_that_has_been_drawn_can_be_copied(twin: Any) -> None:
+    pytest.importorskip("pygame")
+    env = PendulumEnv(render_mode="rgb_array")
+    env.reset(seed=12)
+    frame = env.render()
+    assert np.array_equal(twin(env).render(), frame)
+
+
+@pytest.mark.parametrize("mode", ["ascii", "", "RGB_ARRAY", 1, ["human"]])
+def test_unknown_render_mode_is_refused(mode: Any) -> None:
+    with pytest.raises(ValueError, match="render_mode must be None or one of"):
+        PendulumEnv(render_mode=mode)

@@ -12,6 +12,7 @@ from gymnasium import spaces
 from gymnasium.error import ResetNeeded
 from gymnasium.vector import AutoresetMode
 
+from acl_gym.envs import bookkeeping
 from acl_gym.envs.pendulum import Pendulum, PendulumVectorEnv
 from tests.envs.vector_helpers import (
     EASY,
@@ -238,3 +239,34 @@ def test_with_slots_has_the_parameters_of_the_original() -> None:
     env = PendulumVectorEnv(3, torques=torques)
     torques.append(5.0)
     assert env.with_slots(2).system == env.system
+
+
+def test_kernels_run_the_same_without_the_compiler() -> None:
+    rng = np.random.default_rng(9)
+    slots, actions = np.array([5, 0, 3]), rng.integers(0, 3, 6)
+    rows = [rng.random((2, 6)) for _ in range(2)]
+    results = []
+    for name in ("__call__", "py_func"):
+        part, part_actions = np.zeros((2, 3)), np.zeros(3, dtype=np.int64)
+        gather = getattr(bookkeeping.gather_slots, name)
+        gather(slots, rows[0].copy(), actions, part, part_actions)
+        for limit in (0, 7):
+            outputs = [rows[1].copy(), np.full(6, 6), np.zeros(6)]
+            outputs += [np.zeros(6, dtype=np.bool_) for _ in range(2)]
+            flags = np.array([True, False, True])
+            put_back = getattr(bookkeeping.put_slots_back, name)
+            put_back(slots, part, part[0], flags, limit, *outputs)
+            results.append([part, part_actions, *outputs])
+    for ours, plain in zip(results[:2], results[2:], strict=True):
+        for one, other in zip(ours, plain, strict=True):
+            assert_same_bits(one, other)
+    part, part_actions, states, steps, rewards, terminated, truncated = results[1]
+    assert_same_bits(part, rows[0][:, slots])
+    assert_same_bits(part_actions, actions[slots])
+    assert_same_bits(states[:, slots], part)
+    assert_same_bits(states[:, [1, 2, 4]], rows[1][:, [1, 2, 4]])
+    assert steps.tolist() == [7, 6, 6, 7, 6, 7]
+    assert_same_bits(rewards[slots], part[0])
+    assert np.flatnonzero(terminated).tolist() == [3, 5]
+    assert np.flatnonzero(truncated).tolist() == [0, 3, 5]
+    assert not results[0][-1].any()  # limit 0 is none

@@ -73,6 +73,7 @@ def test_input_is_left_alone_and_output_is_new() -> None:
     assert (batch == 1).all()
 
 
+@pytest.mark.filterwarnings("ignore:.*different from the unwrapped version")
 def test_single_environment_passes_the_checker() -> None:
     env = acl_gym.ScaledObservation(gym.make(PENDULUM, max_episode_steps=20), [0])
     assert env.observation_space == spaces.Box(-1, 1, (3,), np.float32)
@@ -95,8 +96,7 @@ def test_single_and_vector_give_the_same() -> None:
         actions = np.arange(step, step + 12) % 3
         batch, rewards, *_ = vector.step(actions)
         results = [
-            single.step(action)
-            for single, action in zip(singles, actions, strict=True)
+            single.step(action) for single, action in zip(singles, actions, strict=True)
         ]
         assert vector.observation_space.contains(batch)
         np.testing.assert_allclose(batch, [r[0] for r in results], atol=1e-7)

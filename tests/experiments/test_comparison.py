@@ -1,0 +1,117 @@
+"""The main job from command line to files, on the smoke preset."""
+
+from __future__ import annotations
+
+import json
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pyarrow.parquet as pq
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+SCRIPT = ROOT / "benchmarks" / "compare_acl_rl.py"
+
+
+def compare(*arguments: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-W", "error::UserWarning:acl_gym", str(SCRIPT), *arguments],
+        capture_output=True,
+        text=True,
+        cwd=ROOT,
+        check=False,
+    )
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("comparison")
+
+
+@pytest.fixture(scope="module")
+def finished(folder: Path) -> subprocess.CompletedProcess[str]:
+    agents = "acl-fuzzy,q-crisp,dqn"
+    return compare(
+        "--preset", "smoke", "--agents", agents, "--seeds", "2", "--out", str(folder)
+    )
+
+
+def test_it_ends_well_and_says_where_its_files_lie(finished, folder: Path) -> None:
+    assert finished.returncode == 0, finished.stderr
+    for label in ("ACL, fuzzy", "Q-learning, crisp", "DQN"):
+        assert label in finished.stdout
+    assert "report.html" in finished.stdout
+    names = {path.name for path in folder.iterdir()}
+    assert {"results.json", "results.parquet", "report.html", "runs"} <= names
+    assert len([name for name in names if name.endswith(".png")]) >= 3
+
+
+def test_results_hold_what_was_promised(finished, folder: Path) -> None:
+    results = json.loads((folder / "results.json").read_text())
+    assert results["env"] == "acl_gym/Pendulum-v0"
+    assert results["preset"] == "smoke"
+    assert results["reference"]["optimal_cost"] > 0
+    assert {(row["agent"], row["seed"]) for row in results["rows"]} == {
+        (agent, seed) for agent in ("acl-fuzzy", "q-crisp", "dqn") for seed in (0, 1)
+    }
+    for row in results["rows"]:
+        assert set(row) == {
+            "agent",
+            "seed",
+            "env_steps",
+            "seconds",
+            "policy_cost",
+            "success_rate",
+        }
+    assert len(results["summary"]) == 3
+    assert pq.read_table(folder / "results.parquet").to_pylist() == results["rows"]
+
+
+def test_the_report_is_one_file(finished, folder: Path) -> None:
+    page = (folder / "report.html").read_text()
+    assert not re.search(r"""(?:src|href)=["'](?:https?:|//|[^"'#d])""", page)
+    assert page.count("data:image/png;base64,") >= 3
+
+
+def test_a_second_call_runs_nothing_again(finished, folder: Path) -> None:
+    runs = sorted((folder / "runs").iterdir())
+    assert len(runs) == 7
+    before = [path.stat().st_mtime_ns for path in runs]
+    again = compare(
+        *("--preset", "smoke", "--agents", "acl-fuzzy,q-crisp,dqn", "--seeds", "2"),
+        *("--out", str(folder)),
+    )
+    assert again.returncode == 0, again.stderr
+    assert [path.stat().st_mtime_ns for path in runs] == before
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--preset", "huge"], "invalid choice"),
+        (["--agents", "acl-fuzzy,sarsa"], "must be among"),
+        (["--seeds", "0"], "whole number >= 1"),
+        (["--env", "CartPole-v1"], "invalid choice"),
+    ],
+)
+def test_bad_arguments_exit_with_2(arguments: list[str], message: str) -> None:
+    failed = compare(*arguments)
+    assert failed.returncode == 2
+    assert message in failed.stderr
+    assert "Traceback" not in failed.stderr
+
+
+def test_a_folder_that_cannot_be_made_is_one_line(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    failed = compare("--preset", "smoke", "--out", str(tmp_path / "file" / "x"))
+    assert failed.returncode == 1
+    assert len(failed.stderr.strip().splitlines()) == 1
+    assert "Traceback" not in failed.stderr
+
+
+def test_help_teaches() -> None:
+    text = compare("--help").stdout
+    for word in ("--preset", "--env", "--agents", "--seeds", "--out", "acl-fuzzy"):
+        assert word in text

@@ -109,7 +109,8 @@ def main(arguments: list[str] | None = None) -> int:
             options.out,
             fresh=options.fresh,
             workers=options.workers,
-            console=Console(),
+            # A terminal knows its width; a file or a log is given one for the table.
+            console=Console(width=None if sys.stdout.isatty() else 100),
         )
     except (TaskFailedError, OSError) as error:
         print(f"compare_acl_rl: {error}", file=sys.stderr)

@@ -69,7 +69,7 @@ PRESETS = {
         trials=2,
         dqn_steps=1_200,
         dqn_every=400,
-        optimum_cells=(40, 41),
+        optimum_cells=(100, 101),
     ),
     "quick": Preset(
         seeds=3,
@@ -130,32 +130,35 @@ def _tabular(kind: type[ACL] | type[QLearning], partition: type[Crisp] | type[Fu
 def _train_dqn(env_id: str, seed: int, preset: Preset, report: Report) -> Run:
     # Only here: importing torch takes seconds that the other methods do not need.
     import torch
+    from stable_baselines3.common.callbacks import ConvertCallback
 
-    from acl_gym.agents.dqn import (
-        DQNSettings,
-        PolicyCostCallback,
-        ProgressCallback,
-        make_dqn,
-    )
-    from acl_gym.envs.wrappers import ScaledVectorObservation
+    from acl_gym.agents.dqn import DQNSettings, PolicyCostCallback, make_dqn, scaled_env
 
-    torch.set_num_threads(1)
+    torch.set_num_threads(1)  # the fastest for such small networks
     settings = DQNSettings()
-    env = make_env(env_id, 1)
+    circular = make_env(env_id, 1).system.circular
 
-    def scaled(slots: int) -> VectorEnv[Any, Any, Any]:
-        return ScaledVectorObservation(env.with_slots(slots), env.system.circular)
+    def scaled(slots: int | None) -> VectorEnv[Any, Any, Any]:
+        return scaled_env(env_id, slots, circular=circular)
 
-    model = make_dqn(env_id, settings, seed)
-    n_states = len(env.system.evaluation_states())
-    evaluation = PolicyCostCallback(scaled(n_states), every=preset.dqn_every)
+    model = make_dqn(env_id, settings, seed, circular=circular)
+    evaluation = PolicyCostCallback(scaled(None), every=preset.dqn_every)
+
+    def tell(local: dict[str, Any], _: dict[str, Any]) -> bool:
+        report(min(local["self"].num_timesteps / preset.dqn_steps, 1.0))
+        return True
+
     model.learn(
         total_timesteps=preset.dqn_steps,
-        callback=[evaluation, ProgressCallback(report, preset.dqn_steps)],
+        callback=[evaluation, ConvertCallback(tell)],
     )
     if evaluation.best is None:  # pragma: no cover - the last policy is evaluated
         raise RuntimeError("no policy was evaluated")
-    parameters = {**asdict(settings), "steps": preset.dqn_steps}
+    parameters = {
+        **asdict(settings),
+        "net_arch": list(settings.net_arch),
+        "steps": preset.dqn_steps,
+    }
     return finish_run(model, scaled, evaluation.history, evaluation.best, parameters)
 
 

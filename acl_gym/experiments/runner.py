@@ -140,9 +140,15 @@ def _start_worker(reports: Any) -> None:
 
 
 def _run_one(task: Task) -> Result:
-    return task.function(
-        *task.arguments, lambda fraction: _reports.put((task.name, fraction))
-    )
+    told = 0.0
+
+    def report(fraction: float) -> None:
+        nonlocal told
+        if fraction - told >= 0.01:  # not every step needs to be heard of
+            told = fraction
+            _reports.put((task.name, fraction))
+
+    return task.function(*task.arguments, report)
 
 
 def _pass_on(reports: Any, tell: Progress) -> None:

@@ -1,5 +1,6 @@
 """DQN on our environments: what is wired to what, one seed one run, the callback."""
 
+from collections.abc import Iterator
 from dataclasses import FrozenInstanceError, fields, replace
 from pathlib import Path
 from typing import Any
@@ -9,7 +10,7 @@ import numpy as np
 import pytest
 import torch
 from gymnasium import spaces
-from gymnasium.vector import AutoresetMode
+from gymnasium.vector import AutoresetMode, SyncVectorEnv
 from stable_baselines3 import DQN, PPO
 from stable_baselines3.common.evaluation import evaluate_policy
 from stable_baselines3.common.vec_env import VecMonitor
@@ -37,7 +38,7 @@ TINY = DQNSettings(
 
 
 @pytest.fixture(autouse=True)
-def one_thread() -> Any:
+def one_thread() -> Iterator[None]:
     threads = torch.get_num_threads()
     torch.set_num_threads(1)
     yield
@@ -45,7 +46,23 @@ def one_thread() -> Any:
 
 
 def parameters(model: Any) -> np.ndarray:
-    return torch.nn.utils.parameters_to_vector(model.policy.parameters()).numpy()
+    vector = torch.nn.utils.parameters_to_vector(model.policy.parameters())
+    return vector.detach().numpy()
+
+
+def mountain_cars(num_envs: int, autoreset_mode: str, **kwargs: Any) -> SyncVectorEnv:
+    return SyncVectorEnv(
+        [lambda: gym.make("MountainCar-v0", **kwargs)] * num_envs,
+        autoreset_mode=AutoresetMode(autoreset_mode),
+    )
+
+
+@pytest.fixture
+def foreign_id() -> Iterator[str]:
+    """An environment of others whose vector form lets autoreset be disabled."""
+    gym.register("MountainCars-v0", vector_entry_point=mountain_cars)
+    yield "MountainCars-v0"
+    del gym.registry["MountainCars-v0"]
 
 
 # --- settings ------------------------------------------------------------------------
@@ -162,8 +179,8 @@ def test_which_variables_are_circular() -> None:
     assert make_dqn(PENDULUM, TINY, circular=[0, 1]).observation_space.shape == (4,)
 
 
-def test_other_peoples_environments() -> None:
-    model = make_dqn("MountainCar-v0", replace(TINY, max_episode_steps=5), seed=0)
+def test_other_peoples_environments(foreign_id: str) -> None:
+    model = make_dqn(foreign_id, replace(TINY, max_episode_steps=5), seed=0)
     assert model.observation_space == spaces.Box(-1, 1, (2,), np.float32)
     model.learn(80)
     assert model.num_timesteps == 80
@@ -189,14 +206,14 @@ def test_reward_scale_is_checked() -> None:
 # --- scaled environments and policies --------------------------------------------------
 
 
-def test_scaled_env() -> None:
+def test_scaled_env(foreign_id: str) -> None:
     env = scaled_env(PENDULUM, omega_max=12.0)
     assert env.num_envs == 100
     assert env.single_observation_space == FEATURES
     assert env.unwrapped.system.omega_max == 12.0
     assert scaled_env(PENDULUM, 3, circular=[]).observation_space.shape == (3, 2)
     with pytest.raises(ValueError, match="num_envs is needed"):
-        scaled_env("MountainCar-v0")
+        scaled_env(foreign_id)
 
 
 def test_both_ways_to_evaluate_agree() -> None:

@@ -228,8 +228,9 @@ class ACL(TabularAgent):
         Returns:
             A policy over a copy of the pheromone as it is now.
         """
-        first_action = self.policy.first_action
-        return SoftPolicy(self.partition, self._table, exponent, seed, first_action)
+        return SoftPolicy(
+            self.partition, self._table, exponent, seed, self.first_action
+        )
 
     def parameters(self) -> dict[str, Any]:
         """The keyword arguments of the constructor."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from acl_gym import validation
 from acl_gym.agents.pheromone import Pheromone
 from acl_gym.agents.selection import choose_actions, greedy_actions
-from acl_gym.membership import FloatArray, IntArray
+from acl_gym.membership import CellArray, FloatArray, IntArray
 from acl_gym.partition import Partition
 
 RankArray = NDArray[np.int32]
@@ -27,7 +28,54 @@ def random_ranks(n_cells: int, n_actions: int, rng: np.random.Generator) -> Rank
     return np.asarray(rng.permuted(ranks, axis=1), dtype=np.int32)
 
 
-class TablePolicy:
+class PartitionPolicy(ABC):
+    """What chooses actions through a partition, with Stable-Baselines3's `predict`.
+
+    Attributes:
+        partition: turns observations into cells and degrees.
+        first_action: the action that column 0 of a table stands for,
+            `Discrete.start`.
+    """
+
+    partition: Partition
+    first_action: int
+
+    @abstractmethod
+    def _act(
+        self, index: CellArray, degree: FloatArray, deterministic: bool
+    ) -> IntArray:
+        """Choose columns of the table, `(n,)`, for cells and degrees `(n, k)`."""
+
+    def predict(
+        self,
+        observation: ArrayLike,
+        state: Any = None,
+        episode_start: Any = None,
+        deterministic: bool = True,
+    ) -> tuple[NDArray[np.int64], Any]:
+        """Choose actions, with the signature of Stable-Baselines3.
+
+        Args:
+            observation: one observation or a batch of them.
+            state: passed through; a table has no memory.
+            episode_start: not used.
+            deterministic: True follows the policy, False explores as in learning,
+                where there is a difference.
+
+        Returns:
+            `(actions, state)`; the action of a single observation has no axis.
+
+        Raises:
+            ValueError: an observation is not finite or has the wrong shape.
+        """
+        batch = np.asarray(observation)
+        single = batch.ndim == self.partition.state_ndim
+        index, degree = self.partition(batch[None] if single else batch)
+        actions = self._act(index, degree, deterministic) + self.first_action
+        return (actions[0] if single else actions), state
+
+
+class TablePolicy(PartitionPolicy):
     """The action with the largest degree-weighted table entry (4.16).
 
     Args:
@@ -53,33 +101,10 @@ class TablePolicy:
         self.ranks = ranks
         self.first_action = first_action
 
-    def predict(
-        self,
-        observation: ArrayLike,
-        state: Any = None,
-        episode_start: Any = None,
-        deterministic: bool = True,
-    ) -> tuple[NDArray[np.int64], Any]:
-        """Choose actions, with the signature of Stable-Baselines3.
-
-        Args:
-            observation: one observation or a batch of them.
-            state: passed through; a table has no memory.
-            episode_start: not used.
-            deterministic: not used; a table's policy is a function.
-
-        Returns:
-            `(actions, state)`; the action of a single observation has no axis.
-
-        Raises:
-            ValueError: an observation is not finite or has the wrong shape.
-        """
-        batch = np.asarray(observation)
-        single = batch.ndim == self.partition.state_ndim
-        index, degree = self.partition(batch[None] if single else batch)
-        actions = greedy_actions(self.table, self.ranks, index, degree)
-        actions += self.first_action
-        return (actions[0] if single else actions), state
+    def _act(
+        self, index: CellArray, degree: FloatArray, deterministic: bool
+    ) -> IntArray:
+        return greedy_actions(self.table, self.ranks, index, degree)
 
     def best_actions(self) -> IntArray:
         """The best column of every cell, `(n_cells,)`, (3.10)."""
@@ -92,7 +117,7 @@ class TablePolicy:
         )
 
 
-class SoftPolicy:
+class SoftPolicy(PartitionPolicy):
     """Actions drawn from the pheromone as the ants draw them (4.11), only steeper.
 
     A greedy policy on a coarse table can fall into a cycle beside the goal that it
@@ -126,22 +151,12 @@ class SoftPolicy:
         self._pheromone.set_levels(levels)
         self._rng = np.random.default_rng(seed)
 
-    def predict(
-        self,
-        observation: ArrayLike,
-        state: Any = None,
-        episode_start: Any = None,
-        deterministic: bool = True,
-    ) -> tuple[NDArray[np.int64], Any]:
-        """Draw actions; see `TablePolicy.predict`. `deterministic` is not used."""
-        batch = np.asarray(observation)
-        single = batch.ndim == self.partition.state_ndim
-        index, degree = self.partition(batch[None] if single else batch)
-        actions = choose_actions(
+    def _act(
+        self, index: CellArray, degree: FloatArray, deterministic: bool
+    ) -> IntArray:
+        return choose_actions(
             "boltzmann", self._pheromone, index, degree, 0.0, self._rng
         )
-        actions += self.first_action
-        return (actions[0] if single else actions), state
 
 
 @njit(cache=True)

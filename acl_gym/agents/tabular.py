@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from pathlib import Path
 from typing import Any, Self
 
@@ -11,14 +11,20 @@ from gymnasium.vector import VectorEnv
 from numpy.typing import ArrayLike, NDArray
 
 from acl_gym import storage, validation
-from acl_gym.agents.policy import RankArray, TablePolicy, random_ranks
+from acl_gym.agents.policy import (
+    PartitionPolicy,
+    RankArray,
+    TablePolicy,
+    random_ranks,
+)
+from acl_gym.agents.selection import greedy_actions
 from acl_gym.agents.walk import Walk
 from acl_gym.callbacks import Callbacks, Row
 from acl_gym.membership import CellArray, FloatArray, IntArray
 from acl_gym.partition import Partition, partition_from_settings
 
 
-class TabularAgent(ABC):
+class TabularAgent(PartitionPolicy):
     """An agent whose policy is the best entry of a (cell, action) table.
 
     Args:
@@ -60,7 +66,7 @@ class TabularAgent(ABC):
             seed = validation.integer("seed", seed, at_least=0)
         self.env: VectorEnv[Any, Any, Any] | None = None
         self._walk: Walk | None = None
-        self._first_action = 0
+        self.first_action = 0
         if n_actions is not None:
             n_actions = validation.integer("n_actions", n_actions, at_least=1)
         elif env is None:
@@ -155,9 +161,9 @@ class TabularAgent(ABC):
             ValueError: its actions are not those of the table.
         """
         walk = Walk(env, self.max_steps)
-        if walk.first_action != self._first_action:
+        if walk.first_action != self.first_action:
             raise ValueError(
-                f"env's actions must begin at {self._first_action} as the table's do, "
+                f"env's actions must begin at {self.first_action} as the table's do, "
                 f"got {walk.first_action}."
             )
         self._attach(env)
@@ -170,7 +176,7 @@ class TabularAgent(ABC):
                 f"{walk.n_actions}."
             )
         self._n_actions = walk.n_actions
-        self._first_action = walk.first_action
+        self.first_action = walk.first_action
         self.env = env
         self._walk = walk
         k = self.partition.cells_per_state
@@ -195,38 +201,14 @@ class TabularAgent(ABC):
     @property
     def policy(self) -> TablePolicy:
         """The policy as it is now; it follows the table until you `copy()` it."""
-        return TablePolicy(self.partition, self._table, self._ranks, self._first_action)
+        return TablePolicy(self.partition, self._table, self._ranks, self.first_action)
 
-    def predict(
-        self,
-        observation: ArrayLike,
-        state: Any = None,
-        episode_start: Any = None,
-        deterministic: bool = True,
-    ) -> tuple[NDArray[np.int64], Any]:
-        """Choose actions, with the signature of Stable-Baselines3.
-
-        Args:
-            observation: one observation or a batch of them.
-            state: passed through; the agent has no memory.
-            episode_start: not used.
-            deterministic: True follows the policy (4.16); ties are broken by ranks
-                drawn once, so that it is a function. False explores as in learning.
-
-        Returns:
-            `(actions, state)`; the action of a single observation has no axis.
-
-        Raises:
-            ValueError: an observation is not finite or has the wrong shape.
-        """
-        policy = self.policy
+    def _act(
+        self, index: CellArray, degree: FloatArray, deterministic: bool
+    ) -> IntArray:
         if deterministic:
-            return policy.predict(observation, state)
-        batch = np.asarray(observation)
-        single = batch.ndim == self.partition.state_ndim
-        index, degree = self.partition(batch[None] if single else batch)
-        actions = self._explore(index, degree) + policy.first_action
-        return (actions[0] if single else actions), state
+            return greedy_actions(self._table, self._ranks, index, degree)
+        return self._explore(index, degree)
 
     def _locate(
         self, observation: NDArray[Any], ants: IntArray
@@ -264,7 +246,7 @@ class TabularAgent(ABC):
             "parameters": self.parameters(),
             "partition": partition,
             "n_actions": self.n_actions,
-            "first_action": self._first_action,
+            "first_action": self.first_action,
             "num_timesteps": self.num_timesteps,
             "trials": self.trials,
             "seconds": self.seconds,
@@ -320,7 +302,7 @@ class TabularAgent(ABC):
         first_action = header["first_action"]
         if not isinstance(first_action, int):
             raise TypeError(f"first_action must be an integer, got {first_action!r}")
-        self._first_action = first_action
+        self.first_action = first_action
         for name in ("num_timesteps", "trials"):
             count = validation.integer(name, header[name], at_least=0)
             setattr(self, name, count)

@@ -32,7 +32,7 @@ from acl_gym import validation
 from acl_gym.agents.sb3 import VectorEnvAdapter
 from acl_gym.callbacks import Row
 from acl_gym.envs.control_env import ControlVectorEnv
-from acl_gym.envs.wrappers import ScaledVectorObservation, Scaling, full_turns
+from acl_gym.envs.wrappers import ScaledVectorObservation, Scaling
 from acl_gym.evaluation import PolicyCost, evaluate_policy_cost
 
 
@@ -176,27 +176,31 @@ def scaled_env(
             all of this package do; its observations are a bounded box of one axis.
         num_envs: slots. None makes one for each state that an environment of this
             package evaluates policies from.
-        circular: the circular variables, see `Scaling`. None takes those that range
-            over a full turn, [0, 2 pi] or [-pi, pi].
+        circular: the circular variables, see `Scaling`. None takes those that the
+            system of this package names, and none of any other environment.
         env_kwargs: keywords of the environment.
 
     Raises:
         ValueError: `num_envs` is None and the environment is not of this package.
     """
     env = gym.make_vec(
-        env_id, num_envs=num_envs or 1, autoreset_mode="Disabled", **env_kwargs
+        env_id,
+        num_envs=1 if num_envs is None else num_envs,
+        autoreset_mode="Disabled",
+        **env_kwargs,
     )
-    if num_envs is None:
-        base = env.unwrapped
-        if not isinstance(base, ControlVectorEnv):
-            raise ValueError(
-                f"num_envs is needed for {env_id}, which has no evaluation states; "
-                "only environments of acl_gym have."
-            )
-        env = base.with_slots(len(base.system.evaluation_states()))
-    if circular is None:
-        circular = full_turns(env.single_observation_space)
-    return ScaledVectorObservation(env, circular)
+    base = env.unwrapped
+    if isinstance(base, ControlVectorEnv):
+        if num_envs is None:
+            env = base.with_slots(len(base.system.evaluation_states()))
+        if circular is None:
+            circular = base.system.circular
+    elif num_envs is None:
+        raise ValueError(
+            f"num_envs is needed for {env_id}, which has no evaluation states; only "
+            "environments of acl_gym have."
+        )
+    return ScaledVectorObservation(env, circular or ())
 
 
 def make_dqn(
@@ -219,8 +223,7 @@ def make_dqn(
             wants it.
         settings: the hyperparameters; None takes the defaults.
         seed: a run is a function of it, on one machine and one thread; None draws one.
-        circular: the circular variables, see `Scaling`. None takes those that range
-            over a full turn, [0, 2 pi] or [-pi, pi].
+        circular: the circular variables, see `scaled_env`.
         device: where torch computes. Networks this small gain nothing from a GPU.
         env_kwargs: keywords of the environment, such as parameters of its system.
 
@@ -276,27 +279,23 @@ def make_dqn(
 class ScaledPolicy:
     """A model that learned from scaled observations, given those as they are.
 
-    So it can be followed anywhere: `evaluate_policy_cost(ScaledPolicy(model, space,
-    circular=[0]), env)`, or asked for its action in a grid of states.
+    So it can be followed in any environment, `evaluate_policy_cost(ScaledPolicy(model,
+    space, [0]), env)`, or asked for its actions in a grid of states.
 
     Args:
         model: anything with `predict`, such as a DQN of `make_dqn`.
         space: the observation space as it is, a bounded `Box` of one axis.
-        circular: the circular variables, see `Scaling`. None takes those that range
-            over a full turn, [0, 2 pi] or [-pi, pi].
+        circular: the circular variables, such as `env.unwrapped.system.circular`.
     """
 
     def __init__(
         self,
         model: PolicyPredictor,
         space: spaces.Space[Any],
-        *,
-        circular: Iterable[int] | None = None,
+        circular: Iterable[int] = (),
     ) -> None:
         self.model = model
-        self.scaling = Scaling(
-            space, full_turns(space) if circular is None else circular
-        )
+        self.scaling = Scaling(space, circular)
 
     def predict(
         self,

@@ -154,22 +154,6 @@ class ScaledVectorObservation(
         return self.scaling(observations)
 
 
-def full_turns(space: spaces.Space[Any]) -> tuple[int, ...]:
-    """The variables of a bounded box whose range is [0, 2 pi] or [-pi, pi].
-
-    Such a variable is an angle that can go all the way round, as a rule; where it is
-    not, say what is circular yourself.
-
-    Raises:
-        ValueError: `space` is not a bounded `Box` of one axis.
-    """
-    low, high = _bounds(space)
-    turns = np.isclose(high - low, TWO_PI) & (
-        np.isclose(low, 0.0) | np.isclose(low, -math.pi)
-    )
-    return tuple(np.flatnonzero(turns).tolist())
-
-
 def _bounds(space: spaces.Space[Any]) -> tuple[NDArray[np.float64], ...]:
     if not isinstance(space, spaces.Box) or len(space.shape) != 1:
         raise ValueError(

@@ -212,6 +212,8 @@ def test_scaled_env(foreign_id: str) -> None:
     assert env.single_observation_space == FEATURES
     assert env.unwrapped.system.omega_max == 12.0
     assert scaled_env(PENDULUM, 3, circular=[]).observation_space.shape == (3, 2)
+    with pytest.raises(ValueError, match="num_envs"):
+        scaled_env(PENDULUM, 0)
     with pytest.raises(ValueError, match="num_envs is needed"):
         scaled_env(foreign_id)
 
@@ -219,18 +221,19 @@ def test_scaled_env(foreign_id: str) -> None:
 def test_both_ways_to_evaluate_agree() -> None:
     model = make_dqn(PENDULUM, TINY, seed=3)
     raw = gym.make_vec(PENDULUM, num_envs=2)
-    policy = ScaledPolicy(model, raw.single_observation_space)
+    policy = ScaledPolicy(
+        model, raw.single_observation_space, raw.unwrapped.system.circular
+    )
     one = acl_gym.evaluate_policy_cost(model, scaled_env(PENDULUM), max_steps=40)
     two = acl_gym.evaluate_policy_cost(policy, raw, max_steps=40)
     np.testing.assert_allclose(one.costs, two.costs)
     assert one.costs.shape == (100,)
-    assert policy.scaling.circular == (0,)
 
 
 def test_scaled_policy_predicts_one_or_many() -> None:
     model = make_dqn(PENDULUM, TINY, seed=3)
     space = gym.make(PENDULUM).observation_space
-    policy = ScaledPolicy(model, space, circular=[0])
+    policy = ScaledPolicy(model, space, [0])
     states = gym.make(PENDULUM).unwrapped.system.evaluation_states()
     actions, _ = policy.predict(states)
     assert actions.shape == (100,)

@@ -14,7 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import acl_gym
-from acl_gym.envs.wrappers import Scaling, full_turns
+from acl_gym.envs.wrappers import Scaling
 
 PENDULUM = "acl_gym/Pendulum-v0"
 BOX = spaces.Box(np.array([0.0, -9.0]), np.array([2 * math.pi, 9.0]), dtype=np.float64)
@@ -197,13 +197,6 @@ def test_what_is_no_index_is_refused(circular: Any) -> None:
 def test_wrong_number_of_variables_is_refused() -> None:
     with pytest.raises(ValueError, match=r"2 variables.*\(5, 3\)"):
         Scaling(BOX)(np.zeros((5, 3)))
-
-
-def test_full_turns() -> None:
-    low = np.array([0, -math.pi, -1, 1], dtype=np.float32)
-    high = np.array([2 * math.pi, math.pi, 1, 1 + 2 * math.pi], dtype=np.float32)
-    assert full_turns(spaces.Box(low, high)) == (0, 1)
-    assert full_turns(BOX) == (0,)
 
 
 def test_wrapped_environments_can_be_made_again() -> None:

@@ -200,7 +200,7 @@ def scaled_env(
             f"num_envs is needed for {env_id}, which has no evaluation states; only "
             "environments of acl_gym have."
         )
-    return ScaledVectorObservation(env, circular or ())
+    return ScaledVectorObservation(env, () if circular is None else circular)
 
 
 def make_dqn(

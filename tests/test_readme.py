@@ -1,0 +1,35 @@
+"""The README's Python runs as it stands and does what its comments promise."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+README = Path(__file__).resolve().parents[1] / "README.md"
+BLOCKS = re.findall(r"```python\n(.*?)```", README.read_text(), re.DOTALL)
+
+
+def run(block: str) -> dict[str, object]:
+    names: dict[str, object] = {"__name__": "readme"}
+    exec(compile(block, str(README), "exec"), names)  # noqa: S102 - our own file
+    return names
+
+
+def test_ten_lines_learn_the_pendulum(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    run(BLOCKS[0])
+    cost = float(capsys.readouterr().out.split()[0])
+    assert cost < 1.25 * 38.4
+    assert (tmp_path / "swing_up.npz").exists()
+
+
+def test_a_newcomers_environment_is_learned() -> None:
+    names = run(BLOCKS[1])
+    states = np.linspace(0.1, 1.7, 17)[:, None]
+    actions = names["colony"].predict(states)[0]  # type: ignore[attr-defined]
+    assert actions.tolist() == [1] * 17

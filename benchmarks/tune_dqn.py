@@ -48,6 +48,23 @@ CANDIDATES: dict[str, dict[str, Any]] = {
     "num_envs 16": {"num_envs": 16},
     "num_envs 4, reward_scale 0.5": {"num_envs": 4, "reward_scale": 0.5},
     "num_envs 4, max_episode_steps 100": {"num_envs": 4, "max_episode_steps": 100},
+    "num_envs 4, reward_scale 0.5, max_episode_steps 100": {
+        "num_envs": 4,
+        "reward_scale": 0.5,
+        "max_episode_steps": 100,
+    },
+    "num_envs 4, reward_scale 0.5, max_episode_steps 100, lr to 2e-4": {
+        "num_envs": 4,
+        "reward_scale": 0.5,
+        "max_episode_steps": 100,
+        "final_learning_rate": 2e-4,
+    },
+    "num_envs 4, reward_scale 0.5, max_episode_steps 100, batch_size 128": {
+        "num_envs": 4,
+        "reward_scale": 0.5,
+        "max_episode_steps": 100,
+        "batch_size": 128,
+    },
     "num_envs 4, updates_per_step 2": {"num_envs": 4, "updates_per_step": 2.0},
     "updates_per_step 0.5": {"updates_per_step": 0.5},
     "n_steps 3": {"n_steps": 3},

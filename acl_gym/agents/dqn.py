@@ -45,7 +45,7 @@ class DQNSettings:
     slot: n slots make n of them at a time.
 
     Attributes:
-        num_envs: slots, >= 1. Eight share the cost of choosing actions, and are few
+        num_envs: slots, >= 1. Four share the cost of choosing actions, and are few
             enough for the policy to change every few steps of an episode.
         updates_per_step: gradient steps for each step, > 0 and a whole number times
             `1 / num_envs`. Half as many took less time and learned worse in the same
@@ -71,13 +71,14 @@ class DQNSettings:
         max_grad_norm: the gradient is clipped to this length, > 0.
         net_arch: units of each hidden layer, >= 1 each.
         max_episode_steps: T, an episode is truncated then (and its last state's
-            value is asked for, as it should be), >= 1. 300 as for the ants.
+            value is asked for, as it should be), >= 1. With 100 instead of the ants'
+            300 the slots see more initial states, and no seed failed.
     """
 
-    num_envs: int = 8
+    num_envs: int = 4
     updates_per_step: float = 1.0
     discount: float = 0.99
-    reward_scale: float = 1.0
+    reward_scale: float = 0.5
     learning_rate: float = 1e-3
     final_learning_rate: float = 1e-3
     batch_size: int = 64
@@ -91,7 +92,7 @@ class DQNSettings:
     exploration_final: float = 0.05
     max_grad_norm: float = 10.0
     net_arch: tuple[int, ...] = (64, 64)
-    max_episode_steps: int = 300
+    max_episode_steps: int = 100
 
     def __post_init__(self) -> None:
         for name in (

@@ -108,6 +108,7 @@ def list_tasks(
                     "trials": preset.trials,
                     "dqn_steps": preset.dqn_steps,
                     "dqn_every": preset.dqn_every,
+                    "long_run": preset.long_run,
                 },
             )
             for agent in order

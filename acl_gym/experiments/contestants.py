@@ -52,6 +52,7 @@ class Preset:
         trials: K of the tabular agents.
         dqn_steps: environment steps of DQN.
         dqn_every: environment steps between two evaluations of DQN.
+        long_run: DQN's settings for long training instead of those for short.
         optimum_cells: cells of the value iteration that gives J*.
     """
 
@@ -59,6 +60,7 @@ class Preset:
     trials: int
     dqn_steps: int
     dqn_every: int
+    long_run: bool = False
     optimum_cells: tuple[int, int]
 
 
@@ -83,6 +85,7 @@ PRESETS = {
         trials=100,
         dqn_steps=200_000,
         dqn_every=2_000,
+        long_run=True,
         optimum_cells=(1600, 1601),
     ),
 }
@@ -132,10 +135,16 @@ def _train_dqn(env_id: str, seed: int, preset: Preset, report: Report) -> Run:
     import torch
     from stable_baselines3.common.callbacks import ConvertCallback
 
-    from acl_gym.agents.dqn import DQNSettings, PolicyCostCallback, make_dqn, scaled_env
+    from acl_gym.agents.dqn import (
+        LONG_RUN,
+        DQNSettings,
+        PolicyCostCallback,
+        make_dqn,
+        scaled_env,
+    )
 
     torch.set_num_threads(1)  # the fastest for such small networks
-    settings = DQNSettings()
+    settings = LONG_RUN if preset.long_run else DQNSettings()
     circular = make_env(env_id, 1).system.circular
 
     def scaled(slots: int | None) -> VectorEnv[Any, Any, Any]:

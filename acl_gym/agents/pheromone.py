@@ -137,9 +137,10 @@ class Pheromone:
         """
         with np.errstate(divide="ignore", over="ignore"):
             deposits = 1.0 / costs
+            total = deposits.sum()
         valid = np.isfinite(costs) & (costs > 0.0) & np.isfinite(deposits)
-        if not valid.all():
-            ant = int(np.flatnonzero(~valid)[0])
+        if not (valid.all() and np.isfinite(total)):
+            ant = int(np.argmin(valid)) if not valid.all() else int(np.argmin(costs))
             raise ValueError(
                 "the cost of a solution must be > 0 and finite, because ants deposit "
                 f"1 / cost; got {costs[ant]} for ant {ant}. Use an environment whose "

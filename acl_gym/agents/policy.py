@@ -84,6 +84,9 @@ class TablePolicy(PartitionPolicy):
         ranks: `(n_cells, n_actions)`, by which tied actions are told apart; None
             draws them from a fixed seed.
         first_action: the action that column 0 stands for, `Discrete.start`.
+
+    Raises:
+        ValueError: `table` or `ranks` do not fit the partition.
     """
 
     def __init__(
@@ -93,9 +96,24 @@ class TablePolicy(PartitionPolicy):
         ranks: RankArray | None = None,
         first_action: int = 0,
     ) -> None:
+        if table.dtype != np.float64 or table.ndim != 2:
+            raise ValueError(
+                f"table must be float64 with two axes, got {table.dtype} with "
+                f"{table.ndim}."
+            )
+        if len(table) != partition.n_cells:
+            raise ValueError(
+                f"table must have {partition.n_cells} rows, one a cell, got "
+                f"{len(table)}."
+            )
+        n_cells, n_actions = table.shape
         if ranks is None:
-            n_cells, n_actions = table.shape
             ranks = random_ranks(n_cells, n_actions, np.random.default_rng(0))
+        if ranks.shape != table.shape:
+            raise ValueError(
+                f"ranks must have the shape of the table, {table.shape}, got "
+                f"{ranks.shape}."
+            )
         self.partition = partition
         self.table = table
         self.ranks = ranks

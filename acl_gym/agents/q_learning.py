@@ -73,7 +73,11 @@ class QLearning(TabularAgent):
         log_interval: int | None = None,
         progress_bar: bool = False,
     ) -> Self:
-        """Learn; a trial is one episode in every slot. Arguments as in `ACL.learn`."""
+        """Learn; a trial is one episode in every slot. Arguments as in `ACL.learn`.
+
+        Raises:
+            ValueError: the action values have grown beyond all numbers.
+        """
         budget = (total_timesteps, trials, callback, log_interval, progress_bar)
         with Training(self, *budget) as training:
             while training.next_trial():
@@ -100,6 +104,7 @@ class QLearning(TabularAgent):
                     )
                     stays = ~step.finished
                     index, degree = next_index[stays], next_degree[stays]
+                self._check_values()
                 training.end_trial()
         return self
 
@@ -115,6 +120,14 @@ class QLearning(TabularAgent):
         """
         values = self._checked_table(table)
         self._values[:] = values
+
+    def _check_values(self) -> None:
+        if not np.isfinite(self._values).all():
+            raise ValueError(
+                "action values must stay finite, but have overflowed in trial "
+                f"{self.trials + 1}; scale the rewards down, or lower discount or "
+                "learning_rate."
+            )
 
     def parameters(self) -> dict[str, Any]:
         """The keyword arguments of the constructor."""

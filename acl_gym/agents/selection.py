@@ -184,6 +184,7 @@ def _epsilon_greedy(
         if coin[j] < epsilon:
             actions[j] = int(choice[j] * n_actions)
             continue
+        actions[j] = 0  # stands where no value is a number
         best = -np.inf
         tied = 0
         for u in range(n_actions):
@@ -216,8 +217,9 @@ def _greedy(
             if degree[j, c] > degree[j, foremost]:
                 foremost = c
         rank = ranks[index[j, foremost]]
-        best = -np.inf
-        for u in range(table.shape[1]):
+        best = _value(table, index[j], degree[j], 0)
+        actions[j] = 0
+        for u in range(1, table.shape[1]):
             value = _value(table, index[j], degree[j], u)
             if value > best or (value == best and rank[u] < rank[actions[j]]):
                 best = value

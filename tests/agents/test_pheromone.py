@@ -370,3 +370,11 @@ def test_every_changed_cell_becomes_stale_and_no_other() -> None:
     pheromone.stale[:] = False
     pheromone.set_levels(np.full((4, 2), 2.0))
     assert pheromone.stale.all()
+
+
+def test_deposits_whose_sum_overflows_are_refused() -> None:
+    pheromone = Pheromone(3, 2, 1.0, 3.0)
+    solutions = Solutions(50, 1, 1)
+    with pytest.raises(ValueError, match="cost of a solution must be > 0 and finite"):
+        pheromone.global_update(solutions, np.full(50, 1e-307), 0.5)
+    assert (pheromone.levels == 1.0).all()

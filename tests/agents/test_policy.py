@@ -82,3 +82,25 @@ def test_colony_hands_out_a_soft_policy_and_learns_on_as_before() -> None:
     assert evaluation.best.cost == min(
         row["policy_cost"] for row in watched.history if "policy_cost" in row
     )
+
+
+def test_a_table_of_nothing_finite_still_gives_actions() -> None:
+    """No entry is larger than another, so any action will do, but it must be one."""
+    states = np.random.default_rng(0).uniform(0, 2, (2_000, 1))
+    for value in (-np.inf, np.inf, np.nan):
+        actions = TablePolicy(GRID, np.full((3, 4), value)).predict(states)[0]
+        assert set(actions.tolist()) <= {0, 1, 2, 3}
+
+
+@pytest.mark.parametrize(
+    ("table", "ranks"),
+    [
+        (np.ones((2, 3)), None),
+        (np.ones((3, 3), dtype=int), None),
+        (np.ones(3), None),
+        (np.ones((3, 2)), np.zeros((3, 3), dtype=np.int32)),
+    ],
+)
+def test_a_table_that_does_not_fit_is_refused(table, ranks) -> None:
+    with pytest.raises(ValueError, match=r"^(table|ranks) must"):
+        TablePolicy(GRID, table, ranks)

@@ -231,3 +231,10 @@ def test_rewards_of_either_sign_are_welcome() -> None:
     # Staying away from the goal is worth 2 / (1 - 0.5) from every cell but the last.
     np.testing.assert_allclose(agent.table[:4], 4.0, rtol=1e-6)
     np.testing.assert_allclose(agent.table[4], [4.0, 2.0], rtol=1e-6)
+
+
+def test_values_that_overflow_are_refused() -> None:
+    env = chains(6, reward=-1e308)
+    agent = QLearning(env, ROW, learning_rate=1.0, discount=1.0, max_steps=9, seed=0)
+    with pytest.raises(ValueError, match=r"must stay finite, .* in trial"):
+        agent.learn(trials=20)

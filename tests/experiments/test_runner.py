@@ -98,12 +98,14 @@ def test_a_failure_is_one_clear_error_and_loses_nothing(
 
 
 KILLED = """
+import os
 import time
 from pathlib import Path
 from acl_gym.experiments.runner import Task, run_tasks
 from tests.experiments.test_runner import square, tasks
 
 def slow(report):
+    (Path({folder!r}) / "worker").write_text(str(os.getpid()))
     time.sleep(600)
 
 if __name__ == "__main__":
@@ -130,13 +132,27 @@ def test_killed_at_any_moment_it_goes_on(tmp_path: Path) -> None:
     give_up = time.monotonic() + 120
     while len(list(runs.glob("square-*.json"))) < 4 and time.monotonic() < give_up:
         time.sleep(0.05)
-    os.killpg(process.pid, signal.SIGKILL)
+    while not (tmp_path / "worker").exists() and time.monotonic() < give_up:
+        time.sleep(0.05)
+    process.kill()
     process.wait()
+    worker = int((tmp_path / "worker").read_text())
+    while _runs(worker) and time.monotonic() < give_up:
+        time.sleep(0.05)
+    assert not _runs(worker), "a worker must not outlive the runner"
     for path in runs.glob("square-*.json"):
         assert "result" in json.loads(path.read_text())
     results = run_tasks(tasks(tmp_path / "calls"), runs, workers=1)
     assert [result["square"] for result in results] == [0, 1, 4, 9]
     assert calls_in(tmp_path / "calls") == ["0", "1", "2", "3"]
+
+
+def _runs(pid: int) -> bool:
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    return True
 
 
 def test_fingerprint_is_of_the_source() -> None:

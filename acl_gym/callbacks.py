@@ -66,13 +66,13 @@ def as_callbacks(callback: Callbacks) -> list[Callback]:
         return []
     if isinstance(callback, Callback):
         return [callback]
-    if callable(callback):
+    if callable(callback) and not isinstance(callback, type):
         return [_FunctionCallback(callback)]
     if isinstance(callback, Iterable) and not isinstance(callback, str):
         return [one for each in callback for one in as_callbacks(each)]
     raise TypeError(
-        "callback must be a Callback, a function of (agent, row) or a list of those, "
-        f"got {type(callback).__name__}."
+        "callback must be a Callback object, a function of (agent, row) or a list of "
+        f"those, got {callback!r}."
     )
 
 

@@ -74,7 +74,21 @@ class Partition(ABC):
         index = np.zeros((n, self.cells_per_state), dtype=np.int32)
         degree = np.zeros((n, self.cells_per_state))
         self.locate(batch, np.arange(n), index, degree)
+        check_cells(index, self)
         return index, degree
+
+
+def check_cells(index: CellArray, partition: Partition) -> None:
+    """Hold a partition to its own number of cells; tables are indexed by them.
+
+    Raises:
+        ValueError: a cell is out of range.
+    """
+    if index.size and (index.min() < 0 or index.max() >= partition.n_cells):
+        raise ValueError(
+            f"{type(partition).__name__}.locate must give cells in "
+            f"0..{partition.n_cells - 1}, got {index.min()} to {index.max()}."
+        )
 
 
 class _Grid(Partition):

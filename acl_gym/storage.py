@@ -32,11 +32,18 @@ def save(
 
     Returns:
         The path written.
+
+    Raises:
+        FileNotFoundError: there is no such folder.
     """
     target = with_suffix(path)
     text = json.dumps(
         {"format": FORMAT, "version": VERSION, **header}, default=_plain_number
     )
+    if not target.parent.is_dir():
+        raise FileNotFoundError(
+            f"there is no folder {target.parent} to save {target.name} in; make it first."
+        )
     buffer = io.BytesIO()
     content = np.frombuffer(text.encode(), dtype=np.uint8)
     np.savez_compressed(buffer, header=content, **arrays)  # type: ignore[arg-type]
@@ -78,7 +85,8 @@ def load(path: str | Path) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
         # Whatever NumPy, zipfile, zlib and json may raise, and that is a dozen kinds,
         # means one thing here.
         raise ValueError(
-            f"{source} is not an agent saved by acl-gym, or is cut short: {error}."
+            f"{source} is not an agent saved by acl-gym, or is cut short "
+            f"({type(error).__name__}); save the agent again or use another copy."
         ) from error
     if kind != FORMAT or number != VERSION:
         raise ValueError(

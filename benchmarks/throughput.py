@@ -135,7 +135,7 @@ def run(quick: bool, progress: bool) -> list[Case]:
     """
     repetitions = 2 if quick else 5
     sizes = (16, 250) if quick else (1, 16, 250, 2_000, 20_000)
-    dqn_steps = 600 if quick else DQN_STEPS
+    dqn_steps = 2_000 if quick else DQN_STEPS  # it begins to learn after 1,000
     plan: list[tuple[str, int, Work, int, str]] = []
     for n in sizes:
         steps = max(20, min(2_000, 400_000 // n))

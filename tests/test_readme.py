@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 README = Path(__file__).resolve().parents[1] / "README.md"
+PAGES = [f"docs/{path.name}" for path in sorted((README.parent / "docs").glob("*.md"))]
 BLOCKS = re.findall(r"```python\n(.*?)```", README.read_text(), re.DOTALL)
 
 
@@ -33,3 +34,12 @@ def test_a_newcomers_environment_is_learned() -> None:
     states = np.linspace(0.1, 1.7, 17)[:, None]
     actions = names["colony"].predict(states)[0]  # type: ignore[attr-defined]
     assert actions.tolist() == [1] * 17
+
+
+@pytest.mark.parametrize("page", ["README.md", "CONTRIBUTING.md", *PAGES])
+def test_links_within_the_project_lead_somewhere(page: str) -> None:
+    source = README.parent / page
+    links = re.findall(r"\]\(([^)#]+)\)", source.read_text())
+    for link in links:
+        if not link.startswith(("http:", "https:")):
+            assert (source.parent / link).is_file(), f"{page} links to {link}"

@@ -21,7 +21,13 @@ from acl_gym.agents.selection import greedy_actions
 from acl_gym.agents.walk import Walk
 from acl_gym.callbacks import Callbacks, Row
 from acl_gym.membership import CellArray, FloatArray, IntArray
-from acl_gym.partition import Partition, partition_from_settings
+from acl_gym.partition import (
+    Crisp,
+    Fuzzy,
+    Partition,
+    check_cells,
+    partition_from_settings,
+)
 
 
 class TabularAgent(PartitionPolicy):
@@ -216,6 +222,8 @@ class TabularAgent(PartitionPolicy):
         """`(index, degree)` of the walking ants, valid until the next call."""
         m = ants.size
         self.partition.locate(observation, ants, self._index, self._degree)
+        if not isinstance(self.partition, (Crisp, Fuzzy)):
+            check_cells(self._index[:m], self.partition)
         return self._index[:m], self._degree[:m]
 
     def _next_seed(self) -> int:

@@ -12,6 +12,7 @@ import json
 import multiprocessing
 import os
 import queue
+import signal
 import threading
 from collections.abc import Callable, Iterable
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
@@ -116,7 +117,10 @@ def _run_in_processes(
                     _write(task, results[task.name], directory)
                     tell(task.name, 1.0)
         except BaseException:
+            # What is under way is lost anyhow: stop now, and not minutes later.
             pool.shutdown(wait=False, cancel_futures=True)
+            for process in multiprocessing.active_children():
+                process.terminate()
             raise
     return results
 
@@ -139,6 +143,8 @@ _reports: Any = None  # the queue of this worker process
 def _start_worker(reports: Any) -> None:
     global _reports  # noqa: PLW0603 - set once, before any task
     _reports = reports
+    # Ctrl-C reaches every process of a terminal; the parent is the one to answer it.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with_parent, daemon=True).start()
 
 

@@ -363,7 +363,8 @@ def _circumstances(
             f"Fuzzy Q-iteration, which knows the model, gets to a policy cost of "
             f"{coarse['policy_cost']:.1f} on {cells} cells, as many as the table-based "
             f"methods have, and reaches the goal from "
-            f"{wording.share(coarse['success_rate'])} of the starts."
+            f"{wording.share(coarse['success_rate'])} of the starts: its greedy policy "
+            "hovers beside the goal. It is no bound on what these cells allow."
         )
     seeds = [int(entry["seeds"]) for entry in summary]
     number = " to ".join(map(str, sorted({min(seeds), max(seeds)})))

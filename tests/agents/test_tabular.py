@@ -14,7 +14,7 @@ import pytest
 from stable_baselines3.common.evaluation import evaluate_policy
 from stable_baselines3.common.monitor import Monitor
 
-from acl_gym import ACL, Crisp, Fuzzy, QLearning
+from acl_gym import ACL, Crisp, Fuzzy, Partition, QLearning
 from acl_gym.agents.policy import TablePolicy
 from acl_gym.agents.tabular import TabularAgent
 from tests.agents.reference_colony import Chain, chains
@@ -327,3 +327,23 @@ def test_rows_with_numbers_of_numpy_can_be_saved(tmp_path: Path) -> None:
     agent.learn(trials=1, callback=lambda _, row: row.update(ants=np.int64(4)))
     agent.save(tmp_path / "agent")
     assert ACL.load(tmp_path / "agent").history[0]["ants"] == 4
+
+
+def test_a_partition_that_leaves_its_own_range_is_refused() -> None:
+    class Wrong(Partition):
+        n_cells = 3
+        cells_per_state = 1
+
+        def locate(self, states, slots, index, degree):
+            index[: slots.size] = 1_000_000
+            degree[: slots.size] = 1.0
+
+        def settings(self):
+            return {}
+
+        def cell_states(self):
+            return np.zeros((3, 1))
+
+    for kind in (ACL, QLearning):
+        with pytest.raises(ValueError, match=r"Wrong.locate must give cells in 0..2"):
+            kind(chains(4), Wrong(), max_steps=9, seed=0).learn(trials=1)

@@ -158,3 +158,22 @@ def _runs(pid: int) -> bool:
 def test_fingerprint_is_of_the_source() -> None:
     assert runner.code_fingerprint() == runner.code_fingerprint()
     assert len(runner.code_fingerprint()) == 64
+
+
+def test_ctrl_c_stops_at_once_and_leaves_nothing_running(tmp_path: Path) -> None:
+    script = tmp_path / "killed.py"
+    script.write_text(KILLED.format(folder=str(tmp_path)))
+    root = Path(__file__).resolve().parents[2]
+    process = subprocess.Popen(
+        [sys.executable, str(script)],
+        env={**os.environ, "PYTHONPATH": str(root)},
+        stderr=subprocess.DEVNULL,
+        start_new_session=True,
+    )
+    give_up = time.monotonic() + 120
+    while not (tmp_path / "worker").exists() and time.monotonic() < give_up:
+        time.sleep(0.05)
+    os.killpg(process.pid, signal.SIGINT)  # as a terminal does
+    process.wait(timeout=60)  # the task itself would sleep for ten minutes
+    assert process.returncode != 0
+    assert not _runs(int((tmp_path / "worker").read_text()))

@@ -12,6 +12,7 @@ import torch
 from gymnasium import spaces
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
 from stable_baselines3 import DQN, PPO
+from stable_baselines3.common.callbacks import ConvertCallback
 from stable_baselines3.common.evaluation import evaluate_policy
 from stable_baselines3.common.vec_env import VecMonitor
 
@@ -347,3 +348,25 @@ def test_saved_and_loaded_by_stable_baselines(tmp_path: Path) -> None:
         model.predict(observation, deterministic=True)[0],
         again.predict(observation, deterministic=True)[0],
     )
+
+
+def test_time_in_evaluations_is_not_counted(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every step of the slots takes a second here, and every evaluation a hundred."""
+    clock = [0.0]
+    monkeypatch.setattr("time.perf_counter", lambda: clock[0])
+    evaluate = acl_gym.evaluate_policy_cost
+
+    def slow(*arguments: Any, **keywords: Any) -> Any:
+        clock[0] += 100.0
+        return evaluate(*arguments, **keywords)
+
+    def tick(*_: Any) -> bool:
+        clock[0] += 1.0
+        return True
+
+    monkeypatch.setattr("acl_gym.agents.dqn.evaluate_policy_cost", slow)
+    costs = PolicyCostCallback(scaled_env(PENDULUM), every=100, max_steps=5)
+    make_dqn(PENDULUM, TINY, 0).learn(400, callback=[costs, ConvertCallback(tick)])
+    assert len(costs.history) >= 4
+    for row in costs.history:
+        assert row["seconds"] == row["env_steps"] / TINY.num_envs

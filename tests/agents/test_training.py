@@ -206,7 +206,9 @@ def test_callbacks_may_be_nested_and_mixed() -> None:
 @pytest.mark.parametrize("callback", [3, "print", [print, 3], {1: 2}])
 def test_what_is_no_callback_is_refused_at_once(callback: Any) -> None:
     agent = make()
-    with pytest.raises(TypeError, match="callback must be a Callback, a function"):
+    with pytest.raises(
+        TypeError, match="callback must be a Callback object, a function"
+    ):
         agent.learn(trials=1, callback=callback)
     assert agent.trials == 0
 

@@ -99,6 +99,7 @@ def test_a_failure_is_one_clear_error_and_loses_nothing(
 
 KILLED = """
 import os
+import signal
 import time
 from pathlib import Path
 from acl_gym.experiments.runner import Task, run_tasks
@@ -109,6 +110,8 @@ def slow(report):
     time.sleep(600)
 
 if __name__ == "__main__":
+    # A shell that runs this in the background has it ignore Ctrl-C.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     folder = Path({folder!r})
     run_tasks(
         [*tasks(folder / "calls"), Task("slow", slow, (), {{}})],

@@ -137,7 +137,7 @@ def record_trajectory(
         TypeError: `env` is of another package.
         ValueError: it has more than one slot.
     """
-    base = _control_env(env)
+    base = control_env(env)
     if env.num_envs != 1:
         raise ValueError(f"env must have one slot, got {env.num_envs}.")
     walk = Walk(env, base.system.evaluation_steps if max_steps is None else max_steps)
@@ -169,12 +169,17 @@ def actions_in(
     Raises:
         TypeError: `env` is of another package.
     """
-    _control_env(env)
+    control_env(env)
     observation, _ = env.reset(options={"state": states})
     return np.asarray(model.predict(observation, deterministic=True)[0], dtype=np.int64)
 
 
-def _control_env(env: VectorEnv[Any, Any, Any]) -> ControlVectorEnv:
+def control_env(env: VectorEnv[Any, Any, Any]) -> ControlVectorEnv:
+    """The environment of this package that `env` is or wraps.
+
+    Raises:
+        TypeError: it is of another package.
+    """
     base = env.unwrapped
     if not isinstance(base, ControlVectorEnv):
         raise TypeError(

@@ -81,7 +81,7 @@ class TabularAgent(PartitionPolicy):
             )
         self._n_actions = n_actions
         if env is not None:
-            self._attach(env)
+            self._attach(Walk(env, self.max_steps))
         self.num_timesteps = 0
         self.trials = 0
         self.seconds = 0.0
@@ -172,10 +172,9 @@ class TabularAgent(PartitionPolicy):
                 f"env's actions must begin at {self.first_action} as the table's do, "
                 f"got {walk.first_action}."
             )
-        self._attach(env)
+        self._attach(walk)
 
-    def _attach(self, env: VectorEnv[Any, Any, Any]) -> None:
-        walk = Walk(env, self.max_steps)
+    def _attach(self, walk: Walk) -> None:
         if self._n_actions not in (None, walk.n_actions):
             raise ValueError(
                 f"env must have {self._n_actions} actions as the table has, got "
@@ -183,7 +182,7 @@ class TabularAgent(PartitionPolicy):
             )
         self._n_actions = walk.n_actions
         self.first_action = walk.first_action
-        self.env = env
+        self.env = env = walk.env
         self._walk = walk
         k = self.partition.cells_per_state
         self._index: CellArray = np.zeros((env.num_envs, k), dtype=np.int32)

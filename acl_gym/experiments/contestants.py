@@ -27,6 +27,7 @@ from acl_gym.evaluation import (
     Predictor,
     Trajectory,
     actions_in,
+    control_env,
     evaluate_policy_cost,
     record_trajectory,
 )
@@ -226,14 +227,14 @@ def picture(
     model: Predictor, make: Callable[[int], VectorEnv[Any, Any, Any]]
 ) -> dict[str, Any]:
     """The policy as a map over the state space, and the trajectory from rest."""
-    theta, omega = map_axes(_control_env(make(1)))
+    theta, omega = map_axes(control_env(make(1)))
     grid = np.stack(np.meshgrid(theta, omega), axis=-1)
     states = grid.reshape(-1, 2)
     actions = actions_in(model, make(len(states)), states)
     trajectory = record_trajectory(model, make(1), np.zeros(2))
     return {
         "policy_map": actions.reshape(grid.shape[:2]).tolist(),
-        "trajectory": _as_json(trajectory, _pendulum(_control_env(make(1)))),
+        "trajectory": _as_json(trajectory, _pendulum(control_env(make(1)))),
     }
 
 
@@ -313,19 +314,12 @@ class _Progress(Callback):
 
 def make_env(env_id: str, slots: int) -> ControlVectorEnv:
     """An environment of the comparison with so many slots."""
-    return _control_env(gym.make_vec(env_id, num_envs=slots))
+    return control_env(gym.make_vec(env_id, num_envs=slots))
 
 
 def torques(env: ControlVectorEnv) -> tuple[float, ...]:
     """The torque of each action, N m."""
     return _pendulum(env).torques
-
-
-def _control_env(env: VectorEnv[Any, Any, Any]) -> ControlVectorEnv:
-    base = env.unwrapped
-    if not isinstance(base, ControlVectorEnv):
-        raise TypeError(f"env must be an environment of acl_gym, got {base}.")
-    return base
 
 
 def _pendulum(env: ControlVectorEnv) -> Pendulum:

@@ -121,16 +121,20 @@ if __name__ == "__main__":
 """
 
 
-def test_killed_at_any_moment_it_goes_on(tmp_path: Path) -> None:
-    script = tmp_path / "killed.py"
-    script.write_text(KILLED.format(folder=str(tmp_path)))
+def start_killed(folder: Path) -> subprocess.Popen[bytes]:
+    script = folder / "killed.py"
+    script.write_text(KILLED.format(folder=str(folder)))
     root = Path(__file__).resolve().parents[2]
-    process = subprocess.Popen(
+    return subprocess.Popen(
         [sys.executable, str(script)],
         env={**os.environ, "PYTHONPATH": str(root)},
         stderr=subprocess.DEVNULL,
         start_new_session=True,
     )
+
+
+def test_killed_at_any_moment_it_goes_on(tmp_path: Path) -> None:
+    process = start_killed(tmp_path)
     runs = tmp_path / "runs"
     give_up = time.monotonic() + 120
     while len(list(runs.glob("square-*.json"))) < 4 and time.monotonic() < give_up:
@@ -164,15 +168,7 @@ def test_fingerprint_is_of_the_source() -> None:
 
 
 def test_ctrl_c_stops_at_once_and_leaves_nothing_running(tmp_path: Path) -> None:
-    script = tmp_path / "killed.py"
-    script.write_text(KILLED.format(folder=str(tmp_path)))
-    root = Path(__file__).resolve().parents[2]
-    process = subprocess.Popen(
-        [sys.executable, str(script)],
-        env={**os.environ, "PYTHONPATH": str(root)},
-        stderr=subprocess.DEVNULL,
-        start_new_session=True,
-    )
+    process = start_killed(tmp_path)
     give_up = time.monotonic() + 120
     while not (tmp_path / "worker").exists() and time.monotonic() < give_up:
         time.sleep(0.05)

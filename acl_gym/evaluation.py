@@ -9,6 +9,7 @@ import numpy as np
 from gymnasium.vector import VectorEnv
 from numpy.typing import NDArray
 
+from acl_gym.agents.policy import PartitionPolicy
 from acl_gym.agents.walk import Walk, require_vector_env
 from acl_gym.envs.control_env import ControlVectorEnv
 
@@ -113,9 +114,19 @@ def evaluate_policy_cost(
     walk = Walk(env, 300 if max_steps is None else max_steps)
     observation = walk.start(seed=seed, states=states)
     while walk.ants.size:
-        actions, _ = model.predict(observation[walk.ants], deterministic=True)
-        observation = walk.step(np.asarray(actions) - walk.first_action).observation
+        actions = _chosen(model, observation[walk.ants], walk)
+        observation = walk.step(actions).observation
     return PolicyCost(walk.cost, walk.success, walk.length)
+
+
+def _chosen(model: Predictor, observation: Any, walk: Walk) -> NDArray[np.int64]:
+    """Indices of the actions that `model` takes for the walking slots."""
+    allowed = walk.allowed()
+    if allowed is not None and isinstance(model, PartitionPolicy):
+        actions, _ = model.predict(observation, action_masks=allowed)
+    else:
+        actions, _ = model.predict(observation, deterministic=True)
+    return np.asarray(actions) - walk.first_action
 
 
 def record_trajectory(
@@ -144,8 +155,7 @@ def record_trajectory(
     observation = walk.start(states=np.asarray(state)[None])
     states, actions, costs = [base.states[0]], [], []
     while walk.ants.size:
-        action, _ = model.predict(observation, deterministic=True)
-        action = np.asarray(action) - walk.first_action
+        action = _chosen(model, observation, walk)
         step = walk.step(action)
         observation = step.observation
         states.append(base.states[0])

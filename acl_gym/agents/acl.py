@@ -12,7 +12,7 @@ from numba import njit
 from numpy.typing import ArrayLike
 
 from acl_gym import validation
-from acl_gym.agents.pheromone import Pheromone, Solutions
+from acl_gym.agents.pheromone import BoolArray, Pheromone, Solutions
 from acl_gym.agents.policy import SoftPolicy
 from acl_gym.agents.selection import RULES, choose_actions
 from acl_gym.agents.tabular import TabularAgent
@@ -139,7 +139,7 @@ class ACL(TabularAgent):
                     # 8: fuzzify the states
                     index, degree = self._locate(observation, ants)
                     # 9: select actions, all on the same pheromone
-                    actions = self._choose(index, degree, self.rng)
+                    actions = self._choose(index, degree, self.rng, walk.allowed())
                     # 10: add the pairs to the partial solutions
                     solutions.append(ants, index, degree, actions)
                     # 11, 13-16: apply the actions; who is at the goal leaves C
@@ -251,14 +251,20 @@ class ACL(TabularAgent):
             "sensitivity": float(_mean_sensitivity(self._table, policy, self.alpha))
         }
 
-    def _explore(self, index: CellArray, degree: FloatArray) -> IntArray:
-        return self._choose(index, degree, self._predict_rng)
+    def _explore(
+        self, index: CellArray, degree: FloatArray, allowed: BoolArray | None
+    ) -> IntArray:
+        return self._choose(index, degree, self._predict_rng, allowed)
 
     def _choose(
-        self, index: CellArray, degree: FloatArray, rng: np.random.Generator
+        self,
+        index: CellArray,
+        degree: FloatArray,
+        rng: np.random.Generator,
+        allowed: BoolArray | None,
     ) -> IntArray:
         return choose_actions(
-            self.selection, self.pheromone, index, degree, self.epsilon, rng
+            self.selection, self.pheromone, index, degree, self.epsilon, rng, allowed
         )
 
     def _empty_solutions(self) -> Solutions:

@@ -10,7 +10,7 @@ from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from acl_gym import validation
-from acl_gym.agents.pheromone import Pheromone
+from acl_gym.agents.pheromone import BoolArray, Pheromone
 from acl_gym.agents.selection import choose_actions, greedy_actions
 from acl_gym.membership import CellArray, FloatArray, IntArray
 from acl_gym.partition import Partition
@@ -40,9 +40,18 @@ class PartitionPolicy(ABC):
     partition: Partition
     first_action: int
 
+    @property
+    @abstractmethod
+    def n_actions(self) -> int:
+        """The number of actions, the columns of the table."""
+
     @abstractmethod
     def _act(
-        self, index: CellArray, degree: FloatArray, deterministic: bool
+        self,
+        index: CellArray,
+        degree: FloatArray,
+        deterministic: bool,
+        allowed: BoolArray | None,
     ) -> IntArray:
         """Choose columns of the table, `(n,)`, for cells and degrees `(n, k)`."""
 
@@ -52,6 +61,7 @@ class PartitionPolicy(ABC):
         state: Any = None,
         episode_start: Any = None,
         deterministic: bool = True,
+        action_masks: ArrayLike | None = None,
     ) -> tuple[NDArray[np.int64], Any]:
         """Choose actions, with the signature of Stable-Baselines3.
 
@@ -61,18 +71,36 @@ class PartitionPolicy(ABC):
             episode_start: not used.
             deterministic: True follows the policy, False explores as in learning,
                 where there is a difference.
+            action_masks: which actions may be chosen, `(n_actions,)` or
+                `(n, n_actions)`, such as `info["action_mask"]`; None: all.
 
         Returns:
             `(actions, state)`; the action of a single observation has no axis.
 
         Raises:
-            ValueError: an observation is not finite or has the wrong shape.
+            ValueError: an observation is not finite or has the wrong shape, or a mask
+                has the wrong shape or allows nothing.
         """
         batch = np.asarray(observation)
         single = batch.ndim == self.partition.state_ndim
         index, degree = self.partition(batch[None] if single else batch)
-        actions = self._act(index, degree, deterministic) + self.first_action
+        allowed = self._checked_masks(action_masks, len(index))
+        actions = self._act(index, degree, deterministic, allowed) + self.first_action
         return (actions[0] if single else actions), state
+
+    def _checked_masks(self, masks: ArrayLike | None, count: int) -> BoolArray | None:
+        if masks is None:
+            return None
+        allowed = np.asarray(masks) != 0
+        if allowed.ndim == 1:
+            allowed = allowed[None]
+        shape = (count, self.n_actions)
+        if allowed.shape != shape or not allowed.any(axis=1).all():
+            raise ValueError(
+                f"action_masks must have shape {shape} and allow an action in each "
+                f"row, got {np.asarray(masks).tolist()!r:.200}."
+            )
+        return np.ascontiguousarray(allowed)
 
 
 class TablePolicy(PartitionPolicy):
@@ -119,10 +147,19 @@ class TablePolicy(PartitionPolicy):
         self.ranks = ranks
         self.first_action = first_action
 
+    @property
+    def n_actions(self) -> int:
+        """See `PartitionPolicy.n_actions`."""
+        return int(self.table.shape[1])
+
     def _act(
-        self, index: CellArray, degree: FloatArray, deterministic: bool
+        self,
+        index: CellArray,
+        degree: FloatArray,
+        deterministic: bool,
+        allowed: BoolArray | None,
     ) -> IntArray:
-        return greedy_actions(self.table, self.ranks, index, degree)
+        return greedy_actions(self.table, self.ranks, index, degree, allowed)
 
     def best_actions(self) -> IntArray:
         """The best column of every cell, `(n_cells,)`, (3.10)."""
@@ -169,11 +206,20 @@ class SoftPolicy(PartitionPolicy):
         self._pheromone.set_levels(levels)
         self._rng = np.random.default_rng(seed)
 
+    @property
+    def n_actions(self) -> int:
+        """See `PartitionPolicy.n_actions`."""
+        return int(self._pheromone.levels.shape[1])
+
     def _act(
-        self, index: CellArray, degree: FloatArray, deterministic: bool
+        self,
+        index: CellArray,
+        degree: FloatArray,
+        deterministic: bool,
+        allowed: BoolArray | None,
     ) -> IntArray:
         return choose_actions(
-            "boltzmann", self._pheromone, index, degree, 0.0, self._rng
+            "boltzmann", self._pheromone, index, degree, 0.0, self._rng, allowed
         )
 
 

@@ -10,6 +10,7 @@ from numba import njit
 from numpy.typing import ArrayLike
 
 from acl_gym import validation
+from acl_gym.agents.pheromone import BoolArray
 from acl_gym.agents.selection import epsilon_greedy_actions
 from acl_gym.agents.tabular import TabularAgent
 from acl_gym.agents.training import Training
@@ -139,9 +140,11 @@ class QLearning(TabularAgent):
             "seed": self.seed,
         }
 
-    def _explore(self, index: CellArray, degree: FloatArray) -> IntArray:
+    def _explore(
+        self, index: CellArray, degree: FloatArray, allowed: BoolArray | None
+    ) -> IntArray:
         return epsilon_greedy_actions(
-            self._table, index, degree, self.epsilon, self._predict_rng
+            self._table, index, degree, self.epsilon, self._predict_rng, allowed
         )
 
 

@@ -14,6 +14,9 @@ from acl_gym.membership import CellArray, FloatArray, IntArray
 
 RULES = ("boltzmann", "epsilon_greedy", "max_boltzmann")
 
+_ALL: BoolArray = np.empty((0, 0), dtype=np.bool_)
+"""What kernels are given as `allowed` where every action is."""
+
 
 def choose_actions(
     rule: str,
@@ -22,6 +25,7 @@ def choose_actions(
     degree: FloatArray,
     epsilon: float,
     rng: np.random.Generator,
+    allowed: BoolArray | None = None,
 ) -> IntArray:
     """Choose an action for each ant; all choose on the same pheromone.
 
@@ -38,12 +42,16 @@ def choose_actions(
         degree: their degrees, `(m, k)`.
         epsilon: exploration probability, in [0, 1].
         rng: two uniform numbers an ant are drawn from it: a coin, and a choice.
+        allowed: U_q, the actions that each ant may take, `(m, n_actions)`, one or
+            more an ant; None: all.
 
     Returns:
         Indices of actions, `(m,)`.
     """
     if rule == "epsilon_greedy":
-        return epsilon_greedy_actions(pheromone.levels, index, degree, epsilon, rng)
+        return epsilon_greedy_actions(
+            pheromone.levels, index, degree, epsilon, rng, allowed
+        )
     coin, choice = rng.random((2, index.shape[0]))
     actions = np.empty(index.shape[0], dtype=np.int64)
     _boltzmann(
@@ -56,6 +64,7 @@ def choose_actions(
         coin,
         choice,
         epsilon if rule == "max_boltzmann" else 0.0,
+        _ALL if allowed is None else allowed,
         actions,
     )
     return actions
@@ -67,11 +76,13 @@ def epsilon_greedy_actions(
     degree: FloatArray,
     epsilon: float,
     rng: np.random.Generator,
+    allowed: BoolArray | None = None,
 ) -> IntArray:
     """Rule (3.5) on any table of values; see `choose_actions`."""
     coin, choice = rng.random((2, index.shape[0]))
     actions = np.empty(index.shape[0], dtype=np.int64)
-    _epsilon_greedy(table, index, degree, coin, choice, epsilon, actions)
+    any_action = _ALL if allowed is None else allowed
+    _epsilon_greedy(table, index, degree, coin, choice, epsilon, any_action, actions)
     return actions
 
 
@@ -80,6 +91,7 @@ def greedy_actions(
     ranks: NDArray[np.int32],
     index: CellArray,
     degree: FloatArray,
+    allowed: BoolArray | None = None,
 ) -> IntArray:
     """The policy (4.16): the action with the largest degree-weighted value.
 
@@ -89,12 +101,14 @@ def greedy_actions(
             actions go by their rank in the state's foremost cell.
         index: `(n, k)`.
         degree: `(n, k)`.
+        allowed: the actions to choose from, `(n, n_actions)`, one or more a state;
+            None: all.
 
     Returns:
         Indices of actions, `(n,)`.
     """
     actions = np.empty(index.shape[0], dtype=np.int64)
-    _greedy(table, ranks, index, degree, actions)
+    _greedy(table, ranks, index, degree, _ALL if allowed is None else allowed, actions)
     return actions
 
 
@@ -133,6 +147,59 @@ def _repair(
         probabilities[cell, u] /= total
 
 
+@njit(cache=True)
+def _any_action(choice: float, j: int, n_actions: int, allowed: BoolArray) -> int:
+    """One of the actions that ant j may take, each as likely; choice is in [0, 1)."""
+    if allowed.size == 0:
+        return int(choice * n_actions)
+    count = 0
+    for u in range(n_actions):
+        count += allowed[j, u]
+    skip = int(choice * count)
+    for u in range(n_actions):
+        if allowed[j, u]:
+            if skip == 0:
+                return u
+            skip -= 1
+    return 0
+
+
+@njit(cache=True, error_model="numpy")
+def _boltzmann_allowed(
+    levels: FloatArray,
+    alpha: float,
+    cells: CellArray,
+    degrees: FloatArray,
+    allowed: BoolArray,
+    choice: float,
+) -> int:
+    """Draw from (4.11), the sums of (4.3) taken over U_q; one ant."""
+    n_actions = allowed.size
+    weight = np.zeros(n_actions)
+    for c in range(cells.size):
+        row = levels[cells[c]]
+        largest = 0.0
+        for u in range(n_actions):
+            if allowed[u]:
+                largest = max(largest, row[u])
+        share = 0.0
+        for u in range(n_actions):
+            if allowed[u]:
+                share += (row[u] / largest) ** alpha
+        for u in range(n_actions):
+            if allowed[u]:
+                weight[u] += degrees[c] * (row[u] / largest) ** alpha / share
+    cumulated = 0.0
+    action = 0
+    for u in range(n_actions):
+        if allowed[u]:
+            action = u
+            cumulated += weight[u]
+            if choice < cumulated:
+                break
+    return action
+
+
 @njit(cache=True, error_model="numpy")
 def _boltzmann(
     levels: FloatArray,
@@ -144,12 +211,18 @@ def _boltzmann(
     coin: FloatArray,
     choice: FloatArray,
     epsilon: float,
+    allowed: BoolArray,
     actions: IntArray,
 ) -> None:
     n_actions = levels.shape[1]
     for j in range(actions.size):
         if coin[j] < epsilon:
-            actions[j] = int(choice[j] * n_actions)
+            actions[j] = _any_action(choice[j], j, n_actions, allowed)
+            continue
+        if allowed.size > 0:
+            actions[j] = _boltzmann_allowed(
+                levels, alpha, index[j], degree[j], allowed[j], choice[j]
+            )
             continue
         for c in range(index.shape[1]):
             cell = index[j, c]
@@ -176,24 +249,29 @@ def _epsilon_greedy(
     coin: FloatArray,
     choice: FloatArray,
     epsilon: float,
+    allowed: BoolArray,
     actions: IntArray,
 ) -> None:
     n_actions = levels.shape[1]
     values = np.empty(n_actions)
     for j in range(actions.size):
+        # Stands also where no value is a number.
+        actions[j] = _any_action(choice[j], j, n_actions, allowed)
         if coin[j] < epsilon:
-            actions[j] = int(choice[j] * n_actions)
             continue
-        actions[j] = 0  # stands where no value is a number
         best = -np.inf
         tied = 0
         for u in range(n_actions):
-            values[u] = _value(levels, index[j], degree[j], u)
+            values[u] = -np.inf
+            if allowed.size == 0 or allowed[j, u]:
+                values[u] = _value(levels, index[j], degree[j], u)
             if values[u] > best:
                 best = values[u]
                 tied = 1
             elif values[u] == best:
                 tied += 1
+        if best == -np.inf:
+            continue
         skip = int(choice[j] * tied)
         for u in range(n_actions):
             if values[u] == best:
@@ -209,6 +287,7 @@ def _greedy(
     ranks: NDArray[np.int32],
     index: CellArray,
     degree: FloatArray,
+    allowed: BoolArray,
     actions: IntArray,
 ) -> None:
     for j in range(actions.size):
@@ -217,10 +296,14 @@ def _greedy(
             if degree[j, c] > degree[j, foremost]:
                 foremost = c
         rank = ranks[index[j, foremost]]
-        best = _value(table, index[j], degree[j], 0)
-        actions[j] = 0
-        for u in range(1, table.shape[1]):
+        best = -np.inf
+        action = -1
+        for u in range(table.shape[1]):
+            if allowed.size > 0 and not allowed[j, u]:
+                continue
             value = _value(table, index[j], degree[j], u)
-            if value > best or (value == best and rank[u] < rank[actions[j]]):
+            tied = value == best and action >= 0 and rank[u] < rank[action]
+            if action < 0 or value > best or tied:
                 best = value
-                actions[j] = u
+                action = u
+        actions[j] = action

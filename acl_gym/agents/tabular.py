@@ -11,6 +11,7 @@ from gymnasium.vector import VectorEnv
 from numpy.typing import ArrayLike, NDArray
 
 from acl_gym import storage, validation
+from acl_gym.agents.pheromone import BoolArray
 from acl_gym.agents.policy import (
     PartitionPolicy,
     RankArray,
@@ -122,7 +123,9 @@ class TabularAgent(PartitionPolicy):
         return {}
 
     @abstractmethod
-    def _explore(self, index: CellArray, degree: FloatArray) -> IntArray:
+    def _explore(
+        self, index: CellArray, degree: FloatArray, allowed: BoolArray | None
+    ) -> IntArray:
         """Choose actions as in learning, with `self._predict_rng`."""
 
     @property
@@ -209,11 +212,15 @@ class TabularAgent(PartitionPolicy):
         return TablePolicy(self.partition, self._table, self._ranks, self.first_action)
 
     def _act(
-        self, index: CellArray, degree: FloatArray, deterministic: bool
+        self,
+        index: CellArray,
+        degree: FloatArray,
+        deterministic: bool,
+        allowed: BoolArray | None,
     ) -> IntArray:
         if deterministic:
-            return greedy_actions(self._table, self._ranks, index, degree)
-        return self._explore(index, degree)
+            return greedy_actions(self._table, self._ranks, index, degree, allowed)
+        return self._explore(index, degree, allowed)
 
     def _locate(
         self, observation: NDArray[Any], ants: IntArray

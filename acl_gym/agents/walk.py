@@ -59,6 +59,8 @@ class Walk:
         cost: J so far of each slot, the sum of its stage costs.
         length: steps of each slot so far.
         success: whether each slot has ended in a terminal state.
+        action_mask: which actions each slot may take now, `(num_envs, n_actions)`:
+            U_q of (3.4). None where the environment gives no `infos["action_mask"]`.
 
     Raises:
         TypeError: `env` is not a vector environment.
@@ -84,6 +86,7 @@ class Walk:
         self.first_action = int(space.start)
         self._all = np.arange(env.num_envs)
         self._stale: BoolArray | None = None  # slots to reset before the next step
+        self.action_mask: BoolArray | None = None
 
     def start(
         self, seed: int | None = None, states: FloatArray | None = None
@@ -103,8 +106,9 @@ class Walk:
             options["finished"] = "wait"
         if states is not None:
             options["state"] = states
-        observation, _ = self.env.reset(seed=seed, options=options or None)
+        observation, infos = self.env.reset(seed=seed, options=options or None)
         n = self.env.num_envs
+        self._read_mask(infos)
         self.ants = self._all
         self.cost = np.zeros(n)
         self.length = np.zeros(n, dtype=np.int64)
@@ -132,6 +136,7 @@ class Walk:
         self._actions[ants] = actions + self.first_action
         observation, reward, terminated, truncated, infos = self.env.step(self._actions)
         observation = np.asarray(observation)
+        self._read_mask(infos)
         self.steps += 1
 
         m = ants.size
@@ -166,6 +171,41 @@ class Walk:
             self.ants = ants[:0]
             stopped = np.ones_like(stopped)
         return Step(ants, observation, cost, reached, stopped)
+
+    def allowed(self) -> BoolArray | None:
+        """The actions that each walking ant may take, `(m, n_actions)`; None: all.
+
+        Raises:
+            ValueError: an ant may take none.
+        """
+        if self.action_mask is None:
+            return None
+        allowed = self.action_mask[self.ants]
+        if not allowed.any(axis=1).all():
+            slot = self.ants[int(np.argmin(allowed.any(axis=1)))]
+            raise ValueError(
+                f"every slot must have an allowed action, got none in slot {slot}; "
+                "check the environment's action_mask."
+            )
+        return allowed
+
+    def _read_mask(self, infos: dict[str, Any]) -> None:
+        mask = infos.get("action_mask")
+        if mask is None:
+            self.action_mask = None
+            return
+        mask = np.array(mask)
+        shape = (self.env.num_envs, self.n_actions)
+        if mask.shape != shape or mask.dtype.kind not in "biuf":
+            raise ValueError(
+                f"infos['action_mask'] must have shape {shape}, one row a slot, got "
+                f"{mask.shape} of {mask.dtype}."
+            )
+        self.action_mask = mask != 0
+        # Slots that say nothing may do anything.
+        given = infos.get("_action_mask")
+        if given is not None:
+            self.action_mask |= ~np.asarray(given, dtype=np.bool_)[:, None]
 
     def _finish(
         self,

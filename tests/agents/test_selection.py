@@ -144,9 +144,12 @@ def test_the_ends_of_the_unit_interval_choose_the_first_and_last(
             degree,
             *numbers,
             0.5,
+            selection._ALL,
             actions[0],
         )
-        selection._epsilon_greedy(levels, index, degree, *numbers, 0.5, actions[1])
+        selection._epsilon_greedy(
+            levels, index, degree, *numbers, 0.5, selection._ALL, actions[1]
+        )
         assert actions.tolist() == [[end], [end]]
 
 
@@ -247,9 +250,58 @@ def test_ranks_are_orders_and_each_order_is_as_likely() -> None:
     assert stats.chisquare(counts).pvalue > 1e-3
 
 
+@given(colonies(), st.sampled_from(RULES), st.sampled_from([0.0, 0.3, 1.0]))
+@settings(max_examples=100)
+def test_a_restricted_choice_is_that_of_a_table_with_the_allowed_actions_only(
+    colony: tuple[Pheromone, Array, Array, np.random.Generator],
+    rule: str,
+    epsilon: float,
+) -> None:
+    pheromone, index, degree, rng = colony
+    allowed = rng.random((len(index), pheromone.levels.shape[1])) < 0.5
+    allowed[~allowed.any(axis=1), 0] = True
+    state = rng.bit_generator.state
+    actions = choose_actions(rule, pheromone, index, degree, epsilon, rng, allowed)
+    rng.bit_generator.state = state
+    coins, choices = rng.random((2, len(index)))
+    for j, action in enumerate(actions):
+        beta = reference.dense(index[j], degree[j], len(pheromone.levels))
+        columns = np.flatnonzero(allowed[j])
+        expected = reference.chosen(
+            rule,
+            pheromone.levels[:, columns],
+            beta,
+            pheromone.alpha,
+            epsilon,
+            coins[j],
+            choices[j],
+        )
+        assert action == columns[expected]
+
+
+@given(colonies())
+@settings(max_examples=50)
+def test_the_policy_of_allowed_actions_is_that_of_their_columns(
+    colony: tuple[Pheromone, Array, Array, np.random.Generator],
+) -> None:
+    pheromone, index, degree, rng = colony
+    table = np.round(pheromone.levels)  # so that there are ties
+    columns = np.flatnonzero(rng.random(table.shape[1]) < 0.7)
+    columns = columns if columns.size else np.array([0])
+    allowed = np.zeros((len(index), table.shape[1]), dtype=bool)
+    allowed[:, columns] = True
+    ranks = policy.random_ranks(*table.shape, rng)
+    among = greedy_actions(table[:, columns], ranks[:, columns], index, degree)
+    np.testing.assert_array_equal(
+        greedy_actions(table, ranks, index, degree, allowed), columns[among]
+    )
+
+
+@pytest.mark.parametrize("restricted", [False, True])
 @given(colonies())
 @settings(max_examples=50)
 def test_kernels_agree_with_themselves_as_plain_python(
+    restricted: bool,
     colony: tuple[Pheromone, Array, Array, np.random.Generator],
 ) -> None:
     pheromone, index, degree, rng = colony
@@ -257,19 +309,23 @@ def test_kernels_agree_with_themselves_as_plain_python(
     ants, (n_cells, n_actions) = len(index), levels.shape
     numbers = rng.random((2, ants))
     ranks = policy.random_ranks(n_cells, n_actions, rng)
+    allowed = selection._ALL
+    if restricted:
+        allowed = rng.random((ants, n_actions)) < 0.7
+        allowed[:, 0] = True
     results = []
     for version in (lambda kernel: kernel, lambda kernel: kernel.py_func):
         probabilities, row = np.empty_like(levels), np.empty_like(levels)
         stale = np.ones(n_cells, dtype=bool)
         actions = np.full((3, ants), -1, dtype=np.int64)
         states = index, degree
-        exploring = *states, *numbers, 0.2
+        exploring = *states, *numbers, 0.2, allowed
         version(selection._repair)(levels, alpha, 0, row)
         version(selection._boltzmann)(
             levels, alpha, probabilities, stale, *exploring, actions[0]
         )
         version(selection._epsilon_greedy)(levels, *exploring, actions[1])
-        version(selection._greedy)(levels, ranks, *states, actions[2])
+        version(selection._greedy)(levels, ranks, *states, allowed, actions[2])
         results.append((row[0], probabilities[~stale], actions))
     for compiled, plain in zip(*results, strict=True):
         np.testing.assert_allclose(compiled, plain, rtol=1e-13, atol=1e-300)

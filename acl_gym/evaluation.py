@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 
 from acl_gym.agents.policy import PartitionPolicy
 from acl_gym.agents.walk import Walk, require_vector_env
+from acl_gym.costs import Cost, Episode, as_cost, solution_costs
 from acl_gym.envs.control_env import ControlVectorEnv
 
 FloatArray = NDArray[np.float64]
@@ -72,6 +74,7 @@ def evaluate_policy_cost(
     *,
     max_steps: int | None = None,
     seed: int | None = None,
+    cost: Cost | Callable[[Episode], float] | None = None,
 ) -> PolicyCost:
     """Follow the policy of `model`, without exploring, once from each initial state.
 
@@ -84,6 +87,8 @@ def evaluate_policy_cost(
         max_steps: T, >= 1. None takes the environment's `evaluation_steps`, 300 for
             an environment of another package.
         seed: seeds the environment where it is random.
+        cost: what a solution costs; None takes the sum of its stage costs, see
+            `acl_gym.costs`.
 
     Returns:
         Costs, successes and lengths, one for each state.
@@ -112,11 +117,13 @@ def evaluate_policy_cost(
             f"got {env.num_envs} slots."
         )
     walk = Walk(env, 300 if max_steps is None else max_steps)
-    observation = walk.start(seed=seed, states=states)
+    whole = as_cost(cost)
+    observation = walk.start(seed=seed, states=states, record=whole is not None)
     while walk.ants.size:
         actions = _chosen(model, observation[walk.ants], walk)
         observation = walk.step(actions).observation
-    return PolicyCost(walk.cost, walk.success, walk.length)
+    costs = walk.cost if whole is None else solution_costs(whole, walk.episodes())
+    return PolicyCost(costs, walk.success, walk.length)
 
 
 def _chosen(model: Predictor, observation: Any, walk: Walk) -> NDArray[np.int64]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import warnings
+from collections.abc import Callable
 from typing import Any, Self
 
 import numpy as np
@@ -17,10 +18,15 @@ from acl_gym.agents.policy import SoftPolicy
 from acl_gym.agents.selection import RULES, choose_actions
 from acl_gym.agents.tabular import TabularAgent
 from acl_gym.agents.training import Training
+from acl_gym.agents.walk import Walk
 from acl_gym.callbacks import Callbacks, Row
+from acl_gym.costs import Cost, Episode, as_cost, cost_from_settings, solution_costs
+from acl_gym.deposits import Deposit, InverseCost, as_deposit, deposit_from_settings
 from acl_gym.envs.control_env import ControlVectorEnv
 from acl_gym.membership import CellArray, FloatArray, IntArray
 from acl_gym.partition import Partition
+from acl_gym.savable import to_settings
+from acl_gym.schedules import Scheduled, Setting, schedule_from_settings
 
 
 class PheromoneBoundWarning(UserWarning):
@@ -46,11 +52,22 @@ class ACL(TabularAgent):
         global_decay: rho, in [0, 1], weight of the deposits of a trial (4.15). The
             thesis requires rho > 0; 0, where nothing is learned, is among its
             experiments.
-        alpha: exponent of the selection rule (4.11), > 0.
-        epsilon: exploration probability, in [0, 1]; see `selection`.
+        alpha: exponent of the selection rule (4.11), > 0; a number, or a schedule such
+            as `Linear(1, 3, trials=50)` that gives one for each trial.
+        epsilon: exploration probability, in [0, 1], a number or a schedule; see
+            `selection`.
         selection: `"max_boltzmann"` (3.6), `"boltzmann"` (3.4), which has no
             epsilon, or `"epsilon_greedy"` (3.5).
-        max_steps: T, the longest an ant may walk, >= 1.
+        cost: J of a solution. None takes the sum of the environment's stage costs,
+            -(rewards), (3.2); a `Cost` such as `Steps()`, or a function of one
+            `Episode`, looks at the solution as a whole.
+        deposit: what an ant lays for a solution of cost J: `"inverse_cost"`, 1 / J
+            (3.8); `"return"`, for environments whose returns are never negative;
+            `"rank"`, for any; a `Deposit`, or a function of the costs of a trial.
+        tabu: forbid an ant to choose an action twice in the same cell in one trial
+            (§3.4.2). For partitions with one cell a state.
+        max_steps: T, the longest an ant may walk, >= 1. None takes the limit that the
+            environment is registered with, and 300 where it has none.
         seed: a run is a function of it; None draws one from the system.
         n_actions: only needed without an environment.
 
@@ -70,7 +87,8 @@ class ACL(TabularAgent):
 
     local_decay = validation.Number(at_least=0, below=1)
     global_decay = validation.Number(at_least=0, at_most=1)
-    epsilon = validation.Number(at_least=0, at_most=1)
+    alpha = Scheduled(above=0)
+    epsilon = Scheduled(at_least=0, at_most=1)
 
     def __init__(
         self,
@@ -80,23 +98,36 @@ class ACL(TabularAgent):
         tau0: float = 1e-4,
         local_decay: float = 0.01,
         global_decay: float = 0.1,
-        alpha: float = 3.0,
-        epsilon: float = 0.1,
+        alpha: Setting = 3.0,
+        epsilon: Setting = 0.1,
         selection: str = "max_boltzmann",
-        max_steps: int = 300,
+        cost: Cost | Callable[[Episode], float] | None = None,
+        deposit: str | Deposit | Callable[[FloatArray], FloatArray] = "inverse_cost",
+        tabu: bool = False,
+        max_steps: int | None = None,
         seed: int | None = None,
         n_actions: int | None = None,
     ) -> None:
         tau0 = validation.number("tau0", tau0, above=0)
-        alpha = validation.number("alpha", alpha, above=0)
+        self.alpha = alpha
         self.local_decay = local_decay
         self.global_decay = global_decay
         self.epsilon = epsilon
         self._selection = validation.one_of("selection", selection, RULES)
+        self.cost = cost
+        self.deposit = deposit
         super().__init__(
             env, partition, max_steps=max_steps, seed=seed, n_actions=n_actions
         )
-        self.pheromone = Pheromone(partition.n_cells, self.n_actions, tau0, alpha)
+        if tabu and self.partition.cells_per_state > 1:
+            raise ValueError(
+                "tabu needs a partition with one cell a state, such as Crisp or "
+                f"Discrete, got {self.partition!r}; leave tabu out."
+            )
+        self.tabu = bool(tabu)
+        self.pheromone = Pheromone(
+            self.partition.n_cells, self.n_actions, tau0, self._now("alpha")
+        )
         self._solutions: Solutions | None = None
         self._warn_if_tau0_is_high()
 
@@ -133,13 +164,16 @@ class ACL(TabularAgent):
             while training.next_trial():  # 2, 22: repeat until k = K
                 # 3-6: every ant begins in a random state with an empty solution
                 walk, solutions = self.walk, self._empty_solutions()
-                observation = walk.start(seed=self._next_seed())
+                pheromone.alpha, epsilon = self._now("alpha"), self._now("epsilon")
+                whole = self.cost is not None  # the cost looks at whole solutions
+                observation = walk.start(seed=self._next_seed(), record=whole)
                 while walk.ants.size:  # 7, 17: repeat until t = T or C is empty
                     ants = walk.ants
                     # 8: fuzzify the states
                     index, degree = self._locate(observation, ants)
                     # 9: select actions, all on the same pheromone
-                    actions = self._choose(index, degree, self.rng, walk.allowed())
+                    allowed = self._allowed(walk, solutions, index)
+                    actions = self._choose(index, degree, epsilon, self.rng, allowed)
                     # 10: add the pairs to the partial solutions
                     solutions.append(ants, index, degree, actions)
                     # 11, 13-16: apply the actions; who is at the goal leaves C
@@ -147,8 +181,10 @@ class ACL(TabularAgent):
                     # 12: local pheromone update (4.12)
                     pheromone.local_update(index, degree, actions, self.local_decay)
                 # 18-20: global pheromone update with all solutions (4.15)
-                pheromone.global_update(solutions, walk.cost, self.global_decay)
-                training.end_trial()  # 21: k <- k + 1
+                costs = self._costs(walk)
+                deposits = self._deposit(costs, self.tau0)
+                pheromone.global_update(solutions, deposits, self.global_decay)
+                training.end_trial(costs)  # 21: k <- k + 1
         return self
 
     @property
@@ -157,13 +193,24 @@ class ACL(TabularAgent):
         return self.pheromone.tau0
 
     @property
-    def alpha(self) -> float:
-        """Exponent of the selection rule, > 0; may be changed at any time."""
-        return self.pheromone.alpha
+    def cost(self) -> Cost | None:
+        """What a solution costs; None: the sum of its stage costs."""
+        return self._cost
 
-    @alpha.setter
-    def alpha(self, value: float) -> None:
-        self.pheromone.alpha = validation.number("alpha", value, above=0)
+    @cost.setter
+    def cost(self, value: Cost | Callable[[Episode], float] | None) -> None:
+        self._cost = as_cost(value)
+
+    @property
+    def deposit(self) -> Deposit:
+        """What an ant lays for a solution of a given cost."""
+        return self._deposit
+
+    @deposit.setter
+    def deposit(
+        self, value: str | Deposit | Callable[[FloatArray], FloatArray]
+    ) -> None:
+        self._deposit = as_deposit(value)
 
     @property
     def selection(self) -> str:
@@ -203,7 +250,10 @@ class ACL(TabularAgent):
         base = None if self.env is None else self.env.unwrapped
         if not isinstance(base, ControlVectorEnv) or self.global_decay == 0.0:
             return
+        if not isinstance(self.deposit, InverseCost) or self.cost is not None:
+            return  # J_max is known for the environment's own cost only
         highest_cost = self.max_steps * base.system.max_stage_cost
+        highest_cost += self.deposit.offset
         bound = 1.0 / highest_cost
         if self.tau0 > bound:
             digit = 10.0 ** math.floor(math.log10(bound))
@@ -238,33 +288,72 @@ class ACL(TabularAgent):
             "tau0": self.tau0,
             "local_decay": self.local_decay,
             "global_decay": self.global_decay,
-            "alpha": self.alpha,
-            "epsilon": self.epsilon,
+            "alpha": to_settings(self.alpha),
+            "epsilon": to_settings(self.epsilon),
             "selection": self.selection,
+            "cost": to_settings(self.cost),
+            "deposit": to_settings(self.deposit),
+            "tabu": self.tabu,
             "max_steps": self.max_steps,
             "seed": self.seed,
+        }
+
+    @classmethod
+    def _restored_parameters(cls, saved: dict[str, Any]) -> dict[str, Any]:
+        return {
+            **saved,
+            "alpha": schedule_from_settings("alpha", saved["alpha"]),
+            "epsilon": schedule_from_settings("epsilon", saved["epsilon"]),
+            "cost": cost_from_settings(saved["cost"]),
+            "deposit": deposit_from_settings(saved["deposit"]),
         }
 
     def measures(self, policy: IntArray) -> Row:
         """The sensitivity of the policy (3.48), averaged over the cells, in [0, 1]."""
         return {
-            "sensitivity": float(_mean_sensitivity(self._table, policy, self.alpha))
+            "sensitivity": float(
+                _mean_sensitivity(self._table, policy, self.pheromone.alpha)
+            )
         }
+
+    def _now(self, name: str) -> float:
+        """The value that a number or schedule has in the trial to come."""
+        setting: Scheduled = getattr(type(self), name)
+        return setting.at(self, self.trials)
+
+    def _costs(self, walk: Walk) -> FloatArray:
+        """J of each ant."""
+        if self.cost is None:
+            return walk.cost
+        return solution_costs(self.cost, walk.episodes())
+
+    def _allowed(
+        self, walk: Walk, solutions: Solutions, index: CellArray
+    ) -> BoolArray | None:
+        """U_q of each walking ant, less what is tabu; None: all actions."""
+        allowed = walk.allowed()
+        if not self.tabu:
+            return allowed
+        if allowed is None:
+            allowed = np.ones((walk.ants.size, self.n_actions), dtype=np.bool_)
+        return solutions.untried(walk.ants, index, allowed)
 
     def _explore(
         self, index: CellArray, degree: FloatArray, allowed: BoolArray | None
     ) -> IntArray:
-        return self._choose(index, degree, self._predict_rng, allowed)
+        self.pheromone.alpha, epsilon = self._now("alpha"), self._now("epsilon")
+        return self._choose(index, degree, epsilon, self._predict_rng, allowed)
 
     def _choose(
         self,
         index: CellArray,
         degree: FloatArray,
+        epsilon: float,
         rng: np.random.Generator,
         allowed: BoolArray | None,
     ) -> IntArray:
         return choose_actions(
-            self.selection, self.pheromone, index, degree, self.epsilon, rng, allowed
+            self.selection, self.pheromone, index, degree, epsilon, rng, allowed
         )
 
     def _empty_solutions(self) -> Solutions:

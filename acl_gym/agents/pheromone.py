@@ -34,6 +34,28 @@ class Solutions:
         """Forget all solutions."""
         self.length[:] = 0
 
+    def untried(
+        self, ants: IntArray, index: CellArray, allowed: BoolArray
+    ) -> BoolArray:
+        """The tabu list of §3.4.2: no action twice from the same state in a trial.
+
+        Each ant's own partial solution is its list, so that none has to be kept. An
+        ant that has tried all that is allowed may choose from all of it again (a
+        decision; the thesis is silent).
+
+        Args:
+            ants: who chooses, `(m,)`.
+            index: their cells, `(m, 1)`.
+            allowed: the actions they may take, `(m, n_actions)`.
+
+        Returns:
+            Those of `allowed` that the ant has not taken from its cell, `(m,
+            n_actions)`.
+        """
+        left = allowed.copy()
+        _strike_tried(ants, index, self.index, self.action, self.length, allowed, left)
+        return left
+
     def append(
         self, ants: IntArray, index: CellArray, degree: FloatArray, actions: IntArray
     ) -> None:
@@ -119,9 +141,9 @@ class Pheromone:
             )
 
     def global_update(
-        self, solutions: Solutions, costs: FloatArray, global_decay: float
+        self, solutions: Solutions, deposits: FloatArray, global_decay: float
     ) -> None:
-        """Deposit 1 / J along every solution, (4.15).
+        """Reinforce along every solution, (4.15).
 
         Within a solution a pair counts once, with its largest degree (4.13); the
         deposit is summed over ants, the decay weighs with the largest degree over
@@ -129,22 +151,21 @@ class Pheromone:
 
         Args:
             solutions: S_trial.
-            costs: J of each ant, `(n_ants,)`, > 0 and finite.
+            deposits: what each ant lays along its solution, `(n_ants,)`, > 0: in the
+                thesis 1 / J.
             global_decay: rho, in [0, 1].
 
         Raises:
-            ValueError: a cost is not positive and finite.
+            ValueError: a deposit is not positive and finite.
         """
-        with np.errstate(divide="ignore", over="ignore"):
-            deposits = 1.0 / costs
+        with np.errstate(over="ignore"):
             total = deposits.sum()
-        valid = np.isfinite(costs) & (costs > 0.0) & np.isfinite(deposits)
+        valid = np.isfinite(deposits) & (deposits > 0.0)
         if not (valid.all() and np.isfinite(total)):
-            ant = int(np.argmin(valid)) if not valid.all() else int(np.argmin(costs))
+            ant = int(np.argmin(valid)) if not valid.all() else int(np.argmax(deposits))
             raise ValueError(
-                "the cost of a solution must be > 0 and finite, because ants deposit "
-                f"1 / cost; got {costs[ant]} for ant {ant}. Use an environment whose "
-                "rewards are negative costs, or shift its rewards below zero."
+                "deposits must be > 0 and their sum finite, got "
+                f"{deposits[ant]} for ant {ant}; scale the cost, or check the deposit."
             )
         _deposit(
             solutions.index,
@@ -161,6 +182,30 @@ class Pheromone:
             self._touched,
             self._touched_by_ant,
         )
+
+
+@njit(cache=True)
+def _strike_tried(
+    ants: IntArray,
+    index: CellArray,
+    all_index: CellArray,
+    all_action: ActionArray,
+    length: IntArray,
+    allowed: BoolArray,
+    left: BoolArray,
+) -> None:
+    for j in range(ants.size):
+        ant = ants[j]
+        count = allowed[j].sum()
+        for t in range(length[ant]):
+            u = all_action[ant, t]
+            if all_index[ant, t, 0] == index[j, 0] and left[j, u]:
+                left[j, u] = False
+                count -= 1
+                if count == 0:
+                    # Begin the list of this cell anew: what follows counts again.
+                    left[j] = allowed[j]
+                    count = allowed[j].sum()
 
 
 @njit(cache=True)
@@ -213,7 +258,7 @@ def _deposit(
     degree: FloatArray,
     action: ActionArray,
     length: IntArray,
-    inverse_cost: FloatArray,
+    laid: FloatArray,
     global_decay: float,
     levels: FloatArray,
     stale: BoolArray,
@@ -243,7 +288,7 @@ def _deposit(
                 touched[n_touched] = pair
                 n_touched += 1
             union[pair] = max(union[pair], own[pair])
-            deposit[pair] += inverse_cost[ant] * own[pair]
+            deposit[pair] += laid[ant] * own[pair]
             own[pair] = 0.0
     for i in range(n_touched):
         pair = touched[i]

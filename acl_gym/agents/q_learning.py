@@ -33,7 +33,8 @@ class QLearning(TabularAgent):
         learning_rate: alpha_rl, in (0, 1].
         discount: gamma_rl, in [0, 1].
         epsilon: probability of a random action, in [0, 1].
-        max_steps: the longest an episode may last, >= 1.
+        max_steps: the longest an episode may last, >= 1. None takes the limit that the
+            environment is registered with, and 300 where it has none.
         seed: a run is a function of it; None draws one from the system.
         n_actions: only needed without an environment.
 
@@ -54,7 +55,7 @@ class QLearning(TabularAgent):
         learning_rate: float = 0.3,
         discount: float = 0.98,
         epsilon: float = 0.1,
-        max_steps: int = 300,
+        max_steps: int | None = None,
         seed: int | None = None,
         n_actions: int | None = None,
     ) -> None:

@@ -30,6 +30,9 @@ from acl_gym.partition import (
     partition_from_settings,
 )
 
+DEFAULT_MAX_STEPS = 300
+"""T of Table 5.2, where neither agent nor environment sets a limit."""
+
 
 class TabularAgent(PartitionPolicy):
     """An agent whose policy is the best entry of a (cell, action) table.
@@ -37,7 +40,8 @@ class TabularAgent(PartitionPolicy):
     Args:
         env: a vector environment with `Discrete` actions; each slot is one ant.
         partition: turns observations into cells and degrees.
-        max_steps: T, the longest an episode may last, >= 1.
+        max_steps: T, the longest an episode may last, >= 1. None takes the limit that
+            the environment is registered with, and 300 where it has none.
         seed: a run is a function of it; None draws one from the system.
 
     Attributes:
@@ -57,7 +61,7 @@ class TabularAgent(PartitionPolicy):
         env: VectorEnv[Any, Any, Any] | None,
         partition: Partition,
         *,
-        max_steps: int,
+        max_steps: int | None,
         seed: int | None,
         n_actions: int | None = None,
     ) -> None:
@@ -68,6 +72,8 @@ class TabularAgent(PartitionPolicy):
                 "env.single_observation_space, cells)."
             )
         self.partition = partition
+        if max_steps is None:
+            max_steps = time_limit(env) or DEFAULT_MAX_STEPS
         self._max_steps = validation.integer("max_steps", max_steps, at_least=1)
         if seed is not None:
             seed = validation.integer("seed", seed, at_least=0)
@@ -298,13 +304,19 @@ class TabularAgent(PartitionPolicy):
             shape = partition.n_cells, int(header["n_actions"])
             if arrays["table"].shape != shape or arrays["ranks"].shape != shape:
                 raise ValueError(f"its arrays must have shape {shape}")
-            agent = cls(None, partition, n_actions=shape[1], **header["parameters"])
+            parameters = cls._restored_parameters(header["parameters"])
+            agent = cls(None, partition, n_actions=shape[1], **parameters)
             agent._restore(header, arrays)
         except (KeyError, OverflowError, TypeError, ValueError) as error:
             raise ValueError(f"{path} is damaged: {error}.") from error
         if env is not None:
             agent.set_env(env)
         return agent
+
+    @classmethod
+    def _restored_parameters(cls, saved: dict[str, Any]) -> dict[str, Any]:
+        """Keyword arguments of the constructor from what `parameters` gave."""
+        return dict(saved)
 
     def _restore(self, header: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> None:
         """Take over what a file holds beside the constructor's arguments."""
@@ -332,3 +344,9 @@ class TabularAgent(PartitionPolicy):
         generators = (self.rng, self._predict_rng)
         for rng, state in zip(generators, header["generators"], strict=True):
             rng.bit_generator.state = state
+
+
+def time_limit(env: Any) -> int | None:
+    """The time limit an environment was registered or made with, None if it has none."""
+    limit = getattr(getattr(env, "spec", None), "max_episode_steps", None)
+    return int(limit) if limit and limit > 0 else None

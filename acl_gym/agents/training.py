@@ -7,6 +7,7 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
+from numpy.typing import NDArray
 from tqdm.auto import tqdm
 
 from acl_gym import validation
@@ -96,8 +97,12 @@ class Training:
         )
         return self._agent.in_trial
 
-    def end_trial(self) -> None:
-        """Count the trial, measure it (§3.6.1) and tell the callbacks."""
+    def end_trial(self, costs: NDArray[np.float64] | None = None) -> None:
+        """Count the trial, measure it (§3.6.1) and tell the callbacks.
+
+        Args:
+            costs: J of each ant; None takes the sums of the stage costs.
+        """
         agent, walk = self._agent, self._agent.walk
         steps = int(walk.length.sum())
         agent.num_timesteps += steps
@@ -108,7 +113,7 @@ class Training:
             "trial": agent.trials,
             "env_steps": agent.num_timesteps,
             "seconds": agent.seconds,
-            "ants_cost": float(walk.cost.mean()),
+            "ants_cost": float((walk.cost if costs is None else costs).mean()),
             "ants_success_rate": float(walk.success.mean()),
             "policy_variation": float(np.mean(policy != self._policy)),
             **agent.measures(policy),

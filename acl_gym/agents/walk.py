@@ -18,6 +18,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from acl_gym import validation
+from acl_gym.costs import Episodes
 from acl_gym.envs.control_env import ControlVectorEnv
 
 FloatArray = NDArray[np.float64]
@@ -38,6 +39,20 @@ class Step(NamedTuple):
     """Whether the episode ended in a terminal state."""
     finished: BoolArray
     """Whether the ant walks no further, for whatever reason."""
+
+
+class _Record:
+    """Observations, actions and stage costs of all slots, step by step."""
+
+    def __init__(self, observation: NDArray[Any]) -> None:
+        self.observations = [observation]
+        self.actions: list[IntArray] = []
+        self.costs: list[FloatArray] = []
+
+    def append(self, observation: NDArray[Any], actions: IntArray, reward: Any) -> None:
+        self.observations.append(observation)
+        self.actions.append(actions)
+        self.costs.append(-np.asarray(reward, dtype=np.float64))
 
 
 class Walk:
@@ -89,7 +104,10 @@ class Walk:
         self.action_mask: BoolArray | None = None
 
     def start(
-        self, seed: int | None = None, states: FloatArray | None = None
+        self,
+        seed: int | None = None,
+        states: FloatArray | None = None,
+        record: bool = False,
     ) -> NDArray[Any]:
         """Begin an episode in every slot.
 
@@ -97,6 +115,7 @@ class Walk:
             seed: seeds the environment; None continues its stream.
             states: initial states `(num_envs, ...)`, for environments that take
                 `options["state"]`; None draws them.
+            record: keep every step for `episodes`.
 
         Returns:
             The first observations, `(num_envs, ...)`.
@@ -115,7 +134,9 @@ class Walk:
         self.success = np.zeros(n, dtype=np.bool_)
         self.steps = 0
         self._stale = None
-        return np.asarray(observation)
+        observation = np.asarray(observation)
+        self._record: _Record | None = _Record(observation) if record else None
+        return observation
 
     def step(self, actions: IntArray) -> Step:
         """Let every walking ant take one action.
@@ -170,7 +191,28 @@ class Walk:
         if self.steps >= self.max_steps:
             self.ants = ants[:0]
             stopped = np.ones_like(stopped)
+        if self._record is not None:
+            self._record.append(observation, self._actions - self.first_action, reward)
         return Step(ants, observation, cost, reached, stopped)
+
+    def episodes(self) -> Episodes:
+        """What every slot has done since `start(record=True)`.
+
+        Raises:
+            ValueError: nothing was recorded.
+        """
+        record = self._record
+        if record is None or not record.actions:
+            raise ValueError(
+                "no steps were recorded; call start(record=True), then step."
+            )
+        return Episodes(
+            np.stack(record.observations),
+            np.stack(record.actions),
+            np.stack(record.costs),
+            self.length,
+            self.success,
+        )
 
     def allowed(self) -> BoolArray | None:
         """The actions that each walking ant may take, `(m, n_actions)`; None: all.

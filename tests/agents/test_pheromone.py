@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from acl_gym.agents import pheromone as module
-from acl_gym.agents.pheromone import Pheromone, Solutions
+from acl_gym.agents.pheromone import Pheromone, Solutions, _strike_tried
 from tests.agents import reference_colony as reference
 
 Array = np.ndarray
@@ -62,7 +62,8 @@ class Trial:
 
     def deposit(self, order: Array | None = None) -> None:
         order = np.arange(len(self.length)) if order is None else order
-        self.pheromone.global_update(self.packed(order), self.costs[order], self.rho)
+        deposits = 1.0 / self.costs[order]
+        self.pheromone.global_update(self.packed(order), deposits, self.rho)
 
     def decay(self, t: int, order: Array | None = None) -> None:
         order = np.arange(len(self.length)) if order is None else order
@@ -219,7 +220,7 @@ def test_levels_fall_below_a_tau0_that_exceeds_every_deposit() -> None:
     solutions = Solutions(1, 1, 1)
     one = np.zeros((1, 1), dtype=np.int32)
     solutions.append(np.array([0]), one, np.ones((1, 1)), np.array([0]))
-    pheromone.global_update(solutions, np.array([10.0]), 0.5)
+    pheromone.global_update(solutions, np.array([0.1]), 0.5)
     assert pheromone.levels[0, 0] == pytest.approx(0.5 * 2 / 10 + 0.5 / 10)
     assert pheromone.levels[0, 0] < pheromone.tau0
 
@@ -240,7 +241,7 @@ def test_a_pair_counts_once_with_its_largest_degree() -> None:
     for weight in (0.2, 0.9, 0.5):
         degree = np.array([[weight, 1 - weight]])
         solutions.append(np.array([0]), index, degree, np.array([1]))
-    pheromone.global_update(solutions, np.array([4.0]), 0.1)
+    pheromone.global_update(solutions, np.array([0.25]), 0.1)
     expected = np.ones((2, 2))
     expected[:, 1] = [(1 - 0.1 * d) + 0.1 * d / 4 for d in (0.9, 0.8)]
     np.testing.assert_allclose(pheromone.levels, expected, rtol=1e-15)
@@ -253,7 +254,7 @@ def test_the_decay_of_a_deposit_weighs_with_the_largest_degree_of_all_ants() -> 
     index = np.array([[0, 1], [1, 0]], dtype=np.int32)
     degree = np.array([[0.25, 0.75], [0.5, 0.5]])
     solutions.append(np.array([0, 1]), index, degree, np.array([0, 0]))
-    pheromone.global_update(solutions, np.array([2.0, 5.0]), 0.2)
+    pheromone.global_update(solutions, np.array([0.5, 0.2]), 0.2)
     expected = [
         (1 - 0.2 * 0.5) + 0.2 * (0.25 / 2 + 0.5 / 5),
         (1 - 0.2 * 0.75) + 0.2 * (0.75 / 2 + 0.5 / 5),
@@ -270,33 +271,69 @@ def test_scratch_and_solutions_leave_nothing_behind(trial: Trial) -> None:
     results = []
     for _ in range(2):
         trial.pheromone.set_levels(start)
-        trial.pheromone.global_update(solutions, trial.costs, trial.rho)
+        trial.pheromone.global_update(solutions, 1.0 / trial.costs, trial.rho)
         results.append(trial.tau.copy())
     np.testing.assert_array_equal(results[0], results[1])
     solutions.clear()
-    trial.pheromone.global_update(solutions, trial.costs, 1.0)
+    trial.pheromone.global_update(solutions, 1.0 / trial.costs, 1.0)
     np.testing.assert_array_equal(trial.tau, results[1])
 
 
-@pytest.mark.parametrize("cost", [0.0, -0.0, -3.5, np.nan, np.inf, -np.inf])
-def test_a_cost_that_cannot_be_inverted_is_refused(cost: float) -> None:
+@pytest.mark.parametrize("deposit", [0.0, -0.0, -3.5, np.nan, np.inf, -np.inf])
+def test_a_deposit_that_is_none_is_refused(deposit: float) -> None:
     pheromone = Pheromone(2, 2, tau0=0.5, alpha=1.0)
     solutions = Solutions(3, 1, 1)
     index = np.zeros((3, 1), dtype=np.int32)
     solutions.append(np.arange(3), index, np.ones((3, 1)), np.zeros(3, dtype=np.int64))
-    with pytest.raises(ValueError, match=r"> 0 and finite.*ant 1\. Use") as error:
-        pheromone.global_update(solutions, np.array([1.0, cost, 2.0]), 0.1)
-    assert f"got {cost} " in str(error.value)
+    with pytest.raises(ValueError, match=r"> 0 and their sum finite.*ant 1") as error:
+        pheromone.global_update(solutions, np.array([1.0, deposit, 2.0]), 0.1)
+    assert f"got {deposit} " in str(error.value)
     assert (pheromone.levels == 0.5).all()
 
 
-def test_a_cost_whose_inverse_overflows_is_refused() -> None:
-    pheromone = Pheromone(1, 2, tau0=0.5, alpha=1.0)
-    solutions = Solutions(1, 1, 1)
-    index = np.zeros((1, 1), dtype=np.int32)
-    solutions.append(np.arange(1), index, np.ones((1, 1)), np.array([1]))
-    with pytest.raises(ValueError, match="ant 0"):
-        pheromone.global_update(solutions, np.array([1e-310]), 0.1)
+def walked(pairs: list[tuple[int, int]]) -> Solutions:
+    """The solution of one ant: cells and actions."""
+    solutions = Solutions(1, max(len(pairs), 1), 1)
+    for cell, action in pairs:
+        solutions.append(
+            np.array([0]),
+            np.array([[cell]], dtype=np.int32),
+            np.ones((1, 1)),
+            np.array([action]),
+        )
+    return solutions
+
+
+Pairs = st.lists(st.tuples(st.integers(0, 2), st.integers(0, 2)), max_size=20)
+
+
+@given(Pairs, st.integers(0, 2), st.lists(st.booleans(), min_size=3, max_size=3))
+def test_the_tabu_list_is_that_of_a_list_per_state(
+    pairs: list[tuple[int, int]], cell: int, mask: list[bool]
+) -> None:
+    allowed = np.array([mask])
+    left = set(np.flatnonzero(allowed[0]).tolist())
+    everything = set(left)
+    for other, action in pairs:
+        if other == cell and action in left:
+            left.remove(action)
+            left = left or set(everything)
+    one = np.array([0])
+    untried = walked(pairs).untried(one, np.array([[cell]], dtype=np.int32), allowed)
+    assert set(np.flatnonzero(untried[0]).tolist()) == left
+    np.testing.assert_array_equal(allowed[0], mask)  # untouched
+    plain = allowed.copy()
+    solutions = walked(pairs)
+    _strike_tried.py_func(
+        one,
+        np.array([[cell]]),
+        solutions.index,
+        solutions.action,
+        solutions.length,
+        allowed,
+        plain,
+    )
+    np.testing.assert_array_equal(plain, untried)
 
 
 @given(trials())
@@ -375,6 +412,6 @@ def test_every_changed_cell_becomes_stale_and_no_other() -> None:
 def test_deposits_whose_sum_overflows_are_refused() -> None:
     pheromone = Pheromone(3, 2, 1.0, 3.0)
     solutions = Solutions(50, 1, 1)
-    with pytest.raises(ValueError, match="cost of a solution must be > 0 and finite"):
-        pheromone.global_update(solutions, np.full(50, 1e-307), 0.5)
+    with pytest.raises(ValueError, match="their sum finite"):
+        pheromone.global_update(solutions, np.full(50, 1e307), 0.5)
     assert (pheromone.levels == 1.0).all()

@@ -79,7 +79,8 @@ def as_callbacks(callback: Callbacks) -> list[Callback]:
 class PolicyEvaluation(Callback):
     """Evaluates the policy every few trials, and keeps the best one.
 
-    Adds `policy_cost` (3.47) and `success_rate` to the trial's row. Evaluation draws
+    Adds `policy_cost` (3.47) and `success_rate` to the trial's row; the cost is that
+    which the agent learns to lower, `agent.cost` where it has one. Evaluation draws
     nothing from the agent's generator and its time is not counted: learning is the
     same with it and without it.
 
@@ -138,7 +139,12 @@ class PolicyEvaluation(Callback):
         if policy is agent:
             policy = agent.policy
         result = evaluate_policy_cost(
-            policy, self.env, self.states, max_steps=self.max_steps, seed=self.seed
+            policy,
+            self.env,
+            self.states,
+            max_steps=self.max_steps,
+            seed=self.seed,
+            cost=getattr(agent, "cost", None),
         )
         row["policy_cost"] = result.cost
         row["success_rate"] = result.success_rate

@@ -261,7 +261,8 @@ class RiseTime(_Response):
             progress = np.where(span == 0.0, 1.0, 1.0 - error / span)
         begin = _first_crossing(progress, self.low)
         end = _first_crossing(progress, self.high)
-        steps = np.where(np.isfinite(end), end - begin, episodes.lengths)
+        steps = episodes.lengths.astype(np.float64)
+        np.subtract(end, begin, out=steps, where=np.isfinite(end))
         return np.asarray(self.sampling_time * steps)
 
 

@@ -347,6 +347,7 @@ class TabularAgent(PartitionPolicy):
 
 
 def time_limit(env: Any) -> int | None:
-    """The time limit an environment was registered or made with, None if it has none."""
-    limit = getattr(getattr(env, "spec", None), "max_episode_steps", None)
+    """The time limit that an environment was made or registered with; None: none."""
+    own = getattr(getattr(env, "unwrapped", None), "max_episode_steps", None)
+    limit = own or getattr(getattr(env, "spec", None), "max_episode_steps", None)
     return int(limit) if limit and limit > 0 else None

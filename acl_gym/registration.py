@@ -11,6 +11,10 @@ ENVIRONMENTS = {
         "acl_gym.envs.pendulum:PendulumEnv",
         "acl_gym.envs.pendulum:PendulumVectorEnv",
     ),
+    "acl_gym/Navigation-v0": (
+        "acl_gym.envs.navigation:NavigationEnv",
+        "acl_gym.envs.navigation:NavigationVectorEnv",
+    ),
 }
 
 

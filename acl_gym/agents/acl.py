@@ -37,7 +37,8 @@ class ACL(TabularAgent):
 
     Args:
         env: a vector environment with `Discrete` actions; its slots are the M ants.
-        partition: turns observations into cells and degrees.
+        partition: turns observations into cells and degrees; None takes
+            `automatic_partition(env)`.
         tau0: initial pheromone level tau_0, > 0. Levels never fall below it if it is
             at most 1 / J_max (the proof of Proposition 4.3; its text asks for
             rho / J_max, which Table 5.2 exceeds). Where J_max is known and tau0 is
@@ -75,7 +76,7 @@ class ACL(TabularAgent):
     def __init__(
         self,
         env: VectorEnv[Any, Any, Any] | None,
-        partition: Partition,
+        partition: Partition | None = None,
         *,
         tau0: float = 1e-4,
         local_decay: float = 0.01,
@@ -96,7 +97,7 @@ class ACL(TabularAgent):
         super().__init__(
             env, partition, max_steps=max_steps, seed=seed, n_actions=n_actions
         )
-        self.pheromone = Pheromone(partition.n_cells, self.n_actions, tau0, alpha)
+        self.pheromone = Pheromone(self.partition.n_cells, self.n_actions, tau0, alpha)
         self._solutions: Solutions | None = None
         self._warn_if_tau0_is_high()
 

@@ -19,7 +19,8 @@ if TYPE_CHECKING:
     from acl_gym.callbacks import Callback, PolicyEvaluation
     from acl_gym.envs.wrappers import ScaledObservation, ScaledVectorObservation
     from acl_gym.evaluation import PolicyCost, evaluate_policy_cost
-    from acl_gym.partition import Crisp, Fuzzy, Partition
+    from acl_gym.partition import Crisp, Discrete, Fuzzy, Partition
+    from acl_gym.partition.automatic import automatic_partition
 
 __version__ = "0.1.0"
 
@@ -29,6 +30,7 @@ _PUBLIC = {
     "ACL": "acl_gym.agents.acl",
     "Callback": "acl_gym.callbacks",
     "Crisp": "acl_gym.partition",
+    "Discrete": "acl_gym.partition",
     "Fuzzy": "acl_gym.partition",
     "Partition": "acl_gym.partition",
     "PolicyCost": "acl_gym.evaluation",
@@ -37,6 +39,7 @@ _PUBLIC = {
     "ScaledObservation": "acl_gym.envs.wrappers",
     "ScaledVectorObservation": "acl_gym.envs.wrappers",
     "VectorEnvAdapter": "acl_gym.agents.sb3",
+    "automatic_partition": "acl_gym.partition.automatic",
     "evaluate_policy_cost": "acl_gym.evaluation",
     "fuzzy_q_iteration": "acl_gym.agents.q_iteration",
 }
@@ -45,6 +48,7 @@ __all__ = [
     "ACL",
     "Callback",
     "Crisp",
+    "Discrete",
     "Fuzzy",
     "Partition",
     "PolicyCost",
@@ -54,6 +58,7 @@ __all__ = [
     "ScaledVectorObservation",
     "VectorEnvAdapter",
     "__version__",
+    "automatic_partition",
     "evaluate_policy_cost",
     "fuzzy_q_iteration",
 ]

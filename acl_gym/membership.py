@@ -1,6 +1,8 @@
-"""The kernels of partitions: membership functions (4.7) and their products (4.8)."""
+"""The kernels of partitions: membership functions (4.7), products (4.8), integers."""
 
 from __future__ import annotations
+
+from typing import Any
 
 import numpy as np
 from numba import njit
@@ -105,3 +107,42 @@ def locate(
                 degree[j, 2 * c + 1] = weight * fraction
             corners *= 2
     return -1
+
+
+@njit(cache=True)
+def locate_discrete(
+    states: NDArray[Any],
+    slots: IntArray,
+    sizes: IntArray,
+    starts: IntArray,
+    index: CellArray,
+    degree: FloatArray,
+) -> tuple[int, int]:
+    """Fill rows of `index` and `degree` with the cells of integer states.
+
+    Args:
+        states: int64 or float64 `(n, d)`.
+        slots: which rows of `states` to locate, `(m,)`.
+        sizes: how many values each variable has, `(d,)`.
+        starts: the smallest of them, `(d,)`.
+        index: `(>= m, 1)`, receives the cells.
+        degree: `(>= m, 1)`, receives ones.
+
+    Returns:
+        A slot and a variable whose value is not whole or not in range, or (-1, -1).
+    """
+    for j in range(slots.size):
+        slot = slots[j]
+        cell = 0
+        for axis in range(sizes.size):
+            x = states[slot, axis]
+            # False for NaN; only after it is `int` sure to be exact.
+            if not starts[axis] <= x < starts[axis] + sizes[axis]:
+                return int(slot), axis
+            value = int(x)
+            if value != x:
+                return int(slot), axis
+            cell = cell * sizes[axis] + value - starts[axis]
+        index[j, 0] = cell
+        degree[j, 0] = 1.0
+    return -1, -1

@@ -43,7 +43,8 @@ class ACL(TabularAgent):
 
     Args:
         env: a vector environment with `Discrete` actions; its slots are the M ants.
-        partition: turns observations into cells and degrees.
+        partition: turns observations into cells and degrees; None takes
+            `automatic_partition(env)`.
         tau0: initial pheromone level tau_0, > 0. Levels never fall below it if it is
             at most 1 / J_max (the proof of Proposition 4.3; its text asks for
             rho / J_max, which Table 5.2 exceeds). Where J_max is known and tau0 is
@@ -93,7 +94,7 @@ class ACL(TabularAgent):
     def __init__(
         self,
         env: VectorEnv[Any, Any, Any] | None,
-        partition: Partition,
+        partition: Partition | None = None,
         *,
         tau0: float = 1e-4,
         local_decay: float = 0.01,

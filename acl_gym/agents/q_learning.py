@@ -29,7 +29,8 @@ class QLearning(TabularAgent):
 
     Args:
         env: a vector environment with `Discrete` actions.
-        partition: turns observations into cells and degrees.
+        partition: turns observations into cells and degrees; None takes
+            `automatic_partition(env)`.
         learning_rate: alpha_rl, in (0, 1].
         discount: gamma_rl, in [0, 1].
         epsilon: probability of a random action, in [0, 1].
@@ -50,7 +51,7 @@ class QLearning(TabularAgent):
     def __init__(
         self,
         env: VectorEnv[Any, Any, Any] | None,
-        partition: Partition,
+        partition: Partition | None = None,
         *,
         learning_rate: float = 0.3,
         discount: float = 0.98,
@@ -65,7 +66,7 @@ class QLearning(TabularAgent):
         super().__init__(
             env, partition, max_steps=max_steps, seed=seed, n_actions=n_actions
         )
-        self._values: FloatArray = np.zeros((partition.n_cells, self.n_actions))
+        self._values: FloatArray = np.zeros((self.partition.n_cells, self.n_actions))
 
     def learn(
         self,

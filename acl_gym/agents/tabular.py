@@ -19,16 +19,11 @@ from acl_gym.agents.policy import (
     random_ranks,
 )
 from acl_gym.agents.selection import greedy_actions
-from acl_gym.agents.walk import Walk
+from acl_gym.agents.walk import Walk, require_vector_env
 from acl_gym.callbacks import Callbacks, Row
 from acl_gym.membership import CellArray, FloatArray, IntArray
-from acl_gym.partition import (
-    Crisp,
-    Fuzzy,
-    Partition,
-    check_cells,
-    partition_from_settings,
-)
+from acl_gym.partition import Partition, check_cells, partition_from_settings
+from acl_gym.partition.automatic import automatic_partition
 
 DEFAULT_MAX_STEPS = 300
 """T of Table 5.2, where neither agent nor environment sets a limit."""
@@ -39,7 +34,8 @@ class TabularAgent(PartitionPolicy):
 
     Args:
         env: a vector environment with `Discrete` actions; each slot is one ant.
-        partition: turns observations into cells and degrees.
+        partition: turns observations into cells and degrees; None takes
+            `automatic_partition(env)`.
         max_steps: T, the longest an episode may last, >= 1. None takes the limit that
             the environment is registered with, and 300 where it has none.
         seed: a run is a function of it; None draws one from the system.
@@ -59,17 +55,24 @@ class TabularAgent(PartitionPolicy):
     def __init__(
         self,
         env: VectorEnv[Any, Any, Any] | None,
-        partition: Partition,
+        partition: Partition | None = None,
         *,
         max_steps: int | None,
         seed: int | None,
         n_actions: int | None = None,
     ) -> None:
+        if partition is None:
+            if env is None:
+                raise ValueError(
+                    "an agent needs a partition, or env to choose one for; got neither."
+                )
+            require_vector_env(env)
+            partition = automatic_partition(env)
         if not isinstance(partition, Partition):
             raise TypeError(
                 "partition must be a Partition such as Crisp or Fuzzy, got "
                 f"{type(partition).__name__}; build one with Fuzzy.from_box("
-                "env.single_observation_space, cells)."
+                "env.single_observation_space, cells), or leave it out."
             )
         self.partition = partition
         if max_steps is None:
@@ -173,7 +176,8 @@ class TabularAgent(PartitionPolicy):
 
         Raises:
             TypeError: `env` is not a vector environment.
-            ValueError: its actions are not those of the table.
+            ValueError: its actions are not those of the table, or its observations
+                not those of the partition.
         """
         walk = Walk(env, self.max_steps)
         if walk.first_action != self.first_action:
@@ -189,6 +193,7 @@ class TabularAgent(PartitionPolicy):
                 f"env must have {self._n_actions} actions as the table has, got "
                 f"{walk.n_actions}."
             )
+        self.partition.check_space(walk.env.single_observation_space)
         self._n_actions = walk.n_actions
         self.first_action = walk.first_action
         self.env = env = walk.env
@@ -234,7 +239,7 @@ class TabularAgent(PartitionPolicy):
         """`(index, degree)` of the walking ants, valid until the next call."""
         m = ants.size
         self.partition.locate(observation, ants, self._index, self._degree)
-        if not isinstance(self.partition, (Crisp, Fuzzy)):
+        if not self.partition.checked:
             check_cells(self._index[:m], self.partition)
         return self._index[:m], self._degree[:m]
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from acl_gym import membership as module
 from acl_gym.envs.pendulum import Pendulum
 from acl_gym.partition import Crisp, Fuzzy, partition_from_settings
-from tests import reference_partition as reference
+from tests.partition import reference_partition as reference
 
 Grid = tuple[list[np.ndarray], list[float | None], np.ndarray]
 TWO_PI = 2 * np.pi

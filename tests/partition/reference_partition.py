@@ -1,5 +1,6 @@
 """Memberships and degrees of fulfilment, written out from (4.7) and (4.8)."""
 
+import itertools
 from collections.abc import Sequence
 
 import numpy as np
@@ -57,6 +58,12 @@ def dense(partition: Partition, states: FloatArray) -> FloatArray:
     for row, cells, degrees in zip(beta, index, degree, strict=True):
         np.add.at(row, cells, degrees)
     return beta
+
+
+def discrete_states(sizes: Sequence[int], starts: Sequence[int]) -> FloatArray:
+    """All combinations of values in the order of the cells, the last one fastest."""
+    ranges = [range(a, a + n) for n, a in zip(sizes, starts, strict=True)]
+    return np.array(list(itertools.product(*ranges)))
 
 
 @st.composite

@@ -1,13 +1,7 @@
-"""Partitions: a batch of states becomes `(index, degree)`, all that an agent sees.
-
-Every state belongs to k cells, to each by a degree >= 0, and the degrees of a state
-sum to 1. A crisp partition (§4.2) has k = 1, a fuzzy one (§4.3) k = 2^d. Equations
-written over `(index, degree)` therefore hold for both.
-"""
+"""Grids over real variables: crisp bins (4.2) and triangular memberships (4.7)."""
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Iterable, Sequence
 from numbers import Integral
 from typing import Any, ClassVar, Self
@@ -18,80 +12,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from acl_gym import validation
 from acl_gym.membership import CellArray, FloatArray, IntArray, locate
+from acl_gym.partition.base import Partition
 
 
-class Partition(ABC):
-    """A map from states to cells with degrees."""
-
-    n_cells: int
-    """How many cells there are: the rows of an agent's table."""
-
-    cells_per_state: int
-    """k, how many cells a state belongs to at most."""
-
-    state_ndim: int = 1
-    """Axes of the array that is one state."""
-
-    @abstractmethod
-    def locate(
-        self,
-        states: NDArray[Any],
-        slots: IntArray,
-        index: CellArray,
-        degree: FloatArray,
-    ) -> None:
-        """Locate the states of some slots, without allocating.
-
-        Args:
-            states: the observations of all slots, `(n, ...)`.
-            slots: which rows of `states` to locate, shape `(m,)`.
-            index: int32 `(>= m, k)`; row j receives the cells of `states[slots[j]]`.
-            degree: float64 `(>= m, k)`; row j receives their degrees.
-
-        Raises:
-            ValueError: a state is not finite or does not belong to the partition.
-        """
-
-    @abstractmethod
-    def settings(self) -> dict[str, Any]:
-        """What `partition_from_settings` needs to build this partition again."""
-
-    @abstractmethod
-    def cell_states(self) -> NDArray[Any]:
-        """The state that stands for each cell, `(n_cells, ...)`."""
-
-    def __call__(self, states: ArrayLike) -> tuple[CellArray, FloatArray]:
-        """Return `(index, degree)`, each `(n, k)`, for a batch of states `(n, ...)`.
-
-        Raises:
-            ValueError: a state is not finite or does not belong to the partition.
-        """
-        try:
-            batch = np.asarray(states)
-        except ValueError as error:
-            raise ValueError(f"states must be an array: {error}.") from error
-        n = len(batch) if batch.ndim else 0
-        index = np.zeros((n, self.cells_per_state), dtype=np.int32)
-        degree = np.zeros((n, self.cells_per_state))
-        self.locate(batch, np.arange(n), index, degree)
-        check_cells(index, self)
-        return index, degree
-
-
-def check_cells(index: CellArray, partition: Partition) -> None:
-    """Hold a partition to its own number of cells; tables are indexed by them.
-
-    Raises:
-        ValueError: a cell is out of range.
-    """
-    if index.size and (index.min() < 0 or index.max() >= partition.n_cells):
-        raise ValueError(
-            f"{type(partition).__name__}.locate must give cells in "
-            f"0..{partition.n_cells - 1}, got {index.min()} to {index.max()}."
-        )
-
-
-class _Grid(Partition):
+class Grid(Partition):
     """A product of axes, each with strictly increasing centres.
 
     Args:
@@ -106,6 +30,7 @@ class _Grid(Partition):
     """
 
     fuzzy: ClassVar[bool]
+    checked = True
 
     def __init__(
         self,
@@ -206,6 +131,20 @@ class _Grid(Partition):
             periods.append(float(high[axis] - low[axis]) if is_round else None)
         return cls(centres, periods)
 
+    def check_space(self, space: spaces.Space[Any]) -> None:
+        """Refuse what is not a one-dimensional Box of as many variables.
+
+        Raises:
+            ValueError: the observations of `space` are not states of the partition.
+        """
+        dimensions = len(self.centres)
+        if not isinstance(space, spaces.Box) or space.shape != (dimensions,):
+            raise ValueError(
+                f"{self!r} takes observations from a Box of shape ({dimensions},), "
+                f"got {space}; build the partition from env.single_observation_space, "
+                "or let automatic_partition(env) do it."
+            )
+
     def refine(self, axis: int, centres: ArrayLike) -> Self:
         """Return the partition with more centres along one axis.
 
@@ -285,7 +224,7 @@ class _Grid(Partition):
         return f"{type(self).__name__}({shape} cells, circular={rounds})"
 
 
-class Crisp(_Grid):
+class Crisp(Grid):
     """Crisp bins: a state belongs wholly to the nearest centre, (4.2).
 
     A state half-way between two centres belongs to the upper one. See `from_box` for
@@ -299,7 +238,7 @@ class Crisp(_Grid):
     fuzzy = False
 
 
-class Fuzzy(_Grid):
+class Fuzzy(Grid):
     """Triangular membership functions around the centres, (4.7)-(4.9).
 
     The degree of a cell is the product of the memberships of the variables; a state
@@ -312,22 +251,6 @@ class Fuzzy(_Grid):
     """
 
     fuzzy = True
-
-
-def partition_from_settings(settings: dict[str, Any]) -> Partition:
-    """Build the partition that `settings` describes.
-
-    Raises:
-        ValueError: `settings` describe no partition of this package.
-    """
-    kinds: dict[str, type[_Grid]] = {"Crisp": Crisp, "Fuzzy": Fuzzy}
-    try:
-        kind = kinds[settings["type"]]
-        return kind(settings["centres"], settings["periods"])
-    except (KeyError, TypeError) as error:
-        raise ValueError(
-            f"settings must describe one of {sorted(kinds)}, got {settings!r}."
-        ) from error
 
 
 def _as_float64(states: NDArray[Any]) -> FloatArray:

@@ -7,6 +7,14 @@ import gymnasium as gym
 # id: (single environment, native vector environment). No time limit is registered:
 # `max_episode_steps` is a keyword of `make` and `make_vec`.
 ENVIRONMENTS = {
+    "acl_gym/GridSearch1D-v0": (
+        "acl_gym.envs.grid_search:GridSearch1DEnv",
+        "acl_gym.envs.grid_search:GridSearch1DVectorEnv",
+    ),
+    "acl_gym/GridSearch2D-v0": (
+        "acl_gym.envs.grid_search:GridSearch2DEnv",
+        "acl_gym.envs.grid_search:GridSearch2DVectorEnv",
+    ),
     "acl_gym/Pendulum-v0": (
         "acl_gym.envs.pendulum:PendulumEnv",
         "acl_gym.envs.pendulum:PendulumVectorEnv",

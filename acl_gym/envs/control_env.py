@@ -58,6 +58,7 @@ class ControlEnv(gym.Env[Observation, np.int64]):
         self.action_space = self.system.action_space
         self._n_actions = int(self.system.action_space.n)
         self._renderer: Renderer | None = None
+        self._table: FloatArray | None = None
         self._state: FloatArray | None = None
         self._finished = False
 
@@ -69,10 +70,13 @@ class ControlEnv(gym.Env[Observation, np.int64]):
         Args:
             seed: seeds the generator of initial states; None continues its stream.
             options: `{"state": array}`, shape `(state_size,)`, sets the state
-                instead of drawing it.
+                instead of drawing it; a state of one variable may be a number. Any
+                state of the system is allowed, also a goal: the episode then ends
+                when a step leads to a goal.
 
         Returns:
-            The first observation and an empty info.
+            The first observation and the info: empty, or `"action_mask"`, a bool
+            array `(n_actions,)`, where the system offers some actions only.
 
         Raises:
             ValueError: the state or a key of `options` is not valid.
@@ -91,7 +95,7 @@ class ControlEnv(gym.Env[Observation, np.int64]):
         self._action: int | None = None
         if self.render_mode == "human":
             self.render()
-        return self.system.observe(state)[0], {}
+        return self.system.observe(state)[0], self._info(state)
 
     def step(
         self, action: np.int64 | int
@@ -100,7 +104,8 @@ class ControlEnv(gym.Env[Observation, np.int64]):
 
         Returns:
             `(observation, reward, terminated, truncated, info)` with reward
-            = -(stage cost) and `terminated` once the goal is reached.
+            = -(stage cost), `terminated` once the goal is reached and the info that
+            `reset` describes.
 
         Raises:
             ResetNeeded: there was no `reset`, or the goal has been reached since.
@@ -121,7 +126,8 @@ class ControlEnv(gym.Env[Observation, np.int64]):
         if self.render_mode == "human":
             self.render()
         observation = self.system.observe(self._state)[0]
-        return observation, float(rewards[0]), self._finished, False, {}
+        info = self._info(self._state)
+        return observation, float(rewards[0]), self._finished, False, info
 
     def render(self) -> Frame | None:
         """A frame `(480, 480, 3)` for "rgb_array"; shows it for "human".
@@ -142,14 +148,34 @@ class ControlEnv(gym.Env[Observation, np.int64]):
             self._renderer = Renderer(self.system, self.metadata["render_fps"])
         state = self._state[:, 0]
         if self.render_mode == "human":
-            self._renderer.show(state, self._action)
+            self._renderer.show(state, self._action, self._table)
             return None
-        return self._renderer.frame(state, self._action)
+        return self._renderer.frame(state, self._action, self._table)
+
+    def show_table(self, table: FloatArray | None) -> None:
+        """Draw a table of (state, action) values over the frames from now on.
+
+        Args:
+            table: `(n_states, n_actions)`, such as the pheromone of a colony. The
+                array is kept, not copied, so that frames follow it as it changes;
+                None draws no table any more.
+
+        Raises:
+            ValueError: the system draws no tables, or the table does not fit it.
+            TypeError: it is not a NumPy array.
+        """
+        if table is not None:
+            self.system.check_table(table)
+        self._table = table
 
     def close(self) -> None:
         """Close the window if there is one."""
         if self._renderer is not None:
             self._renderer.close()
+
+    def _info(self, state: FloatArray) -> dict[str, Any]:
+        mask = self.system.action_mask(state)
+        return {} if mask is None else {"action_mask": mask[0]}
 
 
 class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
@@ -207,6 +233,7 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
         self.action_space = batch_space(self.single_action_space, self.num_envs)
         self._n_actions = int(self.system.action_space.n)
         self._renderer: Renderer | None = None
+        self._table: FloatArray | None = None
         self._actions: IntArray | None = None  # the last ones, to be drawn
 
         self._state: FloatArray | None = None  # (state_size, num_envs)
@@ -225,7 +252,8 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
             options: any of
 
                 - `"state"`: array `(num_envs, state_size)`, sets the states instead
-                  of drawing them (rows outside the mask are not looked at);
+                  of drawing them (rows outside the mask are not looked at); states
+                  of one variable may have shape `(num_envs,)`, goals are allowed;
                 - `"reset_mask"`: bool array `(num_envs,)`, the slots to reset, the
                   others are left as they are;
                 - `"finished"`: `"wait"`, in any autoreset mode: from now to the next
@@ -235,7 +263,9 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
                   trial of a colony is this, and costs nothing for idle slots.
 
         Returns:
-            The observations of all slots, `(num_envs, ...)`, and an empty info.
+            The observations of all slots, `(num_envs, ...)`, and the infos: empty,
+            or, where the system offers some actions only, `"action_mask"`, a bool
+            array `(num_envs, n_actions)` of the states that all slots are in now.
 
         Raises:
             ValueError: a state, the mask or a key of `options` is not valid.
@@ -255,7 +285,7 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
             self._wait_when_finished = False
         self._wait_when_finished |= "finished" in options
         self._start(slots, states)
-        return self._observe(), {}
+        return self._observe(), self._infos()
 
     def step(self, actions: ArrayLike) -> StepResult:
         """Apply one action to each slot.
@@ -292,18 +322,19 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
         if restarting is not None:
             self._start(restarting, None)
 
-        infos: dict[str, Any] = {}
+        last: dict[str, Any] = {}
         finished = terminated | truncated
         if finished.any():
             if (
                 self.autoreset_mode is AutoresetMode.SAME_STEP
                 and not self._wait_when_finished
             ):
-                infos = self._final_infos(finished)
+                last = self._final_infos(finished)
                 self._start(np.flatnonzero(finished), None)
             else:
                 self._finished |= finished
                 self._walking = np.flatnonzero(~self._finished)
+        infos = {**last, **self._infos()}
         return self._observe(), rewards, terminated, truncated, infos
 
     def render(self) -> tuple[Frame, ...] | None:
@@ -329,9 +360,16 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
                 None
                 if self._actions is None or started[slot] or idle[slot]
                 else int(self._actions[slot]),
+                self._table,
             )
             for slot in range(self.num_envs)
         )
+
+    def show_table(self, table: FloatArray | None) -> None:
+        """Draw a table over the frames from now on; see `ControlEnv.show_table`."""
+        if table is not None:
+            self.system.check_table(table)
+        self._table = table
 
     def with_slots(self, num_envs: int) -> Self:
         """Make a new environment of the same system and limits with other slots."""
@@ -411,12 +449,23 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
         observations = self._observe()
         for slot in np.flatnonzero(finished):
             final_obs[slot] = observations[slot]
+        final_info = self._infos()
+        if final_info:
+            final_info["action_mask"][~finished] = False
+            final_info["_action_mask"] = finished.copy()
         return {
             "final_obs": final_obs,
             "_final_obs": finished.copy(),
-            "final_info": {},
+            "final_info": final_info,
             "_final_info": finished.copy(),
         }
+
+    def _infos(self) -> dict[str, Any]:
+        mask = self.system.action_mask(self._states)
+        if mask is None:
+            return {}
+        present = np.ones(self.num_envs, dtype=np.bool_)
+        return {"action_mask": mask, "_action_mask": present}
 
     @property
     def states(self) -> FloatArray:
@@ -443,6 +492,8 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
                 "options['state'] must hold one row for each slot, shape "
                 f"({self.num_envs}, ...), got shape {rows.shape}."
             )
+        if rows.ndim == 1 and self._state is not None and len(self._state) == 1:
+            rows = rows[:, None]
         if self._state is not None and rows.shape == (current := self.states).shape:
             # Rows outside the mask may hold anything, so they are not looked at.
             current[slots] = rows[slots]

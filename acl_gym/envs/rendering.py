@@ -45,20 +45,25 @@ class Renderer:
             ) from error
         return pygame
 
-    def frame(self, state: FloatArray, action: int | None) -> Frame:
+    def frame(
+        self, state: FloatArray, action: int | None, table: FloatArray | None = None
+    ) -> Frame:
         """The picture of a state, `(height, width, 3)`.
 
         Args:
             state: `(state_size,)`.
             action: what was done to reach it; None at the start of an episode.
+            table: `(n_states, n_actions)`, drawn on top; None draws none.
 
         Raises:
             DependencyNotInstalled: pygame is missing.
         """
-        pixels = self._pygame.surfarray.array3d(self._surface(state, action))
+        pixels = self._pygame.surfarray.array3d(self._surface(state, action, table))
         return np.ascontiguousarray(pixels.transpose(1, 0, 2))
 
-    def show(self, state: FloatArray, action: int | None) -> None:
+    def show(
+        self, state: FloatArray, action: int | None, table: FloatArray | None = None
+    ) -> None:
         """Show the picture in a window, no faster than real time."""
         pygame = self._pygame
         if self._window is None:
@@ -66,7 +71,7 @@ class Renderer:
             self._window = pygame.display.set_mode((SIZE, SIZE))
             pygame.display.set_caption(type(self._system).__name__)
             self._clock = pygame.time.Clock()
-        self._window.blit(self._surface(state, action), (0, 0))
+        self._window.blit(self._surface(state, action, table), (0, 0))
         pygame.event.pump()
         self._clock.tick(self._frames_per_second)
         pygame.display.flip()
@@ -77,7 +82,11 @@ class Renderer:
             self._pygame.display.quit()
             self._window = None
 
-    def _surface(self, state: FloatArray, action: int | None) -> Any:
+    def _surface(
+        self, state: FloatArray, action: int | None, table: FloatArray | None
+    ) -> Any:
         large = self._pygame.Surface((_OVERSAMPLING * SIZE, _OVERSAMPLING * SIZE))
         self._system.draw(self._pygame, large, state, action)
+        if table is not None:
+            self._system.draw_table(self._pygame, large, table)
         return self._pygame.transform.smoothscale(large, (SIZE, SIZE))

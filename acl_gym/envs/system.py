@@ -26,6 +26,7 @@ class ControlSystem(ABC):
     that each variable is one contiguous vector for the kernels.
     """
 
+    # Where the next two depend on the parameters, a system makes them properties.
     draws_per_step: ClassVar[int] = 0
     """How many uniform random numbers `advance` takes for each slot and step."""
 
@@ -61,6 +62,9 @@ class ControlSystem(ABC):
     @abstractmethod
     def checked_states(self, states: Any) -> FloatArray:
         """Return `states`, shape `(n, state_size)`, validated and in canonical form.
+
+        A state of one variable may come without its axis, states of shape `(n,)`.
+        Goal states are allowed: the first step is taken from them like from any other.
 
         Returns:
             Array of shape `(n, state_size)`.
@@ -108,3 +112,39 @@ class ControlSystem(ABC):
     def observe(self, states: FloatArray) -> NDArray[Any]:
         """Return what is seen of `states` `(state_size, n)`: a new array `(n, ...)`."""
         return states.T.copy()
+
+    def action_mask(self, states: FloatArray) -> BoolArray | None:
+        """Return U_q of (3.4): which actions each of `states` offers.
+
+        Args:
+            states: `(state_size, n)`.
+
+        Returns:
+            A new array `(n, n_actions)`; None if all actions are always offered.
+        """
+        return None
+
+    def check_table(self, table: Any) -> None:
+        """Refuse a (state, action) table that `draw_table` cannot draw.
+
+        Raises:
+            ValueError: always, unless the system can draw tables of its states.
+        """
+        raise ValueError(
+            "only the grids (GridSearch1D, GridSearch2D) draw tables, one value for "
+            f"each state and action, not {type(self).__name__}, whose states are "
+            "continuous; use frames without a table."
+        )
+
+    def draw_table(self, pygame: Any, canvas: Any, table: FloatArray) -> None:
+        """Draw a (state, action) table over what `draw` has drawn.
+
+        Args:
+            pygame: the module.
+            canvas: the surface that `draw` has filled.
+            table: `(n_states, n_actions)`, for instance levels of pheromone.
+
+        Raises:
+            ValueError: the system or the table does not allow it, see `check_table`.
+        """
+        self.check_table(table)

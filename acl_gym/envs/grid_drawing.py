@@ -1,0 +1,160 @@
+"""Pictures of grid worlds: the map, the ant, and arrows for a table."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acl_gym.envs.grid_maps import GOAL, WALL
+from acl_gym.envs.system import FloatArray, IntArray
+
+Characters = NDArray[np.str_]
+Direction = tuple[int, int]  # rows and columns
+
+# Colours that stay apart for the colour-blind and in print.
+_PAPER = (255, 255, 255)
+_OBSTACLE = (64, 64, 68)
+_LINE = (224, 224, 224)
+_OPEN = (250, 250, 250)
+_GREEN = (0, 158, 115)
+_BLUE = (0, 114, 178)
+_BEST = (20, 20, 20)
+_FAINT, _FAINTEST = 130, 225  # grey of another action with half of a cell, with none
+
+
+class _Layout:
+    """Where the cells are on a canvas: square, as large as fits, centred."""
+
+    def __init__(self, canvas: Any, shape: tuple[int, ...]) -> None:
+        size = int(canvas.get_width())
+        self.margin = max(2, size // 80)
+        self.side = (size - 2 * self.margin) // max(shape)
+        self.top = (size - self.side * shape[0]) // 2
+        self.left = (size - self.side * shape[1]) // 2
+
+    def rectangle(self, row: int, column: int) -> tuple[int, int, int, int]:
+        """Left, top, width and height of a cell."""
+        side = self.side
+        return self.left + side * column, self.top + side * row, side, side
+
+    def centre(self, cell: IntArray) -> FloatArray:
+        """The x and y of the centre of a cell."""
+        row, column = cell
+        corner = np.array([self.left + self.side * column, self.top + self.side * row])
+        return corner + 0.5 * self.side
+
+
+def draw_map(pygame: Any, canvas: Any, characters: Characters) -> None:
+    """Fill the canvas with a map: obstacles dark, free cells light, goals green."""
+    canvas.fill(_PAPER)
+    layout = _Layout(canvas, characters.shape)
+    rows, columns = characters.shape
+    edge = max(2, layout.margin // 2)
+    frame = pygame.Rect(
+        layout.left, layout.top, layout.side * columns, layout.side * rows
+    )
+    pygame.draw.rect(canvas, _OBSTACLE, frame.inflate(2 * edge, 2 * edge))
+    line = max(1, layout.side // 40)
+    for row in range(rows):
+        for column in range(columns):
+            character = characters[row, column]
+            if character == WALL:
+                continue
+            cell = pygame.Rect(layout.rectangle(row, column))
+            pygame.draw.rect(canvas, _LINE, cell)
+            colour = _GREEN if character == GOAL else _OPEN
+            pygame.draw.rect(canvas, colour, cell.inflate(-2 * line, -2 * line))
+
+
+def draw_ant(
+    pygame: Any,
+    canvas: Any,
+    characters: Characters,
+    cell: IntArray,
+    heading: Direction | None,
+) -> None:
+    """Draw the ant as a disc, with a tip towards the move it tried last."""
+    layout = _Layout(canvas, characters.shape)
+    centre = layout.centre(cell)
+    pygame.draw.circle(canvas, _BLUE, tuple(centre), 0.33 * layout.side)
+    if heading is not None:
+        tip = _triangle(centre, heading, 0.48, 0.2, 0.26, layout.side)
+        pygame.draw.polygon(canvas, _BLUE, tip)
+
+
+def draw_arrows(
+    pygame: Any,
+    canvas: Any,
+    characters: Characters,
+    cells: IntArray,
+    table: FloatArray,
+    directions: tuple[Direction, ...],
+) -> None:
+    """Draw an arrow for each action of each cell, long and dark as its share is large.
+
+    Args:
+        pygame: the module.
+        canvas: a surface with the map.
+        characters: the map.
+        cells: row and column of each row of the table, `(n, 2)`.
+        table: values >= 0, `(n, n_actions)`.
+        directions: rows and columns by which each action moves.
+    """
+    layout = _Layout(canvas, characters.shape)
+    side = layout.side
+    total = table.sum(axis=1, keepdims=True)
+    even = np.full(table.shape, 1.0 / table.shape[1])
+    share = np.divide(table, total, out=even, where=total > 0)
+    highest = share == share.max(axis=1, keepdims=True)
+    best = highest & (highest.sum(axis=1, keepdims=True) == 1)  # none where levels tie
+    for i, cell in enumerate(cells):
+        centre = layout.centre(cell)
+        for action in np.argsort(share[i], kind="stable"):  # the best one on top
+            length = 0.46 * np.sqrt(share[i, action])
+            if length * side < 1.0:
+                continue
+            grey = _FAINTEST + (_FAINT - _FAINTEST) * min(1.0, 2.0 * share[i, action])
+            colour = _BEST if best[i, action] else (int(grey),) * 3
+            heading = directions[action]
+            # The best arrow fills the cell, the others grow out of its centre.
+            half, tail = (0.055, 0.8 * length) if best[i, action] else (0.04, 0.0)
+            neck = max(0.0, length - 0.24)
+            shaft = _bar(centre, heading, neck, tail, half, side)
+            head = _triangle(centre, heading, length, neck, 3.2 * half, side)
+            pygame.draw.polygon(canvas, colour, shaft)
+            pygame.draw.polygon(canvas, colour, head)
+
+
+def _points(
+    centre: FloatArray, heading: Direction, places: Any, side: int
+) -> list[tuple[float, float]]:
+    """Pixels of places (ahead, aside), in sides of a cell from its centre."""
+    down, right = heading
+    ahead = side * np.array([right, down], dtype=np.float64)
+    aside = side * np.array([-down, right], dtype=np.float64)
+    return [tuple(centre + a * ahead + b * aside) for a, b in places]
+
+
+def _triangle(
+    centre: FloatArray,
+    heading: Direction,
+    tip: float,
+    base: float,
+    half: float,
+    side: int,
+) -> list[tuple[float, float]]:
+    return _points(centre, heading, ((tip, 0.0), (base, half), (base, -half)), side)
+
+
+def _bar(
+    centre: FloatArray,
+    heading: Direction,
+    front: float,
+    back: float,
+    half: float,
+    side: int,
+) -> list[tuple[float, float]]:
+    places = ((-back, half), (front, half), (front, -half), (-back, -half))
+    return _points(centre, heading, places, side)

@@ -16,7 +16,14 @@ if TYPE_CHECKING:
     from acl_gym.agents.q_iteration import fuzzy_q_iteration
     from acl_gym.agents.q_learning import QLearning
     from acl_gym.agents.sb3 import VectorEnvAdapter
-    from acl_gym.callbacks import Callback, PolicyEvaluation
+    from acl_gym.callbacks import (
+        Callback,
+        Checkpoint,
+        CSVLog,
+        EarlyStop,
+        PolicyEvaluation,
+        TensorBoardLog,
+    )
     from acl_gym.envs.wrappers import ScaledObservation, ScaledVectorObservation
     from acl_gym.evaluation import PolicyCost, evaluate_policy_cost
     from acl_gym.partition import Crisp, Fuzzy, Partition
@@ -27,8 +34,11 @@ __version__ = "0.1.0"
 # seconds that `gym.make` on another environment should not pay.
 _PUBLIC = {
     "ACL": "acl_gym.agents.acl",
+    "CSVLog": "acl_gym.callbacks",
     "Callback": "acl_gym.callbacks",
+    "Checkpoint": "acl_gym.callbacks",
     "Crisp": "acl_gym.partition",
+    "EarlyStop": "acl_gym.callbacks",
     "Fuzzy": "acl_gym.partition",
     "Partition": "acl_gym.partition",
     "PolicyCost": "acl_gym.evaluation",
@@ -36,6 +46,7 @@ _PUBLIC = {
     "QLearning": "acl_gym.agents.q_learning",
     "ScaledObservation": "acl_gym.envs.wrappers",
     "ScaledVectorObservation": "acl_gym.envs.wrappers",
+    "TensorBoardLog": "acl_gym.callbacks",
     "VectorEnvAdapter": "acl_gym.agents.sb3",
     "evaluate_policy_cost": "acl_gym.evaluation",
     "fuzzy_q_iteration": "acl_gym.agents.q_iteration",
@@ -43,8 +54,11 @@ _PUBLIC = {
 
 __all__ = [
     "ACL",
+    "CSVLog",
     "Callback",
+    "Checkpoint",
     "Crisp",
+    "EarlyStop",
     "Fuzzy",
     "Partition",
     "PolicyCost",
@@ -52,6 +66,7 @@ __all__ = [
     "QLearning",
     "ScaledObservation",
     "ScaledVectorObservation",
+    "TensorBoardLog",
     "VectorEnvAdapter",
     "__version__",
     "evaluate_policy_cost",

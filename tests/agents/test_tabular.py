@@ -83,8 +83,11 @@ def test_a_seed_set_anew_begins_anew(kind: type) -> None:
     np.testing.assert_array_equal(
         fresh.learn(trials=5).table, used.learn(trials=5).table
     )
-    with pytest.raises(ValueError, match=r"seed|non-negative"):
+    with pytest.raises(ValueError, match="seed must be at least 0, got -1"):
         used.set_random_seed(-1)
+    with pytest.raises(TypeError, match="seed must be an integer"):
+        used.set_random_seed(1.5)
+    assert used.seed == 3
 
 
 @BOTH

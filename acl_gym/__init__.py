@@ -16,7 +16,14 @@ if TYPE_CHECKING:
     from acl_gym.agents.q_iteration import fuzzy_q_iteration
     from acl_gym.agents.q_learning import QLearning
     from acl_gym.agents.sb3 import VectorEnvAdapter
-    from acl_gym.callbacks import Callback, PolicyEvaluation
+    from acl_gym.callbacks import (
+        Callback,
+        Checkpoint,
+        CSVLog,
+        EarlyStop,
+        PolicyEvaluation,
+        TensorBoardLog,
+    )
     from acl_gym.envs.wrappers import ScaledObservation, ScaledVectorObservation
     from acl_gym.evaluation import PolicyCost, evaluate_policy_cost
     from acl_gym.partition import Crisp, Discrete, Fuzzy, Partition
@@ -28,9 +35,12 @@ __version__ = "0.1.0"
 # seconds that `gym.make` on another environment should not pay.
 _PUBLIC = {
     "ACL": "acl_gym.agents.acl",
+    "CSVLog": "acl_gym.callbacks",
     "Callback": "acl_gym.callbacks",
+    "Checkpoint": "acl_gym.callbacks",
     "Crisp": "acl_gym.partition",
     "Discrete": "acl_gym.partition",
+    "EarlyStop": "acl_gym.callbacks",
     "Fuzzy": "acl_gym.partition",
     "Partition": "acl_gym.partition",
     "PolicyCost": "acl_gym.evaluation",
@@ -38,6 +48,7 @@ _PUBLIC = {
     "QLearning": "acl_gym.agents.q_learning",
     "ScaledObservation": "acl_gym.envs.wrappers",
     "ScaledVectorObservation": "acl_gym.envs.wrappers",
+    "TensorBoardLog": "acl_gym.callbacks",
     "VectorEnvAdapter": "acl_gym.agents.sb3",
     "automatic_partition": "acl_gym.partition.automatic",
     "evaluate_policy_cost": "acl_gym.evaluation",
@@ -46,9 +57,12 @@ _PUBLIC = {
 
 __all__ = [
     "ACL",
+    "CSVLog",
     "Callback",
+    "Checkpoint",
     "Crisp",
     "Discrete",
+    "EarlyStop",
     "Fuzzy",
     "Partition",
     "PolicyCost",
@@ -56,6 +70,7 @@ __all__ = [
     "QLearning",
     "ScaledObservation",
     "ScaledVectorObservation",
+    "TensorBoardLog",
     "VectorEnvAdapter",
     "__version__",
     "automatic_partition",

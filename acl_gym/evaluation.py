@@ -94,8 +94,10 @@ def evaluate_policy_cost(
         Costs, successes and lengths, one for each state.
 
     Raises:
+        TypeError: `model` has no `predict`, or `env` is not a vector environment.
         ValueError: the number of slots and of states differ and `env` is wrapped.
     """
+    require_predictor(model)
     require_vector_env(env)
     base = env.unwrapped
     wrapped = base is not env
@@ -152,9 +154,10 @@ def record_trajectory(
         max_steps: T; None takes that of the environment.
 
     Raises:
-        TypeError: `env` is of another package.
+        TypeError: `model` has no `predict`, or `env` is of another package.
         ValueError: it has more than one slot.
     """
+    require_predictor(model)
     base = control_env(env)
     if env.num_envs != 1:
         raise ValueError(f"env must have one slot, got {env.num_envs}.")
@@ -184,11 +187,25 @@ def actions_in(
         states: `(n, state_size)`.
 
     Raises:
-        TypeError: `env` is of another package.
+        TypeError: `model` has no `predict`, or `env` is of another package.
     """
+    require_predictor(model)
     control_env(env)
     observation, _ = env.reset(options={"state": states})
     return np.asarray(model.predict(observation, deterministic=True)[0], dtype=np.int64)
+
+
+def require_predictor(model: Any) -> None:
+    """Refuse what cannot choose actions.
+
+    Raises:
+        TypeError: `model` has no method `predict`.
+    """
+    if not callable(getattr(model, "predict", None)) or isinstance(model, type):
+        raise TypeError(
+            "model must be an agent or a policy with "
+            f"predict(observation, deterministic=True), got {model!r}."
+        )
 
 
 def control_env(env: VectorEnv[Any, Any, Any]) -> ControlVectorEnv:

@@ -40,15 +40,25 @@ def save(
     text = json.dumps(
         {"format": FORMAT, "version": VERSION, **header}, default=_plain_number
     )
-    if not target.parent.is_dir():
-        raise FileNotFoundError(
-            f"there is no folder {target.parent} to save {target.name} in; make it first."
-        )
+    checked_target(target)
     buffer = io.BytesIO()
     content = np.frombuffer(text.encode(), dtype=np.uint8)
     np.savez_compressed(buffer, header=content, **arrays)  # type: ignore[arg-type]
     write_atomically(target, buffer.getvalue())
     return target
+
+
+def checked_target(path: Path) -> Path:
+    """Return the path of a file to be written if its folder is there.
+
+    Raises:
+        FileNotFoundError: there is no such folder.
+    """
+    if not path.parent.is_dir():
+        raise FileNotFoundError(
+            f"there is no folder {path.parent} to save {path.name} in; make it first."
+        )
+    return path
 
 
 def write_atomically(path: Path, content: bytes) -> None:

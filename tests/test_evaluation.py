@@ -196,6 +196,17 @@ def test_a_single_environment_is_refused() -> None:
         evaluate_policy_cost(Always(1), gym.make(PENDULUM), STATES)  # type: ignore[arg-type]
 
 
+@pytest.mark.parametrize("model", [None, "policy", ACL, 3.0])
+def test_what_cannot_predict_is_refused_at_once(model: Any) -> None:
+    env = gym.make_vec("acl_gym/Pendulum-v0", num_envs=1)
+    with pytest.raises(TypeError, match="model must be an agent or a policy with"):
+        evaluate_policy_cost(model, env)
+    with pytest.raises(TypeError, match="model must be an agent or a policy with"):
+        record_trajectory(model, env, np.zeros(2))
+    with pytest.raises(TypeError, match="model must be an agent or a policy with"):
+        actions_in(model, env, np.zeros((1, 2)))
+
+
 def test_the_result_cannot_be_changed() -> None:
     result = PolicyCost(np.ones(2), np.ones(2, dtype=bool), np.ones(2, dtype=int))
     with pytest.raises(AttributeError):

@@ -183,11 +183,12 @@ class SoftPolicy(PartitionPolicy):
         partition: turns observations into cells and degrees.
         levels: pheromone, `(n_cells, n_actions)`; copied.
         exponent: > 0; the larger, the closer to the greedy policy.
-        seed: of the draws; None draws one from the system.
+        seed: of the draws, >= 0; None draws one from the system.
         first_action: the action that column 0 stands for, `Discrete.start`.
 
     Raises:
-        ValueError: `exponent` is not > 0 and finite.
+        TypeError: `seed` is not an integer.
+        ValueError: `exponent` is not > 0 and finite, or `seed` is negative.
     """
 
     def __init__(
@@ -199,6 +200,8 @@ class SoftPolicy(PartitionPolicy):
         first_action: int = 0,
     ) -> None:
         exponent = validation.number("exponent", exponent, above=0)
+        if seed is not None:
+            seed = validation.integer("seed", seed, at_least=0)
         self.partition = partition
         self.first_action = first_action
         n_cells, n_actions = levels.shape

@@ -50,6 +50,8 @@ class TabularAgent(PartitionPolicy):
             where a `PolicyEvaluation` ran, `policy_cost` (3.47) and `success_rate`.
         in_trial: whether a trial is under way, or was when an exception ended it: the
             table is then that of no whole trial.
+        metadata: your own notes, JSON values under string keys, empty at first; they
+            are saved with the agent and loaded with it.
     """
 
     def __init__(
@@ -78,8 +80,6 @@ class TabularAgent(PartitionPolicy):
         if max_steps is None:
             max_steps = time_limit(env) or DEFAULT_MAX_STEPS
         self._max_steps = validation.integer("max_steps", max_steps, at_least=1)
-        if seed is not None:
-            seed = validation.integer("seed", seed, at_least=0)
         self.env: VectorEnv[Any, Any, Any] | None = None
         self._walk: Walk | None = None
         self.first_action = 0
@@ -97,6 +97,7 @@ class TabularAgent(PartitionPolicy):
         self.seconds = 0.0
         self.history: list[Row] = []
         self.in_trial = False
+        self.metadata: dict[str, Any] = {}
         self.set_random_seed(seed)
 
     @property
@@ -208,7 +209,16 @@ class TabularAgent(PartitionPolicy):
         Three independent streams: learning, exploring predictions, and the ranks by
         which ties of the policy are broken, so that asking the agent for an action
         never changes what it learns.
+
+        Args:
+            seed: >= 0; None draws one from the system.
+
+        Raises:
+            TypeError: `seed` is not an integer.
+            ValueError: it is negative.
         """
+        if seed is not None:
+            seed = validation.integer("seed", seed, at_least=0)
         self.seed = seed
         learning, predicting, ties = np.random.SeedSequence(seed).spawn(3)
         self.rng = np.random.default_rng(learning)
@@ -276,6 +286,7 @@ class TabularAgent(PartitionPolicy):
             "trials": self.trials,
             "seconds": self.seconds,
             "history": self.history,
+            "metadata": self.metadata,
             "generators": [
                 rng.bit_generator.state for rng in (self.rng, self._predict_rng)
             ],
@@ -346,6 +357,10 @@ class TabularAgent(PartitionPolicy):
         ):
             raise TypeError("history must be a list of rows of numbers")
         self.history = history
+        metadata = header.get("metadata", {})  # files of before it have none
+        if not isinstance(metadata, dict):
+            raise TypeError(f"metadata must be a dict, got {metadata!r}")
+        self.metadata = metadata
         generators = (self.rng, self._predict_rng)
         for rng, state in zip(generators, header["generators"], strict=True):
             rng.bit_generator.state = state

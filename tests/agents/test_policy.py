@@ -67,6 +67,13 @@ def test_soft_policy_refuses_a_bad_exponent(exponent: float) -> None:
         SoftPolicy(GRID, np.ones((3, 2)), exponent)
 
 
+def test_soft_policy_refuses_a_bad_seed() -> None:
+    with pytest.raises(ValueError, match="seed must be at least 0, got -1"):
+        SoftPolicy(GRID, np.ones((3, 2)), seed=-1)
+    with pytest.raises(TypeError, match="seed must be an integer"):
+        SoftPolicy(GRID, np.ones((3, 2)), seed=0.5)  # type: ignore[arg-type]
+
+
 def test_colony_hands_out_a_soft_policy_and_learns_on_as_before() -> None:
     env = gym.make_vec("acl_gym/Pendulum-v0", num_envs=20)
     grid = Fuzzy.from_box(env.single_observation_space, (8, 9), circular=[0])

@@ -14,7 +14,7 @@ import pytest
 from stable_baselines3.common.evaluation import evaluate_policy
 from stable_baselines3.common.monitor import Monitor
 
-from acl_gym import ACL, Crisp, Fuzzy, Partition, QLearning
+from acl_gym import ACL, Crisp, Fuzzy, Partition, QLearning, storage
 from acl_gym.agents.policy import TablePolicy
 from acl_gym.agents.tabular import TabularAgent
 from tests.agents.reference_colony import Chain, chains
@@ -83,8 +83,11 @@ def test_a_seed_set_anew_begins_anew(kind: type) -> None:
     np.testing.assert_array_equal(
         fresh.learn(trials=5).table, used.learn(trials=5).table
     )
-    with pytest.raises(ValueError, match=r"seed|non-negative"):
+    with pytest.raises(ValueError, match="seed must be at least 0, got -1"):
         used.set_random_seed(-1)
+    with pytest.raises(TypeError, match="seed must be an integer"):
+        used.set_random_seed(1.5)
+    assert used.seed == 3
 
 
 @BOTH
@@ -302,6 +305,34 @@ def test_a_loaded_agent_calls_the_actions_as_before(kind: type, tmp_path: Path) 
     np.testing.assert_array_equal(with_env.predict(states)[0], expected)
     without = kind.load(tmp_path / "agent")
     np.testing.assert_array_equal(without.predict(states)[0], expected)
+
+
+def test_notes_are_in_the_file(tmp_path: Path) -> None:
+    agent = on_chain(ACL)
+    assert ACL.load(agent.save(tmp_path / "agent")).metadata == {}
+    agent.metadata = {"env": "Chain", "args": {"slip": np.float64(0.2), "list": [1]}}
+    loaded = ACL.load(agent.save(tmp_path / "agent"))
+    assert loaded.metadata == {"env": "Chain", "args": {"slip": 0.2, "list": [1]}}
+    agent.metadata = {"env": object()}
+    with pytest.raises(TypeError, match="must be numbers and strings"):
+        agent.save(tmp_path / "agent")
+    agent.metadata = ["env"]  # type: ignore[assignment]
+    with pytest.raises(ValueError, match="metadata must be a dict"):
+        ACL.load(agent.save(tmp_path / "agent"))
+
+
+def test_a_file_from_before_there_were_notes_is_read(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    agent = on_chain(ACL)
+    save = storage.save
+
+    def old(path: Path, header: dict[str, Any], arrays: Any) -> Path:
+        del header["metadata"]
+        return save(path, header, arrays)
+
+    monkeypatch.setattr(storage, "save", old)
+    assert ACL.load(agent.save(tmp_path / "agent")).metadata == {}
 
 
 def test_the_wrong_class_is_refused(tmp_path: Path) -> None:

@@ -1,0 +1,217 @@
+"""Evaluating between trials, and stopping when it no longer pays to go on."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from gymnasium.vector import VectorEnv
+from numpy.typing import NDArray
+
+from acl_gym import storage, validation
+from acl_gym.agents.policy import TablePolicy
+from acl_gym.agents.walk import require_vector_env
+from acl_gym.callbacks.base import Callback, Row
+from acl_gym.evaluation import PolicyCost, Predictor, evaluate_policy_cost
+
+if TYPE_CHECKING:
+    from acl_gym.agents.tabular import TabularAgent
+
+
+class PolicyEvaluation(Callback):
+    """Evaluates the policy every few trials, and keeps the best one.
+
+    Adds `policy_cost` (3.47) and `success_rate` to the trial's row; the cost is that
+    which the agent learns to lower, `agent.cost` where it has one. Evaluation draws
+    nothing from the agent's generator and its time is not counted: learning is the
+    same with it and without it.
+
+    Args:
+        env: where to evaluate, see `evaluate_policy_cost`.
+        states: initial states; None takes those of the environment.
+        every: evaluate after each so many trials, and after the last, >= 1.
+        max_steps: T of the evaluation; None takes that of the environment.
+        seed: of an environment that is random: every evaluation is from the same
+            initial states, with the same luck.
+        policy: what to evaluate, a function of the agent, for instance
+            `lambda colony: colony.soft_policy(seed=0)`; None takes the agent's own
+            greedy policy.
+        save_best: write the agent to this file whenever its policy is the best so
+            far; None writes nothing. An agent that goes on after being loaded does
+            not replace it by a worse one: its `history` knows what it had reached.
+
+    Attributes:
+        best: the evaluation of the best policy so far: the lowest cost.
+        best_policy: that policy, unchanged by what the agent learns afterwards.
+
+    Raises:
+        TypeError: `env` is not a vector environment, or `policy` not a function.
+        FileNotFoundError: there is no folder for `save_best`.
+    """
+
+    def __init__(
+        self,
+        env: VectorEnv[Any, Any, Any],
+        states: NDArray[np.float64] | None = None,
+        *,
+        every: int = 1,
+        max_steps: int | None = None,
+        seed: int | None = 0,
+        policy: Callable[[Any], Predictor] | None = None,
+        save_best: str | Path | None = None,
+    ) -> None:
+        require_vector_env(env)
+        if seed is not None:
+            seed = validation.integer("seed", seed, at_least=0)
+        if policy is not None and not callable(policy):
+            raise TypeError(
+                "policy must be a function of the agent that returns what to evaluate, "
+                f"got {policy!r}."
+            )
+        self.save_best = None
+        if save_best is not None:
+            self.save_best = storage.checked_target(storage.with_suffix(save_best))
+        self._saved_cost = math.inf
+        self.seed = seed
+        self.policy = policy
+        self.env = env
+        self.states = states
+        self.every = validation.integer("every", every, at_least=1)
+        if max_steps is not None:
+            max_steps = validation.integer("max_steps", max_steps, at_least=1)
+        self.max_steps = max_steps
+        self.best: PolicyCost | None = None
+        self.best_policy: Predictor | None = None
+
+    def on_training_start(self, agent: TabularAgent) -> None:
+        """Look up what the agent has reached before."""
+        costs = [row["policy_cost"] for row in agent.history if "policy_cost" in row]
+        self._saved_cost = min(costs, default=math.inf)
+
+    def on_trial_end(self, agent: TabularAgent, row: Row) -> bool | None:
+        """Evaluate if it is time to."""
+        if row["trial"] % self.every == 0:
+            self._evaluate(agent, row)
+        return True
+
+    def on_training_end(self, agent: TabularAgent) -> None:
+        """Evaluate the last policy if the last trial was not, and is whole."""
+        if agent.in_trial:
+            return
+        if agent.history and "policy_cost" not in agent.history[-1]:
+            self._evaluate(agent, agent.history[-1])
+
+    def _evaluate(self, agent: TabularAgent, row: Row) -> None:
+        policy = agent if self.policy is None else self.policy(agent)
+        if policy is agent:
+            policy = agent.policy
+        result = evaluate_policy_cost(
+            policy,
+            self.env,
+            self.states,
+            max_steps=self.max_steps,
+            seed=self.seed,
+            cost=getattr(agent, "cost", None),
+        )
+        row["policy_cost"] = result.cost
+        row["success_rate"] = result.success_rate
+        if self.best is None or result.cost < self.best.cost:
+            self.best = result
+            self.best_policy = (
+                policy.copy() if isinstance(policy, TablePolicy) else policy
+            )
+        if self.save_best is not None and result.cost < self._saved_cost:
+            agent.save(self.save_best)
+            self._saved_cost = result.cost
+
+
+class EarlyStop(Callback):
+    """Stops when a measure has not improved for a while, or is good enough.
+
+    Put it after the `PolicyEvaluation` that adds the measure. It begins anew with
+    every call of `learn`, and counts only trials whose row has the measure.
+
+    Args:
+        patience: stop after so many such trials in a row without improvement, >= 1.
+        measure: a key of the rows of `history`; less is better.
+        min_improvement: what is less than the best so far by no more than this is no
+            improvement, >= 0.
+        threshold: stop as well once the measure is at most this; None sets no such
+            goal.
+
+    Attributes:
+        best: the lowest value so far, infinite before the first.
+        waited: trials with the measure since then.
+
+    Raises:
+        TypeError: a parameter is of the wrong kind.
+        ValueError: a parameter is out of range; while learning, the rows lack the
+            measure.
+    """
+
+    def __init__(
+        self,
+        patience: int,
+        measure: str = "policy_cost",
+        min_improvement: float = 0.0,
+        threshold: float | None = None,
+    ) -> None:
+        self.patience = validation.integer("patience", patience, at_least=1)
+        if not isinstance(measure, str):
+            raise TypeError(f"measure must be the name of one, got {measure!r}.")
+        self.measure = measure
+        self.min_improvement = validation.number(
+            "min_improvement", min_improvement, at_least=0
+        )
+        if threshold is not None:
+            threshold = validation.number("threshold", threshold)
+        self.threshold = threshold
+        self.best = math.inf
+        self.waited = 0
+        self._begin(0)
+
+    def on_training_start(self, agent: TabularAgent) -> None:
+        """Begin to count."""
+        self._begin(len(agent.history))
+
+    def on_trial_end(self, agent: TabularAgent, row: Row) -> bool | None:
+        """Look at the measure, if the row has it."""
+        value = row.get(self.measure)
+        if value is None:
+            # The rows before this one are complete.
+            self._check_order(agent.history[self._first : -1])
+            return True
+        self._seen = True
+        self.waited += 1
+        if value < self.best - self.min_improvement:
+            self.best, self.waited = value, 0
+        reached = self.threshold is not None and value <= self.threshold
+        return not reached and self.waited < self.patience
+
+    def on_training_end(self, agent: TabularAgent) -> None:
+        """Refuse to have watched a measure that was never there."""
+        rows = agent.history[self._first :]
+        if self._seen or agent.in_trial or not rows:
+            return
+        if not any(self.measure in row for row in rows):
+            raise ValueError(
+                f"EarlyStop needs rows with {self.measure!r}, got only "
+                f"{', '.join(rows[-1])}; put a PolicyEvaluation before it in the list "
+                "of callbacks."
+            )
+
+    def _begin(self, first: int) -> None:
+        self._first = first
+        self._seen = False
+        self.best = math.inf
+        self.waited = 0
+
+    def _check_order(self, rows: list[Row]) -> None:
+        if not self._seen and rows and self.measure in rows[-1]:
+            raise ValueError(
+                f"EarlyStop must come after the callback that adds {self.measure!r}; "
+                "put it behind that one in the list of callbacks."
+            )

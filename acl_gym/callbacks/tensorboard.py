@@ -1,0 +1,88 @@
+"""The log of a run for TensorBoard."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from acl_gym.callbacks.base import Callback, Row
+
+if TYPE_CHECKING:
+    from acl_gym.agents.tabular import TabularAgent
+
+# Column of a row -> tag; TensorBoard groups tags by what stands before the slash.
+_TAGS = {
+    "ants_cost": "cost/ants",
+    "policy_cost": "cost/policy",
+    "ants_success_rate": "success/ants",
+    "success_rate": "success/policy",
+    "policy_variation": "policy/variation",
+    "sensitivity": "policy/sensitivity",
+    "trial": "time/trial",
+    "seconds": "time/seconds",
+}
+
+
+class TensorBoardLog(Callback):
+    """Writes the measures of each trial as scalars over environment steps.
+
+    Look at them with `tensorboard --logdir DIRECTORY`. Tags are `cost/policy`,
+    `cost/ants`, `success/policy` and so on, `other/NAME` for measures of your own. An
+    agent that goes on after being loaded hides what the directory holds of later
+    steps. Put it after the callbacks that add measures.
+
+    Args:
+        directory: receives the event files; made if it is not there. One a run.
+
+    Raises:
+        ModuleNotFoundError: tensorboard is not installed.
+    """
+
+    def __init__(self, directory: str | Path) -> None:
+        self.directory = Path(directory)
+        self._writer_type = _import_writer()
+        self._writer: Any = None
+        self._written: Row = {}
+
+    def on_training_start(self, agent: TabularAgent) -> None:
+        """Open an event file."""
+        self._written = dict(agent.history[-1]) if agent.history else {}
+        self._writer = self._writer_type(
+            str(self.directory),
+            purge_step=agent.num_timesteps + 1 if agent.history else None,
+            flush_secs=10,
+        )
+
+    def on_trial_end(self, agent: TabularAgent, row: Row) -> bool | None:
+        """Write the row."""
+        self._write(row, row)
+        return True
+
+    def on_training_end(self, agent: TabularAgent) -> None:
+        """Write what the last row has gained since, and close the file."""
+        if agent.history:
+            row = agent.history[-1]
+            self._write(
+                row, {name: row[name] for name in row if name not in self._written}
+            )
+        self._writer.close()
+
+    def _write(self, row: Row, values: Row) -> None:
+        step = int(row["env_steps"])
+        for name, value in values.items():
+            if name != "env_steps":
+                tag = _TAGS.get(name, f"other/{name}")
+                self._writer.add_scalar(tag, float(value), step)
+        self._written = dict(row)
+
+
+def _import_writer() -> Any:
+    # Only here: torch takes seconds to import.
+    try:
+        from torch.utils.tensorboard import SummaryWriter
+    except ImportError as error:
+        raise ModuleNotFoundError(
+            "TensorBoardLog needs tensorboard, which is not installed; "
+            'run `pip install "acl-gym[tensorboard]"`.'
+        ) from error
+    return SummaryWriter

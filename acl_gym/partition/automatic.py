@@ -55,13 +55,16 @@ def automatic_partition(
 
     - `Discrete`, `MultiDiscrete` and `MultiBinary` observations are cells already.
     - The systems of the thesis have its own centres: `named.pendulum` and
-      `named.navigation("regular")`.
+      `named.navigation("regular")`, if the ranges of their variables are its own.
     - Other Boxes of one axis get evenly spread centres, both ends included. The
       more variables, the fewer for each (a decision): 101 for one variable, 41 for
       two, as in (5.3), 15 for three, 7 for four, 5 for five, 3 for six. This keeps the
-      whole below 3,400 cells. The numbers are odd, so that the middle of the range
-      is a centre. A variable that this package's environments declare circular has
-      one centre more, so that each centre has one opposite to it.
+      whole to a few thousand cells. The numbers are odd, so that the middle of the
+      range is a centre. A variable that this package's environments declare circular
+      has one centre more, so that each centre has one opposite to it.
+
+    What lies behind an `AsyncVectorEnv` or a wrapper that changes the observations is
+    not known here: such an environment is like any other, without circular variables.
 
     This is a start, not the best partition for a task: give `cells` where a variable
     needs more of them, and `refine` it around a narrow goal.
@@ -99,8 +102,8 @@ def automatic_partition(
     if cells is None and bounds is None and system is not None:
         for base in type(system).__mro__:
             make = _NAMED.get(f"{base.__module__}.{base.__qualname__}")
-            if make is not None:
-                return make(system, kind)
+            if make is not None and _spans(grid := make(system, kind), box):
+                return grid
     circular = () if system is None else system.circular
     number = _centres(box.low.size) if cells is None else 0
     low, high = _bounded(env, box, bounds, circular, random_steps, seed)
@@ -242,6 +245,15 @@ def _system(env: Any, space: spaces.Space[Any]) -> ControlSystem | None:
         return None
     # A wrapper may have changed what is observed.
     return base.system if base.system.observation_space == space else None
+
+
+def _spans(grid: Grid, box: spaces.Box) -> bool:
+    """Whether the outermost centres of `grid` are the bounds of `box`."""
+    ends = zip(grid.centres, grid.periods, box.low, box.high, strict=True)
+    return all(
+        period is not None or (axis[0] == low and axis[-1] == high)
+        for axis, period, low, high in ends
+    )
 
 
 def _bounded(

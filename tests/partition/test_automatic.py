@@ -120,7 +120,8 @@ def test_a_wrapped_pendulum_is_taken_as_it_is_seen() -> None:
 def test_navigation_gets_the_centres_of_the_thesis() -> None:
     class Navigation:
         circular = ()
-        observation_space = spaces.Box(-5.0, 5.0, (4,), np.float64)
+        high = np.array([5.0, 2.0, 5.0, 2.0])
+        observation_space = spaces.Box(-high, high, dtype=np.float64)
 
     env = gym.make(PENDULUM)
     env.unwrapped.system = Navigation()
@@ -132,6 +133,10 @@ def test_navigation_gets_the_centres_of_the_thesis() -> None:
     for kind in (Crisp, Fuzzy):
         expected = named.navigation("regular", kind=kind).settings()
         assert automatic_partition(env, kind=kind).settings() == expected
+    # Where the vehicle may go further, the centres of the thesis do not reach.
+    wide = spaces.Box(-Navigation.high, 2 * Navigation.high, dtype=np.float64)
+    env.unwrapped.observation_space = Navigation.observation_space = wide
+    assert automatic_partition(env).settings() == Fuzzy.from_box(wide, 7).settings()
 
 
 @pytest.mark.parametrize("d", range(1, 7))

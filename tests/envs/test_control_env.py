@@ -12,17 +12,17 @@ from gymnasium.error import Error, ResetNeeded
 from gymnasium.utils.env_checker import check_env
 from gymnasium.wrappers import TimeLimit
 
+from acl_gym.envs.control_env import ControlEnv
 from acl_gym.envs.pendulum import PendulumEnv
 from acl_gym.registration import ENVIRONMENTS, register_environments
+from tests.envs.systems import SYSTEMS, SystemCase
+from tests.envs.vector_helpers import assert_same_bits
 
-ENV_ID = "acl_gym/Pendulum-v0"
-NAN, INF = float("nan"), float("inf")
-UPRIGHT = {"state": [np.pi, 0.0]}
-HANGING = {"state": [0.0, 0.0]}
-EASY = {"goal_bounds": (2.5, 7.0)}  # random torques reach this goal now and then
+NAN = float("nan")
+COPIES = [copy.deepcopy, lambda env: pickle.loads(pickle.dumps(env))]
 
 
-def walk(env: PendulumEnv, actions: list[int]) -> list[tuple[bytes, float, bool]]:
+def walk(env: ControlEnv, actions: list[int]) -> list[tuple[bytes, float, bool]]:
     """Step through the actions, starting again at the goal; keep every bit."""
     rows = []
     for action in actions:
@@ -34,39 +34,44 @@ def walk(env: PendulumEnv, actions: list[int]) -> list[tuple[bytes, float, bool]
     return rows
 
 
-def random_actions(count: int, seed: int) -> list[int]:
-    return np.random.default_rng(seed).integers(0, 3, count).tolist()
+def random_actions(case: SystemCase, count: int, seed: int) -> list[int]:
+    return np.random.default_rng(seed).integers(0, case.n_actions, count).tolist()
 
 
-def test_gymnasium_accepts_it() -> None:
-    check_env(gym.make(ENV_ID).unwrapped)
+def test_gymnasium_accepts_it(case: SystemCase) -> None:
+    check_env(gym.make(case.env_id).unwrapped)
+    check_env(gym.make(case.env_id, **case.easy, **case.variant).unwrapped)
+
+
+def test_every_registered_system_is_tested() -> None:
+    assert {case.env_id for case in SYSTEMS} == set(ENVIRONMENTS)
 
 
 def test_registering_again_is_harmless() -> None:
     before = {env_id: gym.spec(env_id) for env_id in ENVIRONMENTS}
     register_environments()
     assert {env_id: gym.spec(env_id) for env_id in ENVIRONMENTS} == before
-    assert gym.spec(ENV_ID).max_episode_steps is None
+    assert all(gym.spec(each).max_episode_steps is None for each in ENVIRONMENTS)
 
 
-def test_time_limit_of_make() -> None:
-    env = gym.make(ENV_ID, max_episode_steps=3)
-    env.reset(options=HANGING)
+def test_time_limit_of_make(case: SystemCase) -> None:
+    env = gym.make(case.env_id, max_episode_steps=3, **case.narrow)
+    env.reset(options={"state": case.away})
     flags = [env.step(1)[2:4] for _ in range(3)]
     assert flags == [(False, False), (False, False), (False, True)]
     # Without the keyword no limit applies.
-    unlimited = gym.make(ENV_ID)
-    unlimited.reset(options=HANGING)
-    assert not any(unlimited.step(1)[3] for _ in range(1000))
+    unlimited = gym.make(case.env_id, **case.narrow)
+    unlimited.reset(options={"state": case.away})
+    assert not any(unlimited.step(0)[3] for _ in range(1000))
 
 
-def test_both_flags_on_the_last_step() -> None:
-    env = TimeLimit(PendulumEnv(), 1)
-    env.reset(options=UPRIGHT)
-    assert env.step(1)[2:4] == (True, True)
+def test_both_flags_on_the_last_step(case: SystemCase) -> None:
+    env = TimeLimit(case.single(**case.narrow), 1)
+    env.reset(options={"state": case.near})
+    assert env.step(case.near_action)[2:4] == (True, True)
 
 
-def test_state_option_sets_the_state() -> None:
+def test_given_angle_becomes_canonical() -> None:
     env = PendulumEnv()
     state = np.array([-0.5, 9.0])
     options = {"state": state}
@@ -83,8 +88,15 @@ def test_state_option_sets_the_state() -> None:
     assert env.step(2)[0].tobytes() == expected.tobytes()
 
 
-def test_no_state_means_a_random_one() -> None:
-    env = PendulumEnv()
+def test_state_option_sets_the_state(case: SystemCase) -> None:
+    env = case.single(**case.narrow)
+    observation, info = env.reset(options={"state": list(case.near)})
+    assert_same_bits(np.asarray(observation), case.observed(case.near)[0])
+    assert info == {}
+
+
+def test_no_state_means_a_random_one(case: SystemCase) -> None:
+    env = case.single(**case.narrow)
     rows = [
         env.reset(seed=4, options=options)[0].tolist()
         for options in (None, {}, {"state": None})
@@ -93,39 +105,29 @@ def test_no_state_means_a_random_one() -> None:
     assert rows[0] != env.reset()[0].tolist()
 
 
-def test_given_state_draws_no_random_numbers() -> None:
-    env, other = PendulumEnv(), PendulumEnv()
+def test_given_state_draws_no_random_numbers(case: SystemCase) -> None:
+    env, other = case.single(**case.narrow), case.single(**case.narrow)
     env.reset(seed=5)
     other.reset(seed=5)
-    other.reset(options=HANGING)
+    other.reset(options={"state": case.near})
     assert env.reset()[0].tobytes() == other.reset()[0].tobytes()
 
 
-BAD_STATES = {
-    "batch": [[0.0, 0.0]],
-    "one number": 0.0,
-    "three numbers": [0.0, 0.0, 0.0],
-    "empty": [],
-    "nan": [NAN, 0.0],
-    "infinite": [0.0, -INF],
-    "too fast": [0.0, np.nextafter(9.0, 10.0)],
-    "words": ["up", "still"],
-    "digits as strings": ["0", "0"],
-    "complex": [1j, 0.0],
-    "complex array": np.array([1j, 0.0]),
-    "none": [0.0, None],
-    "dict": {"theta": 0.0},
-}
+BAD_STATES = [
+    pytest.param(case, bad, id=f"{case.single.__name__}-{name}")
+    for case in SYSTEMS
+    for name, bad in case.bad_states.items()
+]
 
 
-@pytest.mark.parametrize("state", BAD_STATES.values(), ids=BAD_STATES)
-def test_bad_state_is_refused_and_changes_nothing(state: Any) -> None:
-    env, twin = PendulumEnv(), PendulumEnv()
+@pytest.mark.parametrize(("case", "state"), BAD_STATES)
+def test_bad_state_is_refused_and_changes_nothing(case: SystemCase, state: Any) -> None:
+    env, twin = case.single(), case.single()
     for each in (env, twin):
         each.reset(seed=6)
     with pytest.raises(ValueError, match=r"state|omega"):
         env.reset(seed=7, options={"state": state})
-    actions = random_actions(20, 1)
+    actions = random_actions(case, 20, 1)
     assert walk(env, actions) == walk(twin, actions)
     assert env.reset()[0].tobytes() == twin.reset()[0].tobytes()
 
@@ -134,20 +136,20 @@ def test_bad_state_is_refused_and_changes_nothing(state: Any) -> None:
     "options",
     [{"states": [0.0, 0.0]}, {"reset_mask": np.array([True])}, {"state": None, "x": 1}],
 )
-def test_unknown_option_is_refused(options: dict[str, Any]) -> None:
+def test_unknown_option_is_refused(case: SystemCase, options: dict[str, Any]) -> None:
     unknown = next(key for key in options if key != "state")
     with pytest.raises(ValueError, match=rf"among \['state'\], got \['{unknown}'\]"):
-        PendulumEnv().reset(options=options)
+        case.single().reset(options=options)
 
 
 @pytest.mark.parametrize("seed", [-1, 1.5, "1"])
-def test_bad_seed_changes_nothing(seed: Any) -> None:
-    env, twin = PendulumEnv(), PendulumEnv()
+def test_bad_seed_changes_nothing(case: SystemCase, seed: Any) -> None:
+    env, twin = case.single(**case.narrow), case.single(**case.narrow)
     for each in (env, twin):
-        each.reset(seed=6)
+        each.reset(options={"state": case.away})
     with pytest.raises(Error):
-        env.reset(seed=seed, options=HANGING)
-    assert env.step(2)[0].tobytes() == twin.step(2)[0].tobytes()
+        env.reset(seed=seed, options={"state": case.near})
+    assert env.step(1)[0].tobytes() == twin.step(1)[0].tobytes()
 
 
 BAD_ACTIONS = {
@@ -157,7 +159,7 @@ BAD_ACTIONS = {
     "bool": (True, TypeError),
     "none": (None, TypeError),
     "string": ("1", TypeError),
-    "beyond": (3, ValueError),
+    "beyond": (4, ValueError),
     "negative": (-1, ValueError),
     "largest unsigned": (np.uint64(2**64 - 1), ValueError),
     "smallest": (np.iinfo(np.int64).min, ValueError),
@@ -169,48 +171,48 @@ BAD_ACTIONS = {
 
 @pytest.mark.parametrize(("action", "error"), BAD_ACTIONS.values(), ids=BAD_ACTIONS)
 def test_bad_action_is_refused_and_changes_nothing(
-    action: Any, error: type[Exception]
+    case: SystemCase, action: Any, error: type[Exception]
 ) -> None:
-    env, twin = PendulumEnv(), PendulumEnv()
+    env, twin = case.single(**case.narrow), case.single(**case.narrow)
     for each in (env, twin):
-        each.reset(options={"state": [1.0, 2.0]})
+        each.reset(options={"state": case.away})
     with pytest.raises(error, match=r"^actions must"):
         env.step(action)
-    assert env.step(2)[0].tobytes() == twin.step(2)[0].tobytes()
+    assert env.step(1)[0].tobytes() == twin.step(1)[0].tobytes()
 
 
 @pytest.mark.parametrize("kind", [int, np.int8, np.int32, np.int64, np.uint8, np.array])
-def test_any_integer_is_an_action(kind: Any) -> None:
-    env, twin = PendulumEnv(), PendulumEnv()
+def test_any_integer_is_an_action(case: SystemCase, kind: Any) -> None:
+    env, twin = case.single(**case.narrow), case.single(**case.narrow)
     for each in (env, twin):
-        each.reset(options={"state": [1.0, 2.0]})
-    assert env.step(kind(2))[0].tobytes() == twin.step(2)[0].tobytes()
+        each.reset(options={"state": case.away})
+    assert env.step(kind(1))[0].tobytes() == twin.step(1)[0].tobytes()
 
 
-def test_step_needs_a_running_episode() -> None:
-    env = PendulumEnv()
+def test_step_needs_a_running_episode(case: SystemCase) -> None:
+    env = case.single(**case.narrow)
     with pytest.raises(ResetNeeded, match="not begun"):
         env.step(1)
-    env.reset(options=UPRIGHT)
-    assert env.step(1)[2]
+    env.reset(options={"state": case.near})
+    assert env.step(case.near_action)[2]
     with pytest.raises(ResetNeeded, match="reached its goal"):
         env.step(1)
     env.reset()
     env.step(1)
 
 
-@pytest.mark.parametrize("substeps", [1, 3])
-def test_observations_belong_to_the_space(substeps: int) -> None:
-    env = PendulumEnv(substeps=substeps, **EASY)
-    observation, _ = env.reset(seed=8)
+@pytest.mark.parametrize("varied", [False, True])
+def test_observations_belong_to_the_space(case: SystemCase, varied: bool) -> None:
+    env = case.single(**case.easy, **(case.variant if varied else {}))
+    observation, info = env.reset(seed=8)
+    keys = list(info)
     finishes = 0
-    for action in random_actions(4000, 2):
+    for action in random_actions(case, 4000, 2):
         assert env.observation_space.contains(observation)
-        assert observation[0] < 2 * np.pi
         observation, reward, terminated, _, info = env.step(action)
         assert type(reward) is float
         assert type(terminated) is bool
-        assert info == {}
+        assert list(info) == keys
         assert -env.system.max_stage_cost <= reward <= 0.0
         if terminated:
             finishes += 1
@@ -220,7 +222,7 @@ def test_observations_belong_to_the_space(substeps: int) -> None:
 
 def test_every_observation_is_a_new_array() -> None:
     env = PendulumEnv()
-    seen = [env.reset(options=HANGING)[0]]
+    seen = [env.reset(options={"state": [0.0, 0.0]})[0]]
     seen += [env.step(2)[0] for _ in range(5)]
     assert len({row.tobytes() for row in seen}) == 6
     assert not any(np.shares_memory(a, b) for a, b in combinations(seen, 2))
@@ -232,46 +234,42 @@ def test_every_observation_is_a_new_array() -> None:
     assert all(np.array_equal(a, b + 1.0) for a, b in zip(seen, kept, strict=True))
 
 
-def test_same_seed_same_bits() -> None:
-    envs = [PendulumEnv(**EASY) for _ in range(3)]
-    starts = [
-        env.reset(seed=seed)[0].tobytes()
-        for env, seed in zip(envs, (9, 9, 10), strict=True)
-    ]
-    walks = [walk(env, random_actions(500, 3)) for env in envs]
+def test_same_seed_same_bits(case: SystemCase) -> None:
+    parameters = case.draws or case.easy
+    envs = [case.single(**parameters) for _ in range(3)]
+    for env, seed in zip(envs, (9, 9, 10), strict=True):
+        env.reset(seed=seed)
+    walks = [walk(env, random_actions(case, 500, 3)) for env in envs]
     assert sum(row[2] for row in walks[0]) > 1
-    assert (starts[0], walks[0]) == (starts[1], walks[1])
-    assert starts[0] != starts[2]
+    assert walks[0] == walks[1]
     assert walks[0] != walks[2]
 
 
-@pytest.mark.parametrize(
-    "twin", [copy.deepcopy, lambda env: pickle.loads(pickle.dumps(env))]
-)
-def test_copy_continues_alike_and_apart(twin: Any) -> None:
-    env = PendulumEnv(**EASY, substeps=2)
+@pytest.mark.parametrize("twin", COPIES)
+def test_copy_continues_alike_and_apart(case: SystemCase, twin: Any) -> None:
+    env = case.single(**(case.draws or {**case.easy, **case.variant}))
     env.reset(seed=11)
-    walk(env, random_actions(10, 4))
+    walk(env, random_actions(case, 10, 4))
     other = twin(env)
     assert other.system == env.system
-    actions = random_actions(300, 5)
+    actions = random_actions(case, 300, 5)
     walked = walk(env, actions)
     assert sum(row[2] for row in walked) > 1
     assert walk(other, actions) == walked
 
 
-@pytest.mark.parametrize(
-    "twin", [copy.deepcopy, lambda env: pickle.loads(pickle.dumps(env))]
-)
-def test_environment_that_has_been_drawn_can_be_copied(twin: Any) -> None:
+@pytest.mark.parametrize("twin", COPIES)
+def test_environment_that_has_been_drawn_can_be_copied(
+    case: SystemCase, twin: Any
+) -> None:
     pytest.importorskip("pygame")
-    env = PendulumEnv(render_mode="rgb_array")
+    env = case.single(render_mode="rgb_array")
     env.reset(seed=12)
     frame = env.render()
     assert np.array_equal(twin(env).render(), frame)
 
 
 @pytest.mark.parametrize("mode", ["ascii", "", "RGB_ARRAY", 1, ["human"]])
-def test_unknown_render_mode_is_refused(mode: Any) -> None:
+def test_unknown_render_mode_is_refused(case: SystemCase, mode: Any) -> None:
     with pytest.raises(ValueError, match="render_mode must be None or one of"):
-        PendulumEnv(render_mode=mode)
+        case.single(render_mode=mode)

@@ -1,4 +1,4 @@
-"""Frames of the pendulum, single and vector, without a screen."""
+"""Frames of all systems, and of the pendulum, single and vector, without a screen."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from gymnasium.error import DependencyNotInstalled, ResetNeeded
 from gymnasium.utils.env_checker import check_env
 
 from acl_gym.envs.pendulum import PendulumEnv, PendulumVectorEnv
+from tests.envs.systems import SystemCase
 
 ID = "acl_gym/Pendulum-v0"
 POLE = np.array([0, 114, 178])
@@ -51,67 +52,76 @@ def test_the_torque_is_drawn_on_the_side_it_turns_to() -> None:
     assert pixels(left, TORQUE)[:, 1].mean() < 239 < pixels(right, TORQUE)[:, 1].mean()
 
 
-def test_vector_frames_are_those_of_single_environments() -> None:
-    env = gym.make_vec(ID, num_envs=2, render_mode="rgb_array")
-    states = np.array([[0.3, 0.0], [2.0, 1.0]])
-    env.reset(options={"state": states})
-    env.step([0, 2])
+def test_vector_frames_are_those_of_single_environments(case: SystemCase) -> None:
+    env = gym.make_vec(case.env_id, num_envs=2, render_mode="rgb_array", **case.easy)
+    env.reset(seed=1)
+    states = env.unwrapped.states
+    env.step([0, 1])
     frames = env.render()
     assert isinstance(frames, tuple)
-    for state, action, frame in zip(states, [0, 2], frames, strict=True):
-        single = gym.make(ID, render_mode="rgb_array")
+    for state, action, frame in zip(states, [0, 1], frames, strict=True):
+        single = gym.make(case.env_id, render_mode="rgb_array", **case.easy)
         single.reset(options={"state": state})
         single.step(action)
+        assert frame.shape == (480, 480, 3)
+        assert frame.dtype == np.uint8
         np.testing.assert_array_equal(frame, single.render())
 
 
-def test_frames_are_new_arrays() -> None:
-    env = gym.make(ID, render_mode="rgb_array")
+def test_frames_are_new_arrays(case: SystemCase) -> None:
+    env = gym.make(case.env_id, render_mode="rgb_array")
     env.reset(seed=0)
     first = env.render()
     first[:] = 0
     assert env.render().any()
 
 
-def test_a_window_opens_and_closes() -> None:
-    env = gym.make(ID, render_mode="human")
+def test_a_window_opens_and_closes(case: SystemCase) -> None:
+    env = gym.make(case.env_id, render_mode="human")
     env.reset(seed=0)
     env.step(0)
     env.close()
     env.close()
 
 
-def test_checked_by_gymnasium() -> None:
-    check_env(gym.make(ID, render_mode="rgb_array").unwrapped)
+def test_checked_by_gymnasium(case: SystemCase) -> None:
+    check_env(gym.make(case.env_id, render_mode="rgb_array").unwrapped)
 
 
-def test_recorded_by_gymnasium(tmp_path) -> None:
-    env = gym.wrappers.RenderCollection(gym.make(ID, render_mode="rgb_array"))
-    env.reset(seed=0)
+def test_recorded_by_gymnasium(case: SystemCase) -> None:
+    env = gym.make(case.env_id, render_mode="rgb_array", **case.narrow)
+    env = gym.wrappers.RenderCollection(env)
+    env.reset(options={"state": case.away})
     for _ in range(3):
-        env.step(2)
+        env.step(0)
     assert len(env.render()) == 4
 
 
-@pytest.mark.parametrize("kind", [PendulumEnv, PendulumVectorEnv])
-def test_an_unknown_mode_is_refused(kind) -> None:
-    with pytest.raises(ValueError, match="render_mode must be None or one of"):
-        kind(render_mode="ansi")
+def test_an_unknown_mode_is_refused(case: SystemCase) -> None:
+    for kind in (case.single, case.vector):
+        with pytest.raises(ValueError, match="render_mode must be None or one of"):
+            kind(render_mode="ansi")
 
 
 @pytest.mark.parametrize("make", [gym.make, gym.make_vec])
-def test_mistakes(make) -> None:
-    env = make(ID)
+def test_mistakes(case: SystemCase, make) -> None:
+    env = make(case.env_id)
     env.reset(seed=0)
     with pytest.warns(UserWarning, match="render"):
         env.unwrapped.render()
     with pytest.raises(ResetNeeded):
-        make(ID, render_mode="rgb_array").unwrapped.render()
+        make(case.env_id, render_mode="rgb_array").unwrapped.render()
 
 
-def test_without_pygame_the_error_says_what_to_install(monkeypatch) -> None:
+def test_without_pygame_the_error_says_what_to_install(case, monkeypatch) -> None:
     monkeypatch.setitem(sys.modules, "pygame", None)
-    env = gym.make(ID, render_mode="rgb_array").unwrapped
+    env = gym.make(case.env_id, render_mode="rgb_array").unwrapped
     env.reset(seed=0)
     with pytest.raises(DependencyNotInstalled, match=r"acl-gym\[render\]"):
         env.render()
+
+
+@pytest.mark.parametrize("kind", [PendulumEnv, PendulumVectorEnv])
+def test_a_system_without_cells_draws_no_table(kind) -> None:
+    with pytest.raises(ValueError, match=r"GridSearch1D.*not Pendulum"):
+        kind(render_mode="rgb_array").show_table(np.ones((4, 3)))

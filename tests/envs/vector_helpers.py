@@ -5,18 +5,10 @@ from typing import Any
 import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv
 
-from acl_gym.envs.pendulum import PendulumVectorEnv
+from acl_gym.envs.control_env import ControlVectorEnv
+from tests.envs.systems import SystemCase
 
-ENV_ID = "acl_gym/Pendulum-v0"
 MODES = [mode.value for mode in AutoresetMode]
-
-# Random torques reach this goal now and then, so that slots finish in both ways.
-EASY: dict[str, Any] = {"goal_bounds": (2.5, 7.0)}
-
-# A slot that starts upright stands in this tiny goal after one step without torque;
-# no other slot ever comes there.
-TINY: dict[str, Any] = {"goal_bounds": (1e-9, 1e-9)}
-UPRIGHT = (np.pi, 0.0)
 
 StepResult = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]
 
@@ -73,9 +65,11 @@ def mask_of(num_envs: int, *slots: int) -> np.ndarray:
     return mask
 
 
-def random_states(num_envs: int, rng: np.random.Generator) -> np.ndarray:
-    """States anywhere in X, shape (num_envs, 2)."""
-    return rng.uniform((0.0, -9.0), (2 * np.pi, 9.0), (num_envs, 2))
+def random_states(
+    env: VectorEnv[Any, Any, Any], rng: np.random.Generator
+) -> np.ndarray:
+    """Initial states, one a slot, shape (num_envs, state_size)."""
+    return env.unwrapped.system.sample_states(rng, env.num_envs).T.copy()
 
 
 def step_and_reset(
@@ -93,15 +87,17 @@ def step_and_reset(
     if finished.any() and env.metadata["autoreset_mode"] is AutoresetMode.DISABLED:
         options: dict[str, Any] = {"reset_mask": finished}
         if rng is not None:
-            options["state"] = random_states(len(finished), rng)
+            options["state"] = random_states(env, rng)
         env.reset(options=options)
     return result
 
 
-def pair(mode: str, num_envs: int = 4, seed: int = 1) -> list[PendulumVectorEnv]:
+def pair(
+    case: SystemCase, mode: str, num_envs: int = 4, seed: int = 1
+) -> list[ControlVectorEnv]:
     """Two environments that have begun alike, with slots that finish soon."""
     envs = [
-        PendulumVectorEnv(num_envs, autoreset_mode=mode, max_episode_steps=11, **EASY)
+        case.vector(num_envs, autoreset_mode=mode, max_episode_steps=11, **case.easy)
         for _ in range(2)
     ]
     for env in envs:
@@ -109,14 +105,14 @@ def pair(mode: str, num_envs: int = 4, seed: int = 1) -> list[PendulumVectorEnv]
     return envs
 
 
-def walk(env: PendulumVectorEnv, steps: int, seed: int) -> list[StepResult]:
+def walk(env: ControlVectorEnv, steps: int, seed: int) -> list[StepResult]:
     """What the environment returns on a walk of random actions."""
     rng = np.random.default_rng(seed)
-    actions = rng.integers(0, 3, (steps, env.num_envs))
+    actions = rng.integers(0, env.single_action_space.n, (steps, env.num_envs))
     return [step_and_reset(env, row) for row in actions]
 
 
-def assert_walk_alike(ours: PendulumVectorEnv, theirs: PendulumVectorEnv) -> None:
+def assert_walk_alike(ours: ControlVectorEnv, theirs: ControlVectorEnv) -> None:
     """Their states, counters and random streams are the same, to the last bit."""
     for mine, other in zip(walk(ours, 60, 0), walk(theirs, 60, 0), strict=True):
         assert_same_step(mine, other)

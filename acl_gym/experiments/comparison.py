@@ -42,6 +42,7 @@ def compare(
     seeds: int | None,
     directory: Path,
     *,
+    first_seed: int = 0,
     fresh: bool = False,
     workers: int | None = None,
     console: Console | None = None,
@@ -55,6 +56,7 @@ def compare(
         seeds: runs of each agent; None takes the preset's number.
         directory: receives results.json, results.parquet, report.html, figures, and
             in runs/ the result of each run.
+        first_seed: the seeds are this one and those that follow it.
         fresh: make every run anew, also those that are there.
         workers: processes; None takes one for each core.
         console: where to print.
@@ -66,7 +68,7 @@ def compare(
     preset = PRESETS[preset_name]
     count = preset.seeds if seeds is None else seeds
     workers = workers or os.cpu_count() or 1
-    tasks = list_tasks(env_id, preset, agents, count)
+    tasks = list_tasks(env_id, preset, agents, range(first_seed, first_seed + count))
     runs_directory = directory / "runs"
     if fresh:
         for task in tasks:
@@ -84,7 +86,7 @@ def compare(
 
 
 def list_tasks(
-    env_id: str, preset: Preset, agents: Sequence[str], seeds: int
+    env_id: str, preset: Preset, agents: Sequence[str], seeds: Sequence[int]
 ) -> list[Task]:
     """The reference, then every run; the longest first, so that no core idles late."""
     order = sorted(agents, key=lambda name: name != "dqn")
@@ -112,7 +114,7 @@ def list_tasks(
                 },
             )
             for agent in order
-            for seed in range(seeds)
+            for seed in seeds
         ),
     ]
 
@@ -140,7 +142,7 @@ def _collect(
         "preset": preset_name,
         "version": acl_gym.__version__,
         "date": datetime.date.today().isoformat(),
-        "command": " ".join(["python", *sys.argv]),
+        "command": _command(),
         "machine": {
             "python": platform.python_version(),
             "cpu": _cpu_name(),
@@ -245,6 +247,13 @@ class _Bar:
         self._progress.update(
             self._bar, completed=done, description=f"runs  {under_way}"
         )
+
+
+def _command() -> str:
+    """The command that runs, without the folders it is installed in."""
+    program, *arguments = sys.argv
+    known = {"acl-gym": "acl-gym", "__main__.py": "python -m acl_gym"}
+    return " ".join([known.get(Path(program).name, f"python {program}"), *arguments])
 
 
 def _cpu_name() -> str:

@@ -1,0 +1,189 @@
+"""`acl-gym envs`: the environments of this package and their parameters.
+
+The list is read from the docstrings of the source files, not from the modules: those
+import Numba, which takes a second.
+"""
+
+from __future__ import annotations
+
+import ast
+import importlib.util
+import inspect
+import re
+from dataclasses import MISSING, Field, fields, is_dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from acl_gym.cli.common import (
+    BadArgumentError,
+    DebugOption,
+    JsonOption,
+    console,
+    make_env,
+    print_json,
+)
+from acl_gym.registration import ENVIRONMENTS
+
+HELP = """List the environments of acl-gym, or the parameters of one.
+
+Each parameter is a keyword of gym.make and gym.make_vec, and an --env-arg of acl-gym
+train, as is max_episode_steps.
+
+\b
+Examples:
+  acl-gym envs
+  acl-gym envs acl_gym/Pendulum-v0
+  acl-gym envs --json
+"""
+
+
+def envs(
+    env_id: Annotated[
+        str | None,
+        typer.Argument(metavar="[ID]", help="Show its parameters.", show_default=False),
+    ] = None,
+    seed: Annotated[
+        int,
+        typer.Option(
+            min=0, metavar="N", help="Of the example observation that ID shows."
+        ),
+    ] = 0,
+    as_json: JsonOption = False,
+    debug: DebugOption = False,
+) -> None:
+    """List environments; see `HELP`."""
+    if env_id is None:
+        rows = [describe(each) for each in ENVIRONMENTS]
+        if as_json:
+            print_json(rows)
+        else:
+            _print_list(rows)
+        return
+    if env_id not in ENVIRONMENTS:
+        raise BadArgumentError(
+            f"acl-gym has no environment {env_id!r}; there are "
+            f"{', '.join(ENVIRONMENTS)}."
+        )
+    found = {**describe(env_id), **_example(env_id, seed)}
+    if as_json:
+        print_json(found)
+    else:
+        _print_one(found)
+
+
+def describe(env_id: str) -> dict[str, Any]:
+    """What the docstring of an environment says in short, read without importing it."""
+    module, name = ENVIRONMENTS[env_id][0].split(":")
+    text = _docstring(module, name)
+    section = re.search(r"§[\d.]*\d|Chapter \d+", text)
+    return {
+        "id": env_id,
+        "description": text.partition("\n")[0],
+        "observation": _first_sentence(text, "Observation Space"),
+        "actions": _first_sentence(text, "Action Space"),
+        "thesis": section[0] if section else "",
+    }
+
+
+def parameters(system: type) -> list[dict[str, Any]]:
+    """Name, default and meaning of each field of a system, from its docstring."""
+    if not is_dataclass(system):
+        return []
+    meanings = _attributes(inspect.getdoc(system) or "")
+    return [
+        {
+            "name": field.name,
+            "default": _default(field),
+            "meaning": meanings.get(field.name, ""),
+        }
+        for field in fields(system)
+        if field.init
+    ]
+
+
+def _default(field: Field[Any]) -> Any:
+    if field.default is not MISSING:
+        return field.default
+    if field.default_factory is not MISSING:
+        return field.default_factory()
+    return None
+
+
+def _docstring(module: str, name: str) -> str:
+    spec = importlib.util.find_spec(module)
+    if spec is None or spec.origin is None:
+        return ""
+    tree = ast.parse(Path(spec.origin).read_text(encoding="utf-8"))
+    for node in tree.body:
+        if isinstance(node, ast.ClassDef) and node.name == name:
+            return ast.get_docstring(node) or ""
+    return ""
+
+
+def _first_sentence(text: str, head: str) -> str:
+    """The first sentence under a head of a docstring, without backquotes."""
+    match = re.search(rf"^## {head}\n+((?:.+\n?)+)", text, re.MULTILINE)
+    if match is None:
+        return ""
+    paragraph = " ".join(match[1].split()).replace("`", "")
+    return re.split(r"(?<=[^.])\.(?= |$)", paragraph)[0]
+
+
+def _attributes(text: str) -> dict[str, str]:
+    """The entries of the section `Attributes:` of a Google docstring."""
+    _, _, section = text.partition("Attributes:\n")
+    entries: dict[str, str] = {}
+    name = ""
+    for line in section.splitlines():
+        if line and not line.startswith(" "):
+            break
+        if match := re.match(r"    (\w+): (.*)", line):
+            name = match[1]
+            entries[name] = match[2]
+        elif name and line.strip():
+            entries[name] += " " + line.strip()
+    return entries
+
+
+def _example(env_id: str, seed: int) -> dict[str, Any]:
+    env = make_env(env_id, 1, {})
+    observation, _ = env.reset(seed=seed)
+    return {
+        "example": observation[0].tolist(),
+        "parameters": parameters(type(env.unwrapped.system)),  # type: ignore[attr-defined]
+    }
+
+
+def _print_list(rows: list[dict[str, Any]]) -> None:
+    from rich.table import Table
+
+    table = Table(box=None, pad_edge=False, header_style="bold", padding=(0, 2, 1, 0))
+    for head in ("id", "description", "observation", "actions", "thesis"):
+        table.add_column(head, overflow="fold", no_wrap=head in ("id", "thesis"))
+    for row in rows:
+        table.add_row(*row.values())
+    console().print(table, markup=False, highlight=False)
+
+
+def _print_one(found: dict[str, Any]) -> None:
+    from rich.table import Table
+    from rich.text import Text
+
+    target = console()
+    lines = [
+        f"{found['id']}: {found['description']}",
+        f"observation: {found['observation']}; for example {found['example']}",
+        f"actions: {found['actions']}",
+        f"thesis: {found['thesis']}",
+    ]
+    for line in lines:
+        target.print(line, markup=False, highlight=False)
+    table = Table(box=None, pad_edge=False, header_style="bold")
+    for head in ("parameter", "default", "meaning"):
+        table.add_column(head, overflow="fold")
+    for each in found["parameters"]:
+        table.add_row(each["name"], Text(str(each["default"])), Text(each["meaning"]))
+    target.print()
+    target.print(table, highlight=False)

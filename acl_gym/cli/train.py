@@ -1,0 +1,300 @@
+"""`acl-gym train`: learn on any environment and save the agent."""
+
+from __future__ import annotations
+
+import inspect
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import typer
+
+from acl_gym.cli.common import (
+    AGENTS,
+    FOREIGN_EPISODES,
+    AgentName,
+    BadArgumentError,
+    DebugOption,
+    JsonOption,
+    bad_arguments,
+    console,
+    default_steps,
+    make_env,
+    parse_settings,
+    print_json,
+)
+
+if TYPE_CHECKING:
+    from gymnasium.vector import VectorEnv
+
+    from acl_gym.agents.tabular import TabularAgent
+    from acl_gym.callbacks import Callback, PolicyEvaluation
+    from acl_gym.partition import Partition
+
+HELP = """Learn on an environment, print how it went, and save the agent.
+
+ENV_ID is any id of Gymnasium that can be a vector environment with Discrete actions;
+"module:id" imports a module first, also one in this folder. Rewards must be negative
+costs for ants, and observations a bounded Box.
+
+\b
+Examples:
+  acl-gym train acl_gym/Pendulum-v0 --out pendulum.npz
+  acl-gym train acl_gym/Pendulum-v0 --ants 2000 --trials 50 --seed 3
+  acl-gym train acl_gym/Pendulum-v0 --agent q-learning --param epsilon=0.05
+  acl-gym train acl_gym/Pendulum-v0 --partition crisp --param global_decay=0.001
+  acl-gym train acl_gym/Pendulum-v0 --env-arg torques=[-1,0,1] --cells 64,65
+  acl-gym train my_module:MyEnv-v0 --max-steps 200 --log run.csv --json
+"""
+
+DEFAULT_CELLS = {"acl_gym/Pendulum-v0": (40, 41)}
+"""Cells of each variable, §5.3."""
+
+ABOUT_CELLS = 1600
+"""Cells altogether where nothing else is said."""
+
+_OWN_OPTION = ("env", "partition", "max_steps", "seed", "n_actions")
+
+
+def train(
+    env_id: Annotated[
+        str,
+        typer.Argument(metavar="ENV_ID", help="See acl-gym envs.", show_default=False),
+    ],
+    agent: Annotated[AgentName, typer.Option(help="Who learns.")] = "acl",
+    trials: Annotated[
+        int,
+        typer.Option(min=1, metavar="K", help="Trials, one episode of every ant each."),
+    ] = 100,
+    ants: Annotated[
+        int, typer.Option(min=1, metavar="M", help="Slots of the vector environment.")
+    ] = 250,
+    partition: Annotated[
+        Literal["auto", "fuzzy", "crisp"],
+        typer.Option(
+            help="How states become cells, spread evenly over the bounds of the "
+            "observations; auto is fuzzy."
+        ),
+    ] = "auto",
+    cells: Annotated[
+        str | None,
+        typer.Option(
+            metavar="N,N,...",
+            help="Cells of each variable, or one number for all.  "
+            "[default: 40,41 for the pendulum, else about 1600 altogether]",
+            show_default=False,
+        ),
+    ] = None,
+    max_steps: Annotated[
+        int | None,
+        typer.Option(
+            min=1,
+            metavar="T",
+            help="The longest an episode may last, in learning and in evaluation.  "
+            "[default: that of the environment, else 300]",
+            show_default=False,
+        ),
+    ] = None,
+    param: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME=VALUE",
+            help="A parameter of the agent, such as epsilon=0.2; give it again for "
+            "more. An unknown name lists those there are.",
+            show_default=False,
+        ),
+    ] = None,
+    env_arg: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME=VALUE",
+            help="A parameter of the environment, see acl-gym envs ENV_ID; numbers, "
+            "true, false and [lists] are read as JSON.",
+            show_default=False,
+        ),
+    ] = None,
+    seed: Annotated[
+        int, typer.Option(min=0, metavar="N", help="The run is a function of it.")
+    ] = 0,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE.npz",
+            help="Save the agent here.  [default: not saved]",
+            show_default=False,
+        ),
+    ] = None,
+    evaluate_every: Annotated[
+        int, typer.Option(min=1, metavar="N", help="Trials between two evaluations.")
+    ] = 10,
+    log: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE.csv", help="Write a row of each trial.", show_default=False
+        ),
+    ] = None,
+    tensorboard: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="DIR", help="Write scalars for TensorBoard.", show_default=False
+        ),
+    ] = None,
+    quiet: Annotated[
+        bool, typer.Option("--quiet", help="Print no bar and no table.")
+    ] = False,
+    as_json: JsonOption = False,
+    debug: DebugOption = False,
+) -> None:
+    """Learn; see `HELP`."""
+    from acl_gym import storage
+
+    with bad_arguments():
+        if out is not None:
+            out = storage.checked_target(storage.with_suffix(out))
+        kind = agent_class(agent)
+        settings = parse_settings("--param", param or (), parameter_names(kind))
+        env_args = parse_settings("--env-arg", env_arg or ())
+        env = make_env(env_id, ants, env_args)
+        steps = max_steps or default_steps(env)
+        grid = _make_partition(env, partition, _cells(env_id, cells))
+        learner = kind(env, grid, max_steps=steps, seed=seed, **settings)
+        evaluation = _make_evaluation(env, env_id, env_args, evaluate_every, steps)
+        watchers = [evaluation, *_make_logs(log, tensorboard)]
+    learner.metadata = {
+        "env_id": env_id,
+        "env_args": env_args,
+        "evaluation": {
+            "episodes": None if evaluation.env is env else evaluation.env.num_envs,
+            "max_steps": steps,
+            "seed": evaluation.seed,
+        },
+    }
+    learner.learn(
+        trials=trials,
+        callback=watchers,
+        progress_bar=not quiet and sys.stderr.isatty(),
+    )
+    if out is not None:
+        learner.save(out)
+    if as_json:
+        print_json(_summary(learner, agent, ants, out))
+    elif not quiet:
+        _print_rows(learner, out)
+
+
+def agent_class(name: str) -> Any:
+    """The class that `--agent` means."""
+    import acl_gym
+
+    return getattr(acl_gym, AGENTS[name])
+
+
+def parameter_names(kind: type) -> list[str]:
+    """What `--param` may set: the keywords of the constructor without own options."""
+    parameters = inspect.signature(kind).parameters
+    return [name for name in parameters if name not in _OWN_OPTION]
+
+
+def _cells(env_id: str, text: str | None) -> list[int] | None:
+    if text is None:
+        default = DEFAULT_CELLS.get(env_id.rsplit(":", maxsplit=1)[-1])
+        return None if default is None else list(default)
+    try:
+        return [int(part) for part in text.split(",")]
+    except ValueError:
+        raise BadArgumentError(
+            f"--cells must be whole numbers such as 40,41, got {text!r}."
+        ) from None
+
+
+def _make_partition(env: VectorEnv, kind: str, cells: list[int] | None) -> Partition:
+    """Cells spread evenly over a bounded Box; its circular variables are known."""
+    from gymnasium import spaces
+
+    from acl_gym import Crisp, Fuzzy
+    from acl_gym.envs.control_env import ControlVectorEnv
+
+    space = env.single_observation_space
+    if not isinstance(space, spaces.Box) or len(space.shape) != 1:
+        raise BadArgumentError(
+            f"observations must be a Box with one axis, got {space}; use the Python "
+            "interface with a partition of your own."
+        )
+    dimensions = int(space.shape[0])
+    if cells is None:
+        cells = [max(3, round(ABOUT_CELLS ** (1 / dimensions)))]
+    if len(cells) == 1:
+        cells = cells * dimensions
+    base = env.unwrapped
+    circular = base.system.circular if isinstance(base, ControlVectorEnv) else ()
+    grid = Crisp if kind == "crisp" else Fuzzy
+    return grid.from_box(space, cells, circular)
+
+
+def _make_evaluation(
+    env: VectorEnv, env_id: str, env_args: dict[str, Any], every: int, steps: int
+) -> PolicyEvaluation:
+    """From the environment's own initial states, else from random but fixed ones."""
+    from acl_gym import PolicyEvaluation
+    from acl_gym.envs.control_env import ControlVectorEnv
+
+    if not isinstance(env.unwrapped, ControlVectorEnv):
+        env = make_env(env_id, FOREIGN_EPISODES, env_args)
+    return PolicyEvaluation(env, every=every, max_steps=steps)
+
+
+def _make_logs(log: Path | None, tensorboard: Path | None) -> list[Callback]:
+    from acl_gym import CSVLog, TensorBoardLog
+
+    logs: list[Callback] = []
+    if log is not None:
+        logs.append(CSVLog(log))
+    if tensorboard is not None:
+        logs.append(TensorBoardLog(tensorboard))
+    return logs
+
+
+def _summary(
+    learner: TabularAgent, name: str, ants: int, out: Path | None
+) -> dict[str, Any]:
+    last = learner.history[-1]
+    return {
+        **learner.metadata,
+        "agent": name,
+        "ants": ants,
+        "partition": repr(learner.partition),
+        "parameters": learner.parameters(),
+        "trials": learner.trials,
+        "env_steps": learner.num_timesteps,
+        "seconds": learner.seconds,
+        "policy_cost": last["policy_cost"],
+        "success_rate": last["success_rate"],
+        "file": None if out is None else str(out),
+        "rows": learner.history,
+    }
+
+
+def _print_rows(learner: TabularAgent, out: Path | None) -> None:
+    from rich.table import Table
+
+    table = Table(box=None, pad_edge=False, header_style="bold")
+    heads = ("trial", "steps", "seconds", "ants' cost", "policy cost", "success")
+    for head in heads:
+        table.add_column(head, justify="right")
+    for row in learner.history:
+        if "policy_cost" in row:
+            table.add_row(
+                f"{row['trial']}",
+                f"{row['env_steps']:,}",
+                f"{row['seconds']:.2f}",
+                f"{row['ants_cost']:.2f}",
+                f"{row['policy_cost']:.4f}",
+                f"{row['success_rate']:.1%}",
+            )
+    target = console()
+    target.print(table)
+    if out is None:
+        line = "The agent was not saved; --out FILE.npz does."
+    else:
+        line = f"Saved {out}; acl-gym evaluate {out} evaluates it again."
+    target.print(line, markup=False, highlight=False, soft_wrap=True)

@@ -26,7 +26,7 @@ def test_the_program_makes_the_files(name: str) -> None:
 @pytest.mark.parametrize("name", MAPS)
 def test_maps_are_what_the_thesis_says(name: str) -> None:
     rows = load_map(name)
-    size = int(name.split("x")[0])
+    size = int(name.split("x", maxsplit=1)[0])
     assert len(rows) == size
     assert {len(row) for row in rows} == {size}
     text = "".join(rows)

@@ -63,12 +63,12 @@ def checked_map(desc: Any) -> tuple[str, ...]:
         ValueError: it is no world in which every free cell has a way to a goal.
     """
     lines = desc.strip().split("\n") if isinstance(desc, str) else desc
-    if not isinstance(lines, Sequence) or not all(isinstance(r, str) for r in lines):
+    if not isinstance(lines, Sequence) or not all(isinstance(x, str) for x in lines):
         raise TypeError(
             "desc must be the text of a map or a sequence of its rows, got "
             f"{desc!r} of type {type(desc).__name__}."
         )
-    rows = tuple(line.strip() for line in lines)
+    rows = tuple(str(line).strip() for line in lines)
     for number, row in enumerate(rows):
         if len(row) != len(rows[0]):
             raise ValueError(
@@ -161,6 +161,8 @@ def make_map(
     validation.integer("free_cells", free_cells, at_least=1)
     if size % 2 == 0:
         raise ValueError(f"size must be odd, for the goal in the centre, got {size}.")
+    if mean_path is not None:
+        validation.number("mean_path", mean_path, above=0)
     rng = np.random.default_rng(seed)
     goals = np.zeros((size, size), dtype=np.bool_)
     goals[size // 2, size // 2] = True

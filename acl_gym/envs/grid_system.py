@@ -193,7 +193,7 @@ class GridSearch(ControlSystem):
             ValueError: wrong shape, or a state is no integer of 0..n_states - 1.
         """
         array = validation.real_array("states", states, finite=False)
-        if array.shape not in ((len(array),), (len(array), 1)):
+        if array.shape not in ((array.size,), (array.size, 1)):
             raise ValueError(
                 "states must be one integer each, shape (n,) or (n, 1), got "
                 f"{array.shape}."

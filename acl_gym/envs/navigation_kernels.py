@@ -116,4 +116,6 @@ def settle(
             degree *= max(1.0 - s2 / goal_velocity, 0.0)
             reached[i] = degree > 0.5
         else:
-            reached[i] = max(x1, x2) <= goal_position and max(s1, s2) <= goal_velocity
+            # Not `and`: a branch here would keep the loop from being vectorised.
+            near = max(x1, x2) <= goal_position
+            reached[i] = near & (max(s1, s2) <= goal_velocity)

@@ -26,7 +26,7 @@ _FORCE: Colour = (213, 94, 0)
 _MARGIN = 0.045  # of the canvas, around the plane
 _VEHICLE_RADIUS = 0.021
 _FORCE_LENGTH = 0.1  # of the largest force, beyond the vehicle
-_VELOCITY_SECONDS = 0.8  # the velocity line shows how far the vehicle drifts in these
+_VELOCITY_SECONDS = 1.0  # the velocity line is how far the vehicle would drift
 
 
 def draw_vehicle(

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from llvmlite import ir
 from numba import njit, types
 from numba.extending import intrinsic, overload
 
@@ -56,12 +55,11 @@ def _power_of_two(rounded: float) -> float:
 def _move_to_exponent(_: Any, rounded: Any) -> Any:
     """Make the low bits of `rounded`, and 1023, the exponent of a float."""
 
-    def code(_context: Any, builder: Any, _signature: Any, args: Any) -> Any:
-        bits = ir.IntType(64)
-        n = builder.bitcast(args[0], bits)
-        biased = builder.add(n, ir.Constant(bits, 1023))
-        exponent = builder.shl(biased, ir.Constant(bits, 52))
-        return builder.bitcast(exponent, ir.DoubleType())
+    def code(context: Any, builder: Any, _signature: Any, args: Any) -> Any:
+        bits = builder.bitcast(args[0], context.get_value_type(types.int64))
+        biased = builder.add(bits, context.get_constant(types.int64, 1023))
+        exponent = builder.shl(biased, context.get_constant(types.int64, 52))
+        return builder.bitcast(exponent, context.get_value_type(types.float64))
 
     return types.float64(types.float64), code
 
@@ -69,7 +67,7 @@ def _move_to_exponent(_: Any, rounded: Any) -> Any:
 @overload(_power_of_two, inline="always")
 def _compiled_power_of_two(rounded: Any) -> Any:
     def implementation(rounded: Any) -> Any:
-        return _move_to_exponent(rounded)
+        return _move_to_exponent(rounded)  # type: ignore[call-arg]
 
     return implementation
 

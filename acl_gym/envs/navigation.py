@@ -1,4 +1,4 @@
-"""The 2-D navigation with variable damping of §4.5: parameters, dynamics, kernels."""
+"""The 2-D navigation with variable damping of §4.5: parameters and dynamics."""
 
 from __future__ import annotations
 
@@ -10,123 +10,12 @@ from typing import Any, ClassVar
 
 import numpy as np
 from gymnasium import spaces
-from numba import njit
 from numpy.typing import ArrayLike
 
 from acl_gym import validation
 from acl_gym.envs.control_env import ControlEnv, ControlVectorEnv
-from acl_gym.envs.fast_math import exponential
+from acl_gym.envs.navigation_kernels import Peak, Row, integrate, settle
 from acl_gym.envs.system import BoolArray, ControlSystem, FloatArray, IntArray
-
-Peak = tuple[float, float, float, float, float]
-Row = tuple[float, float, float, float]
-
-
-@njit(cache=True, error_model="numpy", inline="always")
-def _damping_at(c1: float, c2: float, base: float, peaks: tuple[Peak, ...]) -> float:
-    """The damping at one position; each peak is (height, m1, m2, 1/sigma1, 1/sigma2).
-
-    The peaks are a tuple, so that their number is known when the kernel is compiled
-    and the loop over the slots is the innermost one that is left.
-    """
-    total = base
-    for k in range(len(peaks)):
-        height, mean_1, mean_2, rate_1, rate_2 = peaks[k]
-        distance_1 = (c1 - mean_1) * rate_1
-        distance_2 = (c2 - mean_2) * rate_2
-        total += height * exponential(
-            -(distance_1 * distance_1 + distance_2 * distance_2)
-        )
-    return total
-
-
-@njit(cache=True, error_model="numpy")
-def _integrate(
-    c1: FloatArray,
-    v1: FloatArray,
-    c2: FloatArray,
-    v2: FloatArray,
-    action: IntArray,
-    acceleration: FloatArray,
-    base: float,
-    peaks: tuple[Peak, ...],
-    step: float,
-    substeps: int,
-) -> None:
-    """Fourth-order Runge-Kutta for §4.5.1, the force held constant, in place.
-
-    c_j' = v_j,  v_j' = acceleration[j, action] - b(c1, c2) v_j,  for j = 1, 2
-    """
-    half = 0.5 * step
-    sixth = step / 6.0
-    push1 = acceleration[0][action]
-    push2 = acceleration[1][action]
-    for _ in range(substeps):
-        for i in range(c1.size):
-            x1, x2 = c1[i], c2[i]
-            p1, p2 = push1[i], push2[i]
-            sa1, sa2 = v1[i], v2[i]
-            b = _damping_at(x1, x2, base, peaks)
-            ra1, ra2 = p1 - b * sa1, p2 - b * sa2
-            sb1, sb2 = sa1 + half * ra1, sa2 + half * ra2
-            b = _damping_at(x1 + half * sa1, x2 + half * sa2, base, peaks)
-            rb1, rb2 = p1 - b * sb1, p2 - b * sb2
-            sc1, sc2 = sa1 + half * rb1, sa2 + half * rb2
-            b = _damping_at(x1 + half * sb1, x2 + half * sb2, base, peaks)
-            rc1, rc2 = p1 - b * sc1, p2 - b * sc2
-            sd1, sd2 = sa1 + step * rc1, sa2 + step * rc2
-            b = _damping_at(x1 + step * sc1, x2 + step * sc2, base, peaks)
-            rd1, rd2 = p1 - b * sd1, p2 - b * sd2
-            c1[i] = x1 + sixth * (sa1 + 2.0 * (sb1 + sc1) + sd1)
-            c2[i] = x2 + sixth * (sa2 + 2.0 * (sb2 + sc2) + sd2)
-            v1[i] = sa1 + sixth * (ra1 + 2.0 * (rb1 + rc1) + rd1)
-            v2[i] = sa2 + sixth * (ra2 + 2.0 * (rb2 + rc2) + rd2)
-
-
-@njit(cache=True, error_model="numpy")
-def _settle(
-    c1: FloatArray,
-    v1: FloatArray,
-    c2: FloatArray,
-    v2: FloatArray,
-    action: IntArray,
-    position_max: float,
-    velocity_max: float,
-    weight: tuple[Row, Row, Row, Row],
-    cost_action: FloatArray,
-    product: bool,
-    goal_position: float,
-    goal_velocity: float,
-    rewards: FloatArray,
-    reached: BoolArray,
-) -> None:
-    """Clip the next states to X; reward (3.2) and goal test on them, in place.
-
-    The goal is a product of triangles > 0.5 if `product`, else a box.
-    """
-    (w11, w12, w13, w14), (_, w22, w23, w24), (_, _, w33, w34), (_, _, _, w44) = weight
-    rate_c, rate_v = 1.0 / goal_position, 1.0 / goal_velocity
-    price = cost_action[action]
-    for i in range(c1.size):
-        x1 = min(max(c1[i], -position_max), position_max)
-        x2 = min(max(c2[i], -position_max), position_max)
-        s1 = min(max(v1[i], -velocity_max), velocity_max)
-        s2 = min(max(v2[i], -velocity_max), velocity_max)
-        c1[i], v1[i], c2[i], v2[i] = x1, s1, x2, s2
-        rewards[i] = -(
-            (w11 * x1 + 2.0 * (w12 * s1 + w13 * x2 + w14 * s2)) * x1
-            + (w22 * s1 + 2.0 * (w23 * x2 + w24 * s2)) * s1
-            + (w33 * x2 + 2.0 * w34 * s2) * x2
-            + w44 * s2 * s2
-            + price[i]
-        )
-        x1, s1, x2, s2 = abs(x1), abs(s1), abs(x2), abs(s2)
-        if product:
-            degree = max(1.0 - x1 * rate_c, 0.0) * max(1.0 - s1 * rate_v, 0.0)
-            degree *= max(1.0 - x2 * rate_c, 0.0) * max(1.0 - s2 * rate_v, 0.0)
-            reached[i] = degree > 0.5
-        else:
-            reached[i] = max(x1, x2) <= goal_position and max(s1, s2) <= goal_velocity
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -176,7 +65,7 @@ class Navigation(ControlSystem):
         (8.0, 4.7, 1.0, 1.5, 2.0),
     )
     forces: tuple[tuple[float, float], ...] = tuple(
-        itertools.product((-1.0, 0.0, 1.0), repeat=2)
+        itertools.product((-1.0, 0.0, 1.0), (-1.0, 0.0, 1.0))
     )
     sampling_time: float = 0.2
     substeps: int = 1
@@ -213,7 +102,9 @@ class Navigation(ControlSystem):
             if value is None:
                 value = float(getattr(self, field.name))
             object.__setattr__(self, field.name, value)
-        self._check_step()
+        with np.errstate(over="ignore", invalid="ignore"):  # the checks look for it
+            self._check_step()
+            self._check_cost()
         self._check_goal()
 
     @cached_property
@@ -241,7 +132,8 @@ class Navigation(ControlSystem):
         """What each action adds to the stage cost: u' R u, or 1 for time spent."""
         if self.cost == "time":
             return np.ones(len(self.forces))
-        return self.force_weight * np.square(self.forces).sum(axis=1)
+        squares = np.square(np.array(self.forces)).sum(axis=1)
+        return np.asarray(self.force_weight * squares, dtype=np.float64)
 
     @property
     def _limits(self) -> FloatArray:
@@ -330,7 +222,7 @@ class Navigation(ControlSystem):
     ) -> None:
         """One sampling time of §4.5.1; see `ControlSystem.advance`."""
         c1, v1, c2, v2 = states
-        _integrate(
+        integrate(
             c1,
             v1,
             c2,
@@ -342,7 +234,7 @@ class Navigation(ControlSystem):
             self.sampling_time / self.substeps,
             self.substeps,
         )
-        _settle(
+        settle(
             c1,
             v1,
             c2,
@@ -401,6 +293,8 @@ class Navigation(ControlSystem):
                 f"constant mass / damping, {self.mass / highest:.3g} s, got {step:g} s;"
                 " use more substeps or check mass, base_damping and peaks."
             )
+
+    def _check_cost(self) -> None:
         if not math.isfinite(self.max_stage_cost):
             raise ValueError(
                 "state_weight and force_weight must give a finite stage cost, got "

@@ -26,7 +26,7 @@ _FORCE: Colour = (213, 94, 0)
 _MARGIN = 0.045  # of the canvas, around the plane
 _VEHICLE_RADIUS = 0.021
 _FORCE_LENGTH = 0.1  # of the largest force, beyond the vehicle
-_VELOCITY_SECONDS = 0.8  # the velocity line shows how far the vehicle drifts in these
+_VELOCITY_SECONDS = 1.0  # the velocity line is how far the vehicle would drift
 
 
 def draw_vehicle(
@@ -59,7 +59,7 @@ def goal_outline(system: Navigation) -> FloatArray:
     """The outline of the goal region for a vehicle at rest, m, shape `(n, 2)`."""
     if system.goal_rule == "bounds":
         half = min(system.goal_bounds[0], system.position_max)
-        return half * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]], dtype=np.float64)
+        return np.array([[-half, -half], [half, -half], [half, half], [-half, half]])
     # (1 - |c1| / s)(1 - |c2| / s) = 0.5, one quarter and its three mirrored ones.
     spacing = system.goal_spacing[0]
     along = np.linspace(0.0, 0.5, 17)
@@ -69,7 +69,8 @@ def goal_outline(system: Navigation) -> FloatArray:
         quarter @ np.array([[math.cos(a), -math.sin(a)], [math.sin(a), math.cos(a)]])
         for a in np.pi / 2 * np.arange(4)
     ]
-    return np.clip(np.concatenate(turned), -system.position_max, system.position_max)
+    outline: FloatArray = np.concatenate(turned)
+    return outline.clip(-system.position_max, system.position_max)
 
 
 @lru_cache(maxsize=4)
@@ -84,7 +85,7 @@ def _background(system: Navigation, size: int) -> NDArray[np.uint8]:
     excess = damping - system.base_damping
     share = np.where(plane, excess / (excess[plane].max() or 1.0), 0.0)
     colours = np.array(_PAPER) + share[..., None] * (_DARKEST - np.array(_PAPER))
-    return np.rint(colours).astype(np.uint8)
+    return np.asarray(np.rint(colours), dtype=np.uint8)
 
 
 def _line(size: int) -> int:
@@ -129,5 +130,9 @@ def _draw_force(
     start = vehicle + _VEHICLE_RADIUS * size * along
     neck = start + _FORCE_LENGTH * size * strength / largest * along
     _draw_bar(pygame, canvas, _FORCE, start, neck, 0.013 * size)
-    corners = [neck + 0.55 * head * side, neck - 0.55 * head * side, neck + head * along]
+    corners = [
+        neck + 0.55 * head * side,
+        neck - 0.55 * head * side,
+        neck + head * along,
+    ]
     pygame.draw.polygon(canvas, _FORCE, [tuple(corner) for corner in corners])

@@ -17,6 +17,7 @@ from tqdm.auto import tqdm
 
 from acl_gym import validation
 from acl_gym.agents.policy import TablePolicy
+from acl_gym.agents.selection import ALL, best_value
 from acl_gym.envs.control_env import ControlVectorEnv
 from acl_gym.membership import CellArray, FloatArray
 from acl_gym.partition import Partition
@@ -146,18 +147,13 @@ def _sweep(
     values: FloatArray,
 ) -> float:
     """One pass over all cells and actions, in place; returns the largest change."""
-    n_cells, n_actions, k = index.shape
+    n_cells, n_actions = reward.shape
     change = 0.0
     for cell in range(n_cells):
         for u in range(n_actions):
             best = 0.0
             if not terminated[cell, u]:
-                best = -np.inf
-                for v in range(n_actions):
-                    value = 0.0
-                    for c in range(k):
-                        value += degree[cell, u, c] * values[index[cell, u, c], v]
-                    best = max(best, value)
+                best = best_value(values, index[cell], degree[cell], u, ALL)
             new = reward[cell, u] + discount * best
             change = max(change, abs(new - values[cell, u]))
             values[cell, u] = new

@@ -1,39 +1,66 @@
-"""Q-learning over the same partition and the same slots as the colony."""
+"""Q-learning and Q(lambda) over the same partition and slots as the colony."""
 
 from __future__ import annotations
 
 from typing import Any, Self
 
 import numpy as np
-from gymnasium.vector import VectorEnv
+from gymnasium.vector import AutoresetMode, VectorEnv
 from numba import njit
 from numpy.typing import ArrayLike
 
 from acl_gym import validation
 from acl_gym.agents.pheromone import BoolArray
-from acl_gym.agents.selection import epsilon_greedy_actions
+from acl_gym.agents.selection import (
+    ALL,
+    best_value,
+    epsilon_greedy_actions,
+    mark_greedy,
+)
 from acl_gym.agents.tabular import TabularAgent
 from acl_gym.agents.training import Training
+from acl_gym.agents.walk import Step, Walk
 from acl_gym.callbacks import Callbacks
 from acl_gym.membership import CellArray, FloatArray, IntArray
 from acl_gym.partition import Partition
 
+TRACES = ("replacing", "accumulating")
+
+TRACE_CUTOFF = 1e-4
+"""Traces that fade below it are dropped (a decision)."""
+
 
 class QLearning(TabularAgent):
-    """Watkins's Q-learning (3.44), all slots learning one table in parallel.
+    """Watkins's Q-learning (3.44) and Q(lambda) (3.45), all slots learning one table.
 
     Through a `Crisp` partition it is tabular Q-learning; through a `Fuzzy` one the
     action value is linear in the degrees, Q(x, u) = sum of beta_i Q_iu, and each cell
     learns in proportion to its degree. Values start at 0, which is optimistic where
     rewards are negative costs, and so makes the slots explore.
 
+    With `trace_decay` > 0 it is Watkins's Q(lambda), as in
+    `QLearning(env, grid, trace_decay=0.9)`. Each slot has traces of its own, which
+    begin empty with each episode. In each step they fade by gamma_rl lambda, the cells
+    of the state and the action taken are added, and every pair learns from the error
+    (3.46) in proportion to its trace. An action that is not greedy on the values it
+    was chosen on cuts the slot's traces first; a tied one is greedy. Traces below
+    1e-4 are dropped.
+
     Args:
-        env: a vector environment with `Discrete` actions.
+        env: a vector environment with `Discrete` actions. The actions that a state
+            offers (`infos["action_mask"]`) are U_q in (3.44) and (3.46).
         partition: turns observations into cells and degrees; None takes
             `automatic_partition(env)`.
         learning_rate: alpha_rl, in (0, 1].
         discount: gamma_rl, in [0, 1].
         epsilon: probability of a random action, in [0, 1].
+        trace_decay: lambda, in [0, 1]; 0 is plain Q-learning.
+        traces: what a visit does to a trace e that has faded already, for a cell of
+            degree beta. `"replacing"` makes it max(e, beta): at most 1, so that no
+            error is corrected by more than the learning rate. `"accumulating"` makes
+            it e + beta: a slot that stands still against a wall comes to
+            1 / (1 - gamma_rl lambda), which times the learning rate can exceed 1, and
+            then the value moves further than the error.
         max_steps: the longest an episode may last, >= 1. None takes the limit that the
             environment is registered with, and 300 where it has none.
         seed: a run is a function of it; None draws one from the system.
@@ -47,6 +74,7 @@ class QLearning(TabularAgent):
     learning_rate = validation.Number(above=0, at_most=1)
     discount = validation.Number(at_least=0, at_most=1)
     epsilon = validation.Number(at_least=0, at_most=1)
+    trace_decay = validation.Number(at_least=0, at_most=1)
 
     def __init__(
         self,
@@ -56,6 +84,8 @@ class QLearning(TabularAgent):
         learning_rate: float = 0.3,
         discount: float = 0.98,
         epsilon: float = 0.1,
+        trace_decay: float = 0.0,
+        traces: str = "replacing",
         max_steps: int | None = None,
         seed: int | None = None,
         n_actions: int | None = None,
@@ -63,10 +93,13 @@ class QLearning(TabularAgent):
         self.learning_rate = learning_rate
         self.discount = discount
         self.epsilon = epsilon
+        self.trace_decay = trace_decay
+        self._kind = validation.one_of("traces", traces, TRACES)
         super().__init__(
             env, partition, max_steps=max_steps, seed=seed, n_actions=n_actions
         )
         self._values: FloatArray = np.zeros((self.partition.n_cells, self.n_actions))
+        self._traces: _Traces | None = None
 
     def learn(
         self,
@@ -84,16 +117,18 @@ class QLearning(TabularAgent):
         budget = (total_timesteps, trials, callback, log_interval, progress_bar)
         with Training(self, *budget) as training:
             while training.next_trial():
-                walk = self.walk
+                walk, traces = self.walk, self._empty_traces()
                 observation = walk.start(seed=self._next_seed())
                 index, degree = self.partition(observation)
+                allowed = walk.allowed()
                 while walk.ants.size:
                     actions = epsilon_greedy_actions(
-                        self._table, index, degree, self.epsilon, self.rng
+                        self._table, index, degree, self.epsilon, self.rng, allowed
                     )
                     step = walk.step(actions)
                     next_index, next_degree = self._locate(step.observation, step.ants)
-                    _update(
+                    next_allowed = walk.allowed()
+                    transition = (
                         self._table,
                         index,
                         degree,
@@ -102,14 +137,39 @@ class QLearning(TabularAgent):
                         step.terminated,
                         next_index,
                         next_degree,
+                        _next_allowed(walk, step),
                         self.learning_rate,
                         self.discount,
                     )
-                    stays = ~step.finished
+                    if traces is None:
+                        _update(*transition)
+                    else:
+                        mark_greedy(
+                            self._table,
+                            index,
+                            degree,
+                            actions,
+                            ALL if allowed is None else allowed,
+                            traces.greedy,
+                        )
+                        _update_traced(
+                            *transition,
+                            self.discount * self.trace_decay,
+                            self._kind == "accumulating",
+                            TRACE_CUTOFF,
+                            step.ants,
+                            *traces.arrays,
+                        )
+                    allowed, stays = next_allowed, ~step.finished
                     index, degree = next_index[stays], next_degree[stays]
                 self._check_values()
                 training.end_trial()
         return self
+
+    @property
+    def traces(self) -> str:
+        """The kind of traces; fixed once the agent is made."""
+        return self._kind
 
     @property
     def _table(self) -> FloatArray:
@@ -138,6 +198,8 @@ class QLearning(TabularAgent):
             "learning_rate": self.learning_rate,
             "discount": self.discount,
             "epsilon": self.epsilon,
+            "trace_decay": self.trace_decay,
+            "traces": self.traces,
             "max_steps": self.max_steps,
             "seed": self.seed,
         }
@@ -149,6 +211,61 @@ class QLearning(TabularAgent):
             self._table, index, degree, self.epsilon, self._predict_rng, allowed
         )
 
+    def _empty_traces(self) -> _Traces | None:
+        """Memory for a trial, the same for one after the other; None without traces."""
+        if self.trace_decay == 0:
+            return None
+        kept = self._traces
+        if kept is None or kept.greedy.size != self.num_envs:
+            longest = self.max_steps * self.partition.cells_per_state
+            kept = _Traces(self.num_envs, self._values.size, longest)
+            self._traces = kept
+        kept.clear()
+        return kept
+
+
+class _Traces:
+    """The eligibility traces e of all slots, only those that are not 0.
+
+    Memory is reserved for the longest episode but touched only as far as traces grow.
+
+    Args:
+        slots: how many slots there are.
+        n_pairs: entries of the table.
+        longest: how many visits to pairs an episode can hold.
+    """
+
+    def __init__(self, slots: int, n_pairs: int, longest: int) -> None:
+        capacity = min(n_pairs, longest)
+        self.greedy: BoolArray = np.empty(slots, dtype=np.bool_)
+        pair: IntArray = np.empty((slots, capacity), dtype=np.int64)
+        trace: FloatArray = np.empty((slots, capacity))
+        self._count: IntArray = np.zeros(slots, dtype=np.int64)
+        mark: FloatArray = np.zeros(n_pairs)
+        self.arrays = (self.greedy, pair, trace, self._count, mark)
+
+    def clear(self) -> None:
+        """Forget all traces."""
+        self._count[:] = 0
+
+
+def _next_allowed(walk: Walk, step: Step) -> BoolArray:
+    """U_q of the states that a step led to, `(m, n_actions)`; `ALL` if all is allowed.
+
+    `walk.allowed()` is for the slots that walk on; these are all that took the step.
+    """
+    if walk.action_mask is None:
+        return ALL
+    allowed = walk.action_mask[step.ants]
+    # Where slots are reset within the step, the mask of one that has finished belongs
+    # to its next episode already: take all actions as allowed.
+    mode = walk.env.metadata.get("autoreset_mode", AutoresetMode.NEXT_STEP)
+    if AutoresetMode(mode) is AutoresetMode.SAME_STEP:
+        allowed[step.finished] = True
+    # Where an episode ends, an environment may allow nothing any more.
+    allowed[~allowed.any(axis=1)] = True
+    return allowed
+
 
 @njit(cache=True)
 def _update(
@@ -157,9 +274,10 @@ def _update(
     degree: FloatArray,
     actions: IntArray,
     costs: FloatArray,
-    terminated: np.ndarray,
+    terminated: BoolArray,
     next_index: CellArray,
     next_degree: FloatArray,
+    next_allowed: BoolArray,
     learning_rate: float,
     discount: float,
 ) -> None:
@@ -168,19 +286,103 @@ def _update(
     Summing the slots' corrections instead would overshoot where many slots share a
     cell: ten of them at a rate of 0.3 would move it three times the way.
     """
-    n_actions = values.shape[1]
     for j in range(actions.size):
         u = actions[j]
         best = 0.0
         if not terminated[j]:
-            best = -np.inf
-            for v in range(n_actions):
-                value = 0.0
-                for c in range(index.shape[1]):
-                    value += next_degree[j, c] * values[next_index[j, c], v]
-                best = max(best, value)
+            best = best_value(values, next_index, next_degree, j, next_allowed)
         error = -costs[j] + discount * best
         for c in range(index.shape[1]):
             error -= degree[j, c] * values[index[j, c], u]
         for c in range(index.shape[1]):
             values[index[j, c], u] += learning_rate * degree[j, c] * error
+
+
+@njit(cache=True)
+def _update_traced(
+    values: FloatArray,
+    index: CellArray,
+    degree: FloatArray,
+    actions: IntArray,
+    costs: FloatArray,
+    terminated: BoolArray,
+    next_index: CellArray,
+    next_degree: FloatArray,
+    next_allowed: BoolArray,
+    learning_rate: float,
+    discount: float,
+    fading: float,
+    accumulate: bool,
+    cutoff: float,
+    ants: IntArray,
+    greedy: BoolArray,
+    pair: IntArray,
+    trace: FloatArray,
+    count: IntArray,
+    mark: FloatArray,
+) -> None:
+    """(3.45) for one slot after the other, each on the values as they then are.
+
+    The degrees of the state are laid out in `mark`, so that one pass over the slot's
+    traces lets them fade, merges the state into them, drops what has faded away, and
+    corrects the values.
+
+    Args:
+        values: `(n_cells, n_actions)`, corrected in place.
+        index: cells of the `m` walking slots, `(m, k)`; those of degree > 0 differ.
+        degree: their degrees, `(m, k)`.
+        actions: what they did, `(m,)`.
+        costs: what it cost, `(m,)`.
+        terminated: whether it led to a terminal state, `(m,)`.
+        next_index: where it led, `(m, k)`.
+        next_degree: `(m, k)`.
+        next_allowed: U_q there, `(m, n_actions)`, or empty.
+        learning_rate: alpha_rl.
+        discount: gamma_rl.
+        fading: gamma_rl lambda.
+        accumulate: add a visit to a trace, instead of replacing it.
+        cutoff: traces that are not above it are dropped.
+        ants: which slots walk, `(m,)`.
+        greedy: whether their actions were, `(>= m,)`.
+        pair: of each trace of each slot, cell * n_actions + action.
+        trace: e, of the shape of `pair`.
+        count: how many traces each slot has.
+        mark: zeros, `(values.size,)`; zero again afterwards.
+    """
+    n_actions = values.shape[1]
+    flat = values.reshape(values.size)
+    for j in range(actions.size):
+        u = actions[j]
+        best = 0.0
+        if not terminated[j]:
+            best = best_value(values, next_index, next_degree, j, next_allowed)
+        error = -costs[j] + discount * best
+        for c in range(index.shape[1]):
+            error -= degree[j, c] * values[index[j, c], u]
+        for c in range(index.shape[1]):
+            if degree[j, c] > 0.0:
+                mark[index[j, c] * n_actions + u] = degree[j, c]
+        slot = ants[j]
+        kept = 0
+        for i in range(count[slot] if greedy[j] else 0):
+            p = pair[slot, i]
+            e = fading * trace[slot, i]
+            beta = mark[p]
+            if beta > 0.0:
+                e = e + beta if accumulate else max(e, beta)
+                mark[p] = 0.0
+            elif e <= cutoff:
+                continue
+            pair[slot, kept] = p
+            trace[slot, kept] = e
+            kept += 1
+            flat[p] += learning_rate * e * error
+        for c in range(index.shape[1]):
+            p = index[j, c] * n_actions + u
+            if mark[p] > 0.0:
+                pair[slot, kept] = p
+                trace[slot, kept] = mark[p]
+                kept += 1
+                flat[p] += learning_rate * mark[p] * error
+                mark[p] = 0.0
+        count[slot] = kept

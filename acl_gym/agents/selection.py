@@ -14,7 +14,7 @@ from acl_gym.membership import CellArray, FloatArray, IntArray
 
 RULES = ("boltzmann", "epsilon_greedy", "max_boltzmann")
 
-_ALL: BoolArray = np.empty((0, 0), dtype=np.bool_)
+ALL: BoolArray = np.empty((0, 0), dtype=np.bool_)
 """What kernels are given as `allowed` where every action is."""
 
 
@@ -64,7 +64,7 @@ def choose_actions(
         coin,
         choice,
         epsilon if rule == "max_boltzmann" else 0.0,
-        _ALL if allowed is None else allowed,
+        ALL if allowed is None else allowed,
         actions,
     )
     return actions
@@ -81,7 +81,7 @@ def epsilon_greedy_actions(
     """Rule (3.5) on any table of values; see `choose_actions`."""
     coin, choice = rng.random((2, index.shape[0]))
     actions = np.empty(index.shape[0], dtype=np.int64)
-    any_action = _ALL if allowed is None else allowed
+    any_action = ALL if allowed is None else allowed
     _epsilon_greedy(table, index, degree, coin, choice, epsilon, any_action, actions)
     return actions
 
@@ -108,7 +108,7 @@ def greedy_actions(
         Indices of actions, `(n,)`.
     """
     actions = np.empty(index.shape[0], dtype=np.int64)
-    _greedy(table, ranks, index, degree, _ALL if allowed is None else allowed, actions)
+    _greedy(table, ranks, index, degree, ALL if allowed is None else allowed, actions)
     return actions
 
 
@@ -119,6 +119,51 @@ def _value(table: FloatArray, cells: CellArray, degrees: FloatArray, u: int) -> 
     for c in range(cells.size):
         total += degrees[c] * table[cells[c], u]
     return total
+
+
+@njit(cache=True, inline="always")
+def best_value(
+    table: FloatArray, index: CellArray, degree: FloatArray, j: int, allowed: BoolArray
+) -> float:
+    """The largest degree-weighted value that state j offers, over U_q.
+
+    For kernels: the inner part of (3.40), (3.44) and (4.16).
+
+    Args:
+        table: `(n_cells, n_actions)`.
+        index: `(n, k)`.
+        degree: `(n, k)`.
+        j: which of the n states.
+        allowed: U_q, `(n, n_actions)`; an empty array where every action is.
+    """
+    best = -np.inf
+    for u in range(table.shape[1]):
+        if allowed.size > 0 and not allowed[j, u]:
+            continue
+        value = 0.0
+        for c in range(index.shape[1]):
+            value += degree[j, c] * table[index[j, c], u]
+        best = max(best, value)
+    return best
+
+
+@njit(cache=True)
+def mark_greedy(
+    table: FloatArray,
+    index: CellArray,
+    degree: FloatArray,
+    actions: IntArray,
+    allowed: BoolArray,
+    greedy: BoolArray,
+) -> None:
+    """Write to `greedy` `(m,)` whether each action is a best one; tied ones are.
+
+    Exact where `table` is the one that the actions were chosen on: the sums are those
+    of the selection.
+    """
+    for j in range(actions.size):
+        value = _value(table, index[j], degree[j], actions[j])
+        greedy[j] = value >= best_value(table, index, degree, j, allowed)
 
 
 @njit(cache=True, error_model="numpy")

@@ -164,15 +164,55 @@ def q_update(
     next_beta: Array | None,
     learning_rate: float,
     discount: float,
+    allowed: Array | None = None,
 ) -> None:
     """One transition of (3.44), in place; `next_beta` is None in a terminal state."""
+    error = q_error(values, beta, action, reward, next_beta, discount, allowed)
+    values[:, action] += learning_rate * error * beta
+
+
+def q_error(
+    values: Array,
+    beta: Array,
+    action: int,
+    reward: float,
+    next_beta: Array | None,
+    discount: float,
+    allowed: Array | None = None,
+) -> float:
+    """The temporal-difference error (3.46); `allowed` is U_q of the next state."""
     target = reward
     if next_beta is not None:
         target += discount * max(
-            next_beta @ values[:, u] for u in range(values.shape[1])
+            next_beta @ values[:, u]
+            for u in range(values.shape[1])
+            if allowed is None or allowed[u]
         )
-    error = target - beta @ values[:, action]
-    values[:, action] += learning_rate * error * beta
+    return float(target - beta @ values[:, action])
+
+
+def q_lambda_update(
+    values: Array,
+    trace: Array,
+    beta: Array,
+    action: int,
+    reward: float,
+    next_beta: Array | None,
+    greedy: bool,
+    learning_rate: float,
+    discount: float,
+    trace_decay: float,
+    accumulate: bool,
+    allowed: Array | None = None,
+) -> None:
+    """One transition of (3.45) over all pairs, in place; `trace` is that of one slot."""
+    error = q_error(values, beta, action, reward, next_beta, discount, allowed)
+    trace *= discount * trace_decay if greedy else 0.0
+    if accumulate:
+        trace[:, action] += beta
+    else:
+        trace[:, action] = np.maximum(trace[:, action], beta)
+    values += learning_rate * error * trace
 
 
 def memberships(x: float, centres: Array, period: float | None) -> Array:

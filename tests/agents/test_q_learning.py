@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 
 from acl_gym import Crisp, Fuzzy, QLearning
 from acl_gym.agents import q_learning
+from acl_gym.agents.selection import ALL
 from tests.agents import reference_colony as reference
 from tests.agents.reference_colony import Chain, chains
 from tests.agents.test_pheromone import degrees
@@ -24,6 +25,15 @@ ROW = Crisp([np.arange(6.0)])
 VALUES = np.array(
     [[-(1 + 5 - max(q - 1, 0)), -(5 - q)] for q in range(5)] + [[0, 0]], dtype=float
 )
+
+
+def masks(
+    rng: np.random.Generator, slots: int, n_actions: int, given: bool
+) -> np.ndarray:
+    """One allowed action a slot or more; an empty array if none are given."""
+    allowed = rng.random((slots, n_actions)) < 0.5
+    allowed[np.arange(slots), rng.integers(n_actions, size=slots)] = True
+    return allowed if given else ALL
 
 
 @st.composite
@@ -44,6 +54,9 @@ def transitions(draw: st.DrawFn) -> dict[str, Any]:
         "terminated": rng.random(slots) < 0.3,
         "next_index": np.array(cells[slots:], dtype=np.int32),
         "next_degree": degrees(rng, slots, k),
+        "next_allowed": masks(
+            rng, slots, n_actions, draw(st.booleans(), label="masks")
+        ),
         "learning_rate": draw(st.sampled_from([0.3, 1.0]) | st.floats(0.001, 1.0)),
         "discount": draw(st.sampled_from([0.0, 0.98, 1.0]) | st.floats(0.0, 1.0)),
     }
@@ -66,6 +79,7 @@ def test_updates_are_those_of_the_slots_one_after_another(case: dict[str, Any]) 
             None if case["terminated"][j] else next_beta,
             case["learning_rate"],
             case["discount"],
+            case["next_allowed"][j] if case["next_allowed"].size else None,
         )
     plain = case["values"].copy()
     q_learning._update(*case.values())

@@ -144,11 +144,11 @@ def test_the_ends_of_the_unit_interval_choose_the_first_and_last(
             degree,
             *numbers,
             0.5,
-            selection._ALL,
+            selection.ALL,
             actions[0],
         )
         selection._epsilon_greedy(
-            levels, index, degree, *numbers, 0.5, selection._ALL, actions[1]
+            levels, index, degree, *numbers, 0.5, selection.ALL, actions[1]
         )
         assert actions.tolist() == [[end], [end]]
 
@@ -309,7 +309,7 @@ def test_kernels_agree_with_themselves_as_plain_python(
     ants, (n_cells, n_actions) = len(index), levels.shape
     numbers = rng.random((2, ants))
     ranks = policy.random_ranks(n_cells, n_actions, rng)
-    allowed = selection._ALL
+    allowed = selection.ALL
     if restricted:
         allowed = rng.random((ants, n_actions)) < 0.7
         allowed[:, 0] = True

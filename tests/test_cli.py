@@ -19,7 +19,7 @@ import pytest
 from typer.testing import CliRunner
 
 from acl_gym import ACL, Crisp, Fuzzy, PolicyEvaluation, QLearning, evaluate_policy_cost
-from acl_gym.cli import app
+from acl_gym.cli.app import app
 from acl_gym.cli.common import AGENTS, parse_settings
 from acl_gym.cli.envs import describe, parameters
 from acl_gym.cli.train import agent_class, parameter_names
@@ -105,7 +105,7 @@ def test_help_of_compare_lists_what_there_is() -> None:
 def test_help_and_list_import_nothing_heavy(arguments: list[str]) -> None:
     code = f"""
 import sys
-from acl_gym.cli import app
+from acl_gym.cli.app import app
 try:
     app({arguments!r}, prog_name="acl-gym")
 except SystemExit as end:
@@ -171,7 +171,9 @@ def test_it_trains_what_python_trains(tmp_path: Path) -> None:
         *("--seed", "4", "--param", "epsilon=0.3", "--param", "selection=boltzmann"),
         *("--env-arg", "torques=[-1, 0, 0.5, 1]", "--max-steps", "50"),
         *("--out", str(tmp_path / "x"), "--log", str(tmp_path / "x.csv")),
+        *("--tensorboard", str(tmp_path / "board")),
     )
+    assert len(list((tmp_path / "board").iterdir())) == 1
     env = gym.make_vec(PENDULUM, num_envs=10, torques=[-1, 0, 0.5, 1])
     grid = Fuzzy.from_box(env.single_observation_space, (6, 7), circular=[0])
     agent = ACL(env, grid, epsilon=0.3, selection="boltzmann", max_steps=50, seed=4)
@@ -308,9 +310,9 @@ def test_every_parameter_is_explained(env_id: str) -> None:
         assert each["meaning"], f"{env_id}: nothing is said of {each['name']}"
     shown = invoke("envs", env_id).stdout
     assert all(each["name"] in shown for each in found["parameters"])
-    assert figures("envs", env_id, "--seed", "1")["example"] != found["example"] or (
-        len(found["example"]) == 0
-    )
+    space = gym.make_vec(env_id, num_envs=1).single_observation_space
+    example = np.asarray(found["example"], dtype=space.dtype)
+    assert space.contains(example if example.ndim else space.dtype.type(example))
 
 
 def test_parameters_are_those_of_the_system() -> None:
@@ -321,6 +323,36 @@ def test_parameters_are_those_of_the_system() -> None:
         "omega is clipped to it after each step."
     )
     assert describe(PENDULUM)["thesis"] == "§5.2"
+    first, other = (figures("envs", PENDULUM, "--seed", seed) for seed in "01")
+    assert first["example"] != other["example"]
+    assert {**first, "example": None} == {**other, "example": None}
+
+
+# --- compare -------------------------------------------------------------------
+
+
+def test_compare_prints_results_as_json(tmp_path: Path) -> None:
+    out = tmp_path / "results"
+    arguments = ["compare", "--preset", "smoke", "--agents", "q-crisp", "--seeds", "2"]
+    arguments += ["--seed", "5", "--workers", "1", "--out", str(out), "--json"]
+    done = run(*arguments, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    results = json.loads(done.stdout)
+    assert results == json.loads((out / "results.json").read_text())
+    assert {row["seed"] for row in results["rows"]} == {5, 6}
+    assert "python -m acl_gym compare" in (out / "report.html").read_text()
+
+
+@pytest.mark.parametrize("argument", ["compare", "envs"])
+def test_an_interrupted_command_says_what_is_kept(
+    argument: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    def interrupt(*_: Any, **__: Any) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("acl_gym.experiments.comparison.compare", interrupt)
+    monkeypatch.setattr("acl_gym.cli.envs.describe", interrupt)
+    assert "interrupted; " in refused(130, argument)
 
 
 # --- errors --------------------------------------------------------------------
@@ -344,7 +376,7 @@ def test_parameters_are_those_of_the_system() -> None:
         ([*SMALL, "--cells", "6,7,8"], "cells must be an int or 2 ints"),
         ([*SMALL, "--cells", "six"], "--cells must be whole numbers"),
         ([*SMALL, "--param", "epsilon"], "--param must be name=value, got 'epsilon'"),
-        ([*SMALL, "--param", "speed=1"], "no 'speed'; there are alpha, epsilon"),
+        ([*SMALL, "--param", "speed=1"], "no 'speed'; there are alpha, "),
         ([*SMALL, "--param", "seed=1"], "no 'seed'"),
         ([*SMALL, "--param", "epsilon=1.5"], "epsilon must lie in [0, 1]"),
         ([*SMALL, "--param", "epsilon=high"], "epsilon must be a real number"),

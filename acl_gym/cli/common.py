@@ -37,6 +37,10 @@ class BadArgumentError(Exception):
     """What the user has typed cannot be done; exit code 2."""
 
 
+class InterruptedRunError(Exception):
+    """Ctrl-C came, and there is something to say about it; exit code 130."""
+
+
 class _Flags:
     debug = False
 
@@ -105,12 +109,10 @@ def _run(
         warnings.showwarning = lambda message, *_: _tell(name, f"warning: {message}")
         try:
             code = main(args, prog_name, standalone_mode=False)
-        except KeyboardInterrupt:
-            code = INTERRUPTED
+            if code == INTERRUPTED:  # what Typer makes of Ctrl-C
+                _tell(name, "interrupted; what is in files already is kept.")
         except Exception as error:
             code = _explain(name, error)
-    if code == INTERRUPTED:
-        _tell(name, "interrupted; what is in files already is kept.")
     sys.exit(code if isinstance(code, int) else 0)
 
 
@@ -123,9 +125,9 @@ def _explain(name: str, error: Exception) -> int:
         message = error.format_message().rstrip(".")
         _tell(name, f"{message}. See '{path} --help'.")
         return 2
-    if isinstance(error, BadArgumentError):
+    if isinstance(error, (BadArgumentError, InterruptedRunError)):
         _tell(name, str(error))
-        return 2
+        return 2 if isinstance(error, BadArgumentError) else INTERRUPTED
     message = str(error)
     plain = isinstance(
         error, (ValueError, TypeError, OSError, RuntimeError, ImportError)

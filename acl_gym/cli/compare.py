@@ -11,6 +11,7 @@ from acl_gym.cli.common import (
     BadArgumentError,
     Command,
     DebugOption,
+    InterruptedRunError,
     JsonOption,
     console,
 )
@@ -128,17 +129,22 @@ def compare(
                 f"--agents must be among {', '.join(names)}, got {agents!r}."
             )
         names = list(dict.fromkeys(wanted))
-    comparison.compare(
-        env,
-        preset,
-        names,
-        seeds,
-        out,
-        first_seed=seed,
-        fresh=fresh,
-        workers=workers,
-        console=console(stderr=as_json),
-    )
+    try:
+        comparison.compare(
+            env,
+            preset,
+            names,
+            seeds,
+            out,
+            first_seed=seed,
+            fresh=fresh,
+            workers=workers,
+            console=console(stderr=as_json),
+        )
+    except KeyboardInterrupt as error:
+        raise InterruptedRunError(
+            "interrupted; finished runs are kept, give the same command to go on."
+        ) from error
     if as_json:
         typer.echo((out / "results.json").read_text())
 

@@ -1,0 +1,62 @@
+"""The commands put together."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+import acl_gym
+from acl_gym.cli.common import DebugOption, Group
+from acl_gym.cli.compare import HELP as COMPARE_HELP
+from acl_gym.cli.compare import CompareCommand, compare
+from acl_gym.cli.envs import HELP as ENVS_HELP
+from acl_gym.cli.envs import envs
+from acl_gym.cli.evaluate import HELP as EVALUATE_HELP
+from acl_gym.cli.evaluate import evaluate
+from acl_gym.cli.train import HELP as TRAIN_HELP
+from acl_gym.cli.train import train
+
+HELP = """Ant Colony Learning: colonies of ants that learn control policies.
+
+\b
+Examples:
+  acl-gym envs                                    what there is to learn
+  acl-gym train acl_gym/Pendulum-v0 --out a.npz   learn, a few seconds
+  acl-gym evaluate a.npz                          what the policy costs
+  acl-gym compare                                 ants, Q-learning and DQN
+
+Each command explains itself: acl-gym train --help. It ends with exit code 0 for
+success, 1 for a run that failed, 2 for bad arguments, 130 for Ctrl-C.
+"""
+
+app = typer.Typer(cls=Group, add_completion=False, rich_markup_mode=None)
+
+
+def _show_version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"acl-gym {acl_gym.__version__}")
+        raise typer.Exit
+
+
+@app.callback(help=HELP, invoke_without_command=True)
+def _main(
+    context: typer.Context,
+    version: Annotated[
+        bool,
+        typer.Option(
+            "--version", callback=_show_version, is_eager=True, help="Show the version."
+        ),
+    ] = False,
+    debug: DebugOption = False,
+) -> None:
+    """Show the help if there is no command."""
+    if context.invoked_subcommand is None:
+        typer.echo(context.get_help())
+        raise typer.Exit(2)
+
+
+app.command(help=TRAIN_HELP)(train)
+app.command(help=EVALUATE_HELP)(evaluate)
+app.command(help=ENVS_HELP)(envs)
+app.command(help=COMPARE_HELP, cls=CompareCommand)(compare)

@@ -101,12 +101,13 @@ def test_bad_value_is_refused_by_name(make: Any, name: str, value: Any) -> None:
 @pytest.mark.parametrize(
     "parameters",
     [
-        {"sampling_time": 0.3},  # the strongest damping is 8.5 kg/s: 0.3 * 8.5 > 2.5
-        {"mass": 0.5},
-        {"base_damping": 13.0, "peaks": ()},
+        # The strongest damping is 8.5 kg/s: 0.3 * 8.5 > 2.5.
+        {"sampling_time": 0.3, "substeps": 1},
+        {"mass": 0.5, "substeps": 1},
+        {"base_damping": 13.0, "peaks": (), "substeps": 1},
         {"sampling_time": 0.6, "substeps": 2},
         # A needle that a grid would miss.
-        {"peaks": [[20.0, 0.123, 4.567, 1e-3, 1e-3]]},
+        {"peaks": [[40.0, 0.123, 4.567, 1e-3, 1e-3]]},
         {"base_damping": 1e300},
     ],
 )
@@ -186,7 +187,7 @@ def test_defaults_are_those_of_the_thesis() -> None:
         "peaks": ((8.0, 0.0, -2.3, 2.5, 1.5), (8.0, 4.7, 1.0, 1.5, 2.0)),
         "forces": tuple(itertools.product((-1.0, 0.0, 1.0), (-1.0, 0.0, 1.0))),
         "sampling_time": 0.2,
-        "substeps": 1,
+        "substeps": 2,
         "position_max": 5.0,
         "velocity_max": 2.0,
         "cost": "quadratic",
@@ -223,7 +224,7 @@ def test_equal_parameters_make_equal_systems() -> None:
         forces=np.array(ours.forces, dtype=np.int64),
         goal_bounds=[0.25, 0.05],
         state_weight=np.diag([0.2, 0.1, 0.2, 0.1]),
-        substeps=np.int64(1),
+        substeps=np.int64(2),
         position_max=5,
     )
     assert ours == other

@@ -5,9 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from gymnasium.error import ResetNeeded
 from gymnasium.vector import AutoresetMode
 from numba import njit
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from acl_gym.envs.system import BoolArray, ControlSystem, FloatArray, IntArray
 
@@ -94,6 +95,57 @@ def checked_actions(actions: ArrayLike, count: int, n_actions: int) -> IntArray:
             f"in slot {slot}."
         )
     return checked
+
+
+def checked_reset_mask(mask: Any, num_envs: int, *, begun: bool) -> BoolArray | None:
+    """Return the mask of a partial reset, None for a full one.
+
+    Raises:
+        TypeError: it is not a bool array.
+        ValueError: it has the wrong shape or nothing is True.
+        ResetNeeded: there was no full reset yet.
+    """
+    if mask is None:
+        return None
+    if not isinstance(mask, np.ndarray) or mask.dtype != np.bool_:
+        actual = mask.dtype if isinstance(mask, np.ndarray) else type(mask)
+        raise TypeError(
+            f"options['reset_mask'] must be a NumPy array of bool, got {actual}."
+        )
+    if mask.shape != (num_envs,) or not mask.any():
+        raise ValueError(
+            f"options['reset_mask'] must have shape ({num_envs},) and at least one "
+            f"True, got shape {mask.shape} with {int(mask.sum())} True."
+        )
+    if not begun:
+        raise ResetNeeded(
+            "the first reset must start all slots; leave 'reset_mask' out."
+        )
+    return mask
+
+
+def final_infos(
+    observations: NDArray[Any], finished: BoolArray, infos: dict[str, Any]
+) -> dict[str, Any]:
+    """What the infos of a step say of slots that it ends and resets at once.
+
+    Args:
+        observations: the last ones, `(num_envs, ...)`.
+        finished: `(num_envs,)`.
+        infos: those of the last states, keys with arrays `(num_envs, ...)`; changed
+            where slots have not finished.
+    """
+    final_obs = np.full(finished.size, None, dtype=object)
+    for slot in np.flatnonzero(finished):
+        final_obs[slot] = observations[slot]
+    for array in infos.values():
+        array[~finished] = 0
+    return {
+        "final_obs": final_obs,
+        "_final_obs": finished.copy(),
+        "final_info": infos,
+        "_final_info": finished.copy(),
+    }
 
 
 def checked_autoreset_mode(mode: str | AutoresetMode) -> AutoresetMode:

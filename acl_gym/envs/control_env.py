@@ -23,7 +23,9 @@ from acl_gym.envs.bookkeeping import (
     checked_autoreset_mode,
     checked_options,
     checked_render_mode,
+    checked_reset_mask,
     draw_uniforms,
+    final_infos,
     gather_slots,
     put_slots_back,
 )
@@ -273,7 +275,9 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
             ResetNeeded: a mask was given before the first full reset.
         """
         options = checked_options(options, ("state", "reset_mask", "finished"))
-        mask = self._checked_mask(options.get("reset_mask"))
+        mask = checked_reset_mask(
+            options.get("reset_mask"), self.num_envs, begun=self._state is not None
+        )
         slots = np.arange(self.num_envs) if mask is None else np.flatnonzero(mask)
         given = options.get("state")
         states = None if given is None else self._given_states(given, slots)
@@ -329,7 +333,7 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
                 self.autoreset_mode is AutoresetMode.SAME_STEP
                 and not self._wait_when_finished
             ):
-                last = self._final_infos(finished)
+                last = final_infos(self._observe(), finished, self._infos())
                 self._start(np.flatnonzero(finished), None)
             else:
                 self._finished |= finished
@@ -444,22 +448,6 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
         walking = np.flatnonzero(~self._finished)
         self._walking = None if walking.size == self.num_envs else walking
 
-    def _final_infos(self, finished: BoolArray) -> dict[str, Any]:
-        final_obs = np.full(self.num_envs, None, dtype=object)
-        observations = self._observe()
-        for slot in np.flatnonzero(finished):
-            final_obs[slot] = observations[slot]
-        final_info = self._infos()
-        if final_info:
-            final_info["action_mask"][~finished] = False
-            final_info["_action_mask"] = finished.copy()
-        return {
-            "final_obs": final_obs,
-            "_final_obs": finished.copy(),
-            "final_info": final_info,
-            "_final_info": finished.copy(),
-        }
-
     def _infos(self) -> dict[str, Any]:
         mask = self.system.action_mask(self._states)
         if mask is None:
@@ -499,22 +487,3 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
             current[slots] = rows[slots]
             rows = current
         return self.system.checked_states(rows)[slots].T.copy()
-
-    def _checked_mask(self, mask: Any) -> BoolArray | None:
-        if mask is None:
-            return None
-        if not isinstance(mask, np.ndarray) or mask.dtype != np.bool_:
-            actual = mask.dtype if isinstance(mask, np.ndarray) else type(mask)
-            raise TypeError(
-                f"options['reset_mask'] must be a NumPy array of bool, got {actual}."
-            )
-        if mask.shape != (self.num_envs,) or not mask.any():
-            raise ValueError(
-                f"options['reset_mask'] must have shape ({self.num_envs},) and at "
-                f"least one True, got shape {mask.shape} with {int(mask.sum())} True."
-            )
-        if self._state is None:
-            raise ResetNeeded(
-                "the first reset must start all slots; leave 'reset_mask' out."
-            )
-        return mask

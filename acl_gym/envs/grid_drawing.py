@@ -80,7 +80,8 @@ def draw_ant(
     centre = layout.centre(cell)
     pygame.draw.circle(canvas, _BLUE, tuple(centre), 0.33 * layout.side)
     if heading is not None:
-        tip = _triangle(centre, heading, 0.48, 0.2, 0.26, layout.side)
+        ahead, aside = np.array([[[0.48, 0.2, 0.2]]]), np.array([[[0.0, 0.26, -0.26]]])
+        tip = _pixels(centre[None, None], (heading,), ahead, aside, layout.side)[0, 0]
         pygame.draw.polygon(canvas, _BLUE, tip)
 
 
@@ -103,58 +104,47 @@ def draw_arrows(
         directions: rows and columns by which each action moves.
     """
     layout = _Layout(canvas, characters.shape)
-    side = layout.side
     total = table.sum(axis=1, keepdims=True)
     even = np.full(table.shape, 1.0 / table.shape[1])
     share = np.divide(table, total, out=even, where=total > 0)
     highest = share == share.max(axis=1, keepdims=True)
     best = highest & (highest.sum(axis=1, keepdims=True) == 1)  # none where levels tie
-    for i, cell in enumerate(cells):
-        centre = layout.centre(cell)
-        for action in np.argsort(share[i], kind="stable"):  # the best one on top
-            length = 0.46 * np.sqrt(share[i, action])
-            if length * side < 1.0:
-                continue
-            grey = _FAINTEST + (_FAINT - _FAINTEST) * min(1.0, 2.0 * share[i, action])
-            colour = _BEST if best[i, action] else (int(grey),) * 3
-            heading = directions[action]
-            # The best arrow fills the cell, the others grow out of its centre.
-            half, tail = (0.055, 0.8 * length) if best[i, action] else (0.04, 0.0)
-            neck = max(0.0, length - 0.24)
-            shaft = _bar(centre, heading, neck, tail, half, side)
-            head = _triangle(centre, heading, length, neck, 3.2 * half, side)
-            pygame.draw.polygon(canvas, colour, shaft)
-            pygame.draw.polygon(canvas, colour, head)
+    length = 0.46 * np.sqrt(share)
+    grey = _FAINTEST + (_FAINT - _FAINTEST) * np.minimum(1.0, 2.0 * share)
+    # The best arrow fills the cell, the others grow out of its centre.
+    half, tail = np.where(best, 0.055, 0.04), np.where(best, -0.8 * length, 0.0)
+    neck, wide = np.maximum(0.0, length - 0.24), 3.2 * half
+    ahead = np.stack([tail, neck, neck, length, neck, neck, tail], axis=-1)
+    aside = np.stack([half, half, wide, 0 * half, -wide, -half, -half], axis=-1)
+    centres = np.array([layout.centre(cell) for cell in cells])[:, None]
+    outlines = _pixels(centres, directions, ahead, aside, layout.side)
+    visible = length * layout.side >= 1.0
+    for i, order in enumerate(np.argsort(share, axis=1, kind="stable")):
+        for action in order:  # the best one on top
+            if visible[i, action]:
+                colour = _BEST if best[i, action] else (int(grey[i, action]),) * 3
+                pygame.draw.polygon(canvas, colour, outlines[i, action])
 
 
-def _points(
-    centre: FloatArray, heading: Direction, places: Any, side: int
-) -> list[tuple[float, float]]:
-    """Pixels of places (ahead, aside), in sides of a cell from its centre."""
-    down, right = heading
-    ahead = side * np.array([right, down], dtype=np.float64)
-    aside = side * np.array([-down, right], dtype=np.float64)
-    return [tuple(centre + a * ahead + b * aside) for a, b in places]
-
-
-def _triangle(
-    centre: FloatArray,
-    heading: Direction,
-    tip: float,
-    base: float,
-    half: float,
+def _pixels(
+    centres: FloatArray,
+    directions: tuple[Direction, ...],
+    ahead: FloatArray,
+    aside: FloatArray,
     side: int,
-) -> list[tuple[float, float]]:
-    return _points(centre, heading, ((tip, 0.0), (base, half), (base, -half)), side)
+) -> FloatArray:
+    """Pixels of points seen from the centre of a cell in the direction of an action.
 
+    Args:
+        centres: pixels, `(n, 1, 2)`.
+        directions: rows and columns of each action.
+        ahead: how far the points are ahead, in sides of a cell, `(n, n_actions, k)`.
+        aside: how far they are to the right of it, the same.
+        side: of a cell, in pixels.
 
-def _bar(
-    centre: FloatArray,
-    heading: Direction,
-    front: float,
-    back: float,
-    half: float,
-    side: int,
-) -> list[tuple[float, float]]:
-    places = ((-back, half), (front, half), (front, -half), (-back, -half))
-    return _points(centre, heading, places, side)
+    Returns:
+        Array `(n, n_actions, k, 2)`.
+    """
+    down, right = np.array(directions, dtype=np.float64).T[..., None]
+    x, y = ahead * right - aside * down, ahead * down + aside * right
+    return np.asarray(centres[..., None, :] + side * np.stack([x, y], axis=-1))

@@ -12,6 +12,7 @@ from acl_gym.envs.grid_search import (
     GridSearch2DEnv,
     GridSearch2DVectorEnv,
 )
+from acl_gym.envs.navigation import NavigationEnv, NavigationVectorEnv
 from acl_gym.envs.pendulum import PendulumEnv, PendulumVectorEnv
 
 NAN, INF = float("nan"), float("inf")
@@ -139,6 +140,31 @@ SYSTEMS = [
         away=(0,),
         draws={"transition_probability": 0.6, "desc": (".G..", "..#.", "....")},
         bad_states=_GRID_BAD,
+    ),
+    SystemCase(
+        env_id="acl_gym/Navigation-v0",
+        single=NavigationEnv,
+        vector=NavigationVectorEnv,
+        easy={"goal_bounds": (4.2, 1.7)},
+        variant={"substeps": 3},
+        # A vehicle at rest at the origin stays in this tiny goal without force.
+        narrow={"goal_bounds": (1e-9, 1e-9)},
+        near=(0.0, 0.0, 0.0, 0.0),
+        near_action=4,
+        away=(3.0, 0.0, 3.0, 0.0),
+        bad_states={
+            "batch": [[0.0, 0.0, 0.0, 0.0]],
+            "one number": 0.0,
+            "three numbers": [0.0, 0.0, 0.0],
+            "empty": [],
+            "nan": [NAN, 0.0, 0.0, 0.0],
+            "infinite": [0.0, 0.0, -INF, 0.0],
+            "too far": [np.nextafter(5.0, 6.0), 0.0, 0.0, 0.0],
+            "too fast": [0.0, 0.0, 0.0, 2.1],
+            "words": ["a", "b", "c", "d"],
+            "complex": [1j, 0.0, 0.0, 0.0],
+            "dict": {"c1": 0.0},
+        },
     ),
 ]
 

@@ -159,7 +159,7 @@ BAD_ACTIONS = {
     "bool": (True, TypeError),
     "none": (None, TypeError),
     "string": ("1", TypeError),
-    "beyond": (4, ValueError),
+    "beyond": (9, ValueError),
     "negative": (-1, ValueError),
     "largest unsigned": (np.uint64(2**64 - 1), ValueError),
     "smallest": (np.iinfo(np.int64).min, ValueError),

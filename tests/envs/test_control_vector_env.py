@@ -108,7 +108,7 @@ BAD_ACTIONS = {
     "too many": ([0] * 5, ValueError, r"\(5,\)"),
     "one number": (1, ValueError, r"\(\)"),
     "column": ([[0], [1], [2], [0]], ValueError, r"\(4, 1\)"),
-    "beyond": ([0, 1, 4, 0], ValueError, "got 4 in slot 2"),
+    "beyond": ([0, 1, 9, 0], ValueError, "got 9 in slot 2"),
     "negative": ([0, -1, 1, 0], ValueError, "got -1 in slot 1"),
     "huge": (np.array([0, 2**63, 0, 0], dtype=np.uint64), ValueError, "in slot 1"),
 }

@@ -94,6 +94,16 @@ def test_a_loaded_agent_does_not_replace_a_better_one(tmp_path: Path) -> None:
     assert ACL.load(path).history[-1]["policy_cost"] <= lowest
 
 
+def test_a_second_run_writes_its_own_best(tmp_path: Path) -> None:
+    """Also where the agent was better once, but that is in no file."""
+    agent = make().learn(trials=2, callback=evaluation())
+    agent.history[0]["policy_cost"] = -1.0
+    agent.learn(trials=1, callback=evaluation(save_best=tmp_path / "best"))
+    assert ACL.load(tmp_path / "best").trials == 3
+    make(QLearning).learn(trials=1, callback=evaluation(save_best=tmp_path / "best"))
+    assert QLearning.load(tmp_path / "best").trials == 1
+
+
 def test_a_file_in_no_folder_is_refused_before_training(tmp_path: Path) -> None:
     for bad in (
         lambda path: evaluation(save_best=path),

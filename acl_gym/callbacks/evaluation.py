@@ -40,8 +40,8 @@ class PolicyEvaluation(Callback):
             `lambda colony: colony.soft_policy(seed=0)`; None takes the agent's own
             greedy policy.
         save_best: write the agent to this file whenever its policy is the best so
-            far; None writes nothing. An agent that goes on after being loaded does
-            not replace it by a worse one: its `history` knows what it had reached.
+            far; None writes nothing. Where the file is there, an agent that goes on
+            does not replace it by one worse than its `history` has seen.
 
     Attributes:
         best: the evaluation of the best policy so far: the lowest cost.
@@ -87,9 +87,11 @@ class PolicyEvaluation(Callback):
         self.best_policy: Predictor | None = None
 
     def on_training_start(self, agent: TabularAgent) -> None:
-        """Look up what the agent has reached before."""
-        costs = [row["policy_cost"] for row in agent.history if "policy_cost" in row]
-        self._saved_cost = min(costs, default=math.inf)
+        """Look up what the agent in the file has reached."""
+        self._saved_cost = math.inf
+        if self.save_best is not None and self.save_best.exists():
+            costs = (row.get("policy_cost", math.inf) for row in agent.history)
+            self._saved_cost = min(costs, default=math.inf)
 
     def on_trial_end(self, agent: TabularAgent, row: Row) -> bool | None:
         """Evaluate if it is time to."""
@@ -152,6 +154,9 @@ class EarlyStop(Callback):
             measure.
     """
 
+    best: float
+    waited: int
+
     def __init__(
         self,
         patience: int,
@@ -169,8 +174,6 @@ class EarlyStop(Callback):
         if threshold is not None:
             threshold = validation.number("threshold", threshold)
         self.threshold = threshold
-        self.best = math.inf
-        self.waited = 0
         self._begin(0)
 
     def on_training_start(self, agent: TabularAgent) -> None:

@@ -4,68 +4,33 @@ from __future__ import annotations
 
 import csv
 import json
-import os
-import signal
 import subprocess
 import sys
 import tomllib
 from importlib import import_module
 from pathlib import Path
-from typing import Any
 
 import gymnasium as gym
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 from acl_gym import ACL, Crisp, Fuzzy, PolicyEvaluation, QLearning, evaluate_policy_cost
-from acl_gym.cli.app import app
 from acl_gym.cli.common import AGENTS, parse_settings
 from acl_gym.cli.envs import describe, parameters
 from acl_gym.cli.train import agent_class, parameter_names
 from acl_gym.envs.pendulum import Pendulum
 from acl_gym.registration import ENVIRONMENTS
-
-ROOT = Path(__file__).resolve().parents[1]
-PENDULUM = "acl_gym/Pendulum-v0"
-SMALL = ["train", PENDULUM, "--ants", "10", "--cells", "6,7", "--trials", "5"]
-SMALL += ["--evaluate-every", "2"]
-COMMANDS = ("train", "evaluate", "envs", "compare")
-
-
-def invoke(*arguments: str) -> Any:
-    return CliRunner().invoke(app, list(arguments), prog_name="acl-gym")
-
-
-def figures(*arguments: str) -> Any:
-    result = invoke(*arguments, "--json")
-    assert result.exit_code == 0, result.output
-    return json.loads(result.stdout)
-
-
-def run(*arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]:
-    """In a new interpreter, in another folder."""
-    return subprocess.run(
-        [sys.executable, "-m", "acl_gym", *arguments],
-        cwd=cwd,
-        env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=120,
-    )
-
-
-def refused(code: int, *arguments: str) -> str:
-    """The one line of an invocation that fails."""
-    result = invoke(*arguments)
-    assert result.exit_code == code, result.output
-    assert result.stdout == ""
-    lines = result.stderr.splitlines()
-    assert len(lines) == 1, result.stderr
-    assert lines[0].startswith("acl-gym: ")
-    return str(lines[0])
-
+from tests.cli.runner import (
+    COMMANDS,
+    MODULE,
+    PENDULUM,
+    ROOT,
+    SMALL,
+    figures,
+    invoke,
+    refused,
+    run,
+)
 
 # --- help ----------------------------------------------------------------------
 
@@ -221,31 +186,6 @@ def test_partitions_and_cells() -> None:
     assert one["partition"] == "Fuzzy(5 x 5 cells, circular=[0])"
 
 
-MODULE = """
-import gymnasium as gym, numpy as np
-
-class Corridor(gym.Env):
-    observation_space = gym.spaces.Box(0.0, 2.0, (1,), np.float64)
-    action_space = gym.spaces.Discrete(2)
-
-    def __init__(self, slip=0.0, render_mode=None):
-        self.slip = slip
-
-    def reset(self, *, seed=None, options=None):
-        super().reset(seed=seed)
-        self.x = self.np_random.uniform(0.0, 1.8)
-        return np.array([self.x]), {}
-
-    def step(self, action):
-        slips = self.np_random.random() < self.slip
-        move = 0.1 if (action == 1) != slips else -0.1
-        self.x = float(np.clip(self.x + move, 0.0, 2.0))
-        return np.array([self.x]), -1.0, self.x >= 1.95, False, {}
-
-gym.register("Corridor-v0", entry_point=Corridor, max_episode_steps=80)
-"""
-
-
 def test_an_environment_of_a_module_in_this_folder(tmp_path: Path) -> None:
     """Random, and so evaluated with the same luck; its own T."""
     (tmp_path / "my_corridor.py").write_text(MODULE)
@@ -341,125 +281,6 @@ def test_compare_prints_results_as_json(tmp_path: Path) -> None:
     assert results == json.loads((out / "results.json").read_text())
     assert {row["seed"] for row in results["rows"]} == {5, 6}
     assert "python -m acl_gym compare" in (out / "report.html").read_text()
-
-
-@pytest.mark.parametrize("argument", ["compare", "envs"])
-def test_an_interrupted_command_says_what_is_kept(
-    argument: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    def interrupt(*_: Any, **__: Any) -> None:
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr("acl_gym.experiments.comparison.compare", interrupt)
-    monkeypatch.setattr("acl_gym.cli.envs.describe", interrupt)
-    assert "interrupted; " in refused(130, argument)
-
-
-# --- errors --------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (["trian"], "No such command 'trian'. Did you mean 'train'"),
-        (["train"], "Missing argument 'ENV_ID'"),
-        (["train", PENDULUM, "--trials", "0"], "--trials"),
-        (["train", PENDULUM, "--ants", "many"], "--ants"),
-        (["train", PENDULUM, "--seed", "-1"], "--seed"),
-        (["train", PENDULUM, "--agent", "sarsa"], "'acl', 'q-learning'"),
-        (["train", PENDULUM, "--walk"], "No such option: --walk"),
-        (["train", "acl_gym/Pendulm-v0"], "Did you mean: `Pendulum`"),
-        (["train", "no_such_module:X-v0"], "no_such_module"),
-        (["train", "CartPole-v1"], "bounded in every variable"),
-        (["train", "FrozenLake-v1"], "Box with one axis"),
-        (["train", "Pendulum-v1"], "Discrete actions"),
-        ([*SMALL, "--cells", "6,7,8"], "cells must be an int or 2 ints"),
-        ([*SMALL, "--cells", "six"], "--cells must be whole numbers"),
-        ([*SMALL, "--param", "epsilon"], "--param must be name=value, got 'epsilon'"),
-        ([*SMALL, "--param", "speed=1"], "no 'speed'; there are alpha, "),
-        ([*SMALL, "--param", "seed=1"], "no 'seed'"),
-        ([*SMALL, "--param", "epsilon=1.5"], "epsilon must lie in [0, 1]"),
-        ([*SMALL, "--param", "epsilon=high"], "epsilon must be a real number"),
-        ([*SMALL, "--param", "alpha=1", "--param", "alpha=2"], "twice"),
-        ([*SMALL, "--env-arg", "gravitas=1"], "there are inertia, motor_gain"),
-        ([*SMALL, "--env-arg", "mass=-1"], "mass must lie in"),
-        ([*SMALL, "--out", "/no/such/folder/x"], "no folder /no/such/folder"),
-        ([*SMALL, "--log", "/no/such/folder/x"], "no folder /no/such/folder"),
-        ([*SMALL, "--log", str(ROOT / "README.md")], "is not a log"),
-        (["evaluate", "/no/such/agent"], "no agent file at /no/such/agent.npz"),
-        (["evaluate", str(ROOT / "README.md")], "is not an agent saved by acl-gym"),
-        (["envs", "CartPole-v1"], "no environment 'CartPole-v1'; there are"),
-        (["compare", "--preset", "huge"], "invalid choice 'huge'"),
-        (["compare", "--env", "CartPole-v1"], "invalid choice 'CartPole-v1'"),
-        (["compare", "--agents", "sarsa"], "must be among acl-fuzzy"),
-        (["compare", "--seeds", "0"], "whole number >= 1"),
-    ],
-)
-def test_bad_arguments_are_one_line_and_2(arguments: list[str], message: str) -> None:
-    assert message in refused(2, *arguments)
-
-
-def test_an_agent_for_another_environment(tmp_path: Path) -> None:
-    out = str(tmp_path / "x.npz")
-    figures(*SMALL, "--out", out)
-    line = refused(2, "evaluate", out, "--env-id", "CartPole-v1")
-    assert "3 actions as the table has, got 2" in line
-
-
-def test_a_run_that_fails_is_one_line_and_1(tmp_path: Path) -> None:
-    """Rewards that are no costs."""
-    (tmp_path / "my_treat.py").write_text(
-        MODULE.replace("-1.0, self.x", "1.0, self.x").replace("Corridor-v0", "Treat-v0")
-    )
-    arguments = ["train", "my_treat:Treat-v0", "--ants", "3", "--param", "tau0=0.001"]
-    done = run(*arguments, "--json", cwd=tmp_path)
-    assert (done.returncode, done.stdout) == (1, "")
-    (line,) = done.stderr.splitlines()
-    assert "cost" in line
-
-
-@pytest.mark.parametrize("first", [True, False])
-def test_debug_shows_the_traceback(first: bool) -> None:
-    arguments = ["evaluate", "/no/such/agent"]
-    arguments = ["--debug", *arguments] if first else [*arguments, "--debug"]
-    result = invoke(*arguments)
-    assert result.exit_code == 2
-    assert "Traceback" in result.stderr
-    assert result.stderr.splitlines()[-1].startswith("acl-gym: no agent file")
-
-
-def test_a_warning_is_one_line_and_json_stays_pure(tmp_path: Path) -> None:
-    done = run(*SMALL, "--param", "tau0=0.5", "--json", cwd=tmp_path)
-    assert done.returncode == 0
-    assert json.loads(done.stdout)["parameters"]["tau0"] == 0.5
-    (line,) = done.stderr.splitlines()
-    assert line.startswith("acl-gym: warning: tau0 = 0.5 exceeds")
-
-
-def test_ctrl_c_is_one_line_and_130(tmp_path: Path) -> None:
-    """A handler of Python's own, as in a terminal; a shell may have set to ignore it."""
-    code = (
-        "import signal; signal.signal(signal.SIGINT, signal.default_int_handler);"
-        "from acl_gym.cli import main; main()"
-    )
-    log = tmp_path / "log.csv"
-    arguments = ["train", PENDULUM, "--trials", "1000000", "--log", str(log)]
-    with subprocess.Popen(
-        [sys.executable, "-c", code, *arguments],
-        env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
-        cwd=tmp_path,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    ) as process:
-        while process.poll() is None:
-            if log.exists() and log.stat().st_size > 200:
-                process.send_signal(signal.SIGINT)
-                break
-        out, err = process.communicate(timeout=60)
-    assert process.returncode == 130
-    assert out == ""
-    assert err == "acl-gym: interrupted; what is in files already is kept.\n"
 
 
 # --- the parts -----------------------------------------------------------------

@@ -1,0 +1,140 @@
+"""How the command line fails: one line, an exit code, no traceback."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.cli.runner import (
+    MODULE,
+    PENDULUM,
+    ROOT,
+    SMALL,
+    figures,
+    invoke,
+    refused,
+    run,
+)
+
+
+@pytest.mark.parametrize("argument", ["compare", "envs"])
+def test_an_interrupted_command_says_what_is_kept(
+    argument: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    def interrupt(*_: Any, **__: Any) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("acl_gym.experiments.comparison.compare", interrupt)
+    monkeypatch.setattr("acl_gym.cli.envs.describe", interrupt)
+    assert "interrupted; " in refused(130, argument)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["trian"], "No such command 'trian'. Did you mean 'train'"),
+        (["train"], "Missing argument 'ENV_ID'"),
+        (["train", PENDULUM, "--trials", "0"], "--trials"),
+        (["train", PENDULUM, "--ants", "many"], "--ants"),
+        (["train", PENDULUM, "--seed", "-1"], "--seed"),
+        (["train", PENDULUM, "--agent", "sarsa"], "'acl', 'q-learning'"),
+        (["train", PENDULUM, "--walk"], "No such option: --walk"),
+        (["train", "acl_gym/Pendulm-v0"], "Did you mean: `Pendulum`"),
+        (["train", "no_such_module:X-v0"], "no_such_module"),
+        (["train", "CartPole-v1"], "bounded in every variable"),
+        (["train", "FrozenLake-v1"], "Box with one axis"),
+        (["train", "Pendulum-v1"], "Discrete actions"),
+        ([*SMALL, "--cells", "6,7,8"], "cells must be an int or 2 ints"),
+        ([*SMALL, "--cells", "six"], "--cells must be whole numbers"),
+        ([*SMALL, "--param", "epsilon"], "--param must be name=value, got 'epsilon'"),
+        ([*SMALL, "--param", "speed=1"], "no 'speed'; there are alpha, "),
+        ([*SMALL, "--param", "seed=1"], "no 'seed'"),
+        ([*SMALL, "--param", "epsilon=1.5"], "epsilon must lie in [0, 1]"),
+        ([*SMALL, "--param", "epsilon=high"], "epsilon must be a real number"),
+        ([*SMALL, "--param", "alpha=1", "--param", "alpha=2"], "twice"),
+        ([*SMALL, "--env-arg", "gravitas=1"], "there are inertia, motor_gain"),
+        ([*SMALL, "--env-arg", "mass=-1"], "mass must lie in"),
+        ([*SMALL, "--out", "/no/such/folder/x"], "no folder /no/such/folder"),
+        ([*SMALL, "--log", "/no/such/folder/x"], "no folder /no/such/folder"),
+        ([*SMALL, "--log", str(ROOT / "README.md")], "is not a log"),
+        (["evaluate", "/no/such/agent"], "no agent file at /no/such/agent.npz"),
+        (["evaluate", str(ROOT / "README.md")], "is not an agent saved by acl-gym"),
+        (["envs", "CartPole-v1"], "no environment 'CartPole-v1'; there are"),
+        (["compare", "--preset", "huge"], "invalid choice 'huge'"),
+        (["compare", "--env", "CartPole-v1"], "invalid choice 'CartPole-v1'"),
+        (["compare", "--agents", "sarsa"], "must be among acl-fuzzy"),
+        (["compare", "--seeds", "0"], "whole number >= 1"),
+    ],
+)
+def test_bad_arguments_are_one_line_and_2(arguments: list[str], message: str) -> None:
+    assert message in refused(2, *arguments)
+
+
+def test_an_agent_for_another_environment(tmp_path: Path) -> None:
+    out = str(tmp_path / "x.npz")
+    figures(*SMALL, "--out", out)
+    line = refused(2, "evaluate", out, "--env-id", "CartPole-v1")
+    assert "3 actions as the table has, got 2" in line
+
+
+def test_a_run_that_fails_is_one_line_and_1(tmp_path: Path) -> None:
+    """Rewards that are no costs."""
+    (tmp_path / "my_treat.py").write_text(
+        MODULE.replace("-1.0, self.x", "1.0, self.x").replace("Corridor-v0", "Treat-v0")
+    )
+    arguments = ["train", "my_treat:Treat-v0", "--ants", "3", "--param", "tau0=0.001"]
+    done = run(*arguments, "--json", cwd=tmp_path)
+    assert (done.returncode, done.stdout) == (1, "")
+    (line,) = done.stderr.splitlines()
+    assert "cost" in line
+
+
+@pytest.mark.parametrize("first", [True, False])
+def test_debug_shows_the_traceback(first: bool) -> None:
+    arguments = ["evaluate", "/no/such/agent"]
+    arguments = ["--debug", *arguments] if first else [*arguments, "--debug"]
+    result = invoke(*arguments)
+    assert result.exit_code == 2
+    assert "Traceback" in result.stderr
+    assert result.stderr.splitlines()[-1].startswith("acl-gym: no agent file")
+
+
+def test_a_warning_is_one_line_and_json_stays_pure(tmp_path: Path) -> None:
+    done = run(*SMALL, "--param", "tau0=0.5", "--json", cwd=tmp_path)
+    assert done.returncode == 0
+    assert json.loads(done.stdout)["parameters"]["tau0"] == 0.5
+    (line,) = done.stderr.splitlines()
+    assert line.startswith("acl-gym: warning: tau0 = 0.5 exceeds")
+
+
+def test_ctrl_c_is_one_line_and_130(tmp_path: Path) -> None:
+    """A handler of Python's own, as in a terminal; a shell may have set to ignore it."""
+    code = (
+        "import signal; signal.signal(signal.SIGINT, signal.default_int_handler);"
+        "from acl_gym.cli import main; main()"
+    )
+    log = tmp_path / "log.csv"
+    arguments = ["train", PENDULUM, "--trials", "1000000", "--log", str(log)]
+    with subprocess.Popen(
+        [sys.executable, "-c", code, *arguments],
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
+        cwd=tmp_path,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    ) as process:
+        while process.poll() is None:
+            if log.exists() and log.stat().st_size > 200:
+                process.send_signal(signal.SIGINT)
+                break
+        out, err = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert out == ""
+    assert err == "acl-gym: interrupted; what is in files already is kept.\n"

@@ -40,7 +40,7 @@ class QLearning(TabularAgent):
     tells what a state offers (`infos["action_mask"]`), those actions are its U_q.
 
     With `trace_decay` > 0 it is Watkins's Q(lambda), as in
-    `QLearning(env, grid, trace_decay=0.9)`. Each slot has traces of its own, which
+    `QLearning(env, grid, trace_decay=0.7)`. Each slot has traces of its own, which
     begin empty with each episode. In each step they fade by gamma_rl lambda, the cells
     of the state and the action taken are added, and every pair learns from the error
     (3.46) in proportion to its trace. An action that is not greedy on the values it

@@ -36,10 +36,11 @@ class QLearning(TabularAgent):
     Through a `Crisp` partition it is tabular Q-learning; through a `Fuzzy` one the
     action value is linear in the degrees, Q(x, u) = sum of beta_i Q_iu, and each cell
     learns in proportion to its degree. Values start at 0, which is optimistic where
-    rewards are negative costs, and so makes the slots explore.
+    rewards are negative costs, and so makes the slots explore. Where the environment
+    tells what a state offers (`infos["action_mask"]`), those actions are its U_q.
 
     With `trace_decay` > 0 it is Watkins's Q(lambda), as in
-    `QLearning(env, grid, trace_decay=0.9)`. Each slot has traces of its own, which
+    `QLearning(env, grid, trace_decay=0.7)`. Each slot has traces of its own, which
     begin empty with each episode. In each step they fade by gamma_rl lambda, the cells
     of the state and the action taken are added, and every pair learns from the error
     (3.46) in proportion to its trace. An action that is not greedy on the values it
@@ -47,8 +48,7 @@ class QLearning(TabularAgent):
     1e-4 are dropped.
 
     Args:
-        env: a vector environment with `Discrete` actions. The actions that a state
-            offers (`infos["action_mask"]`) are U_q in (3.44) and (3.46).
+        env: a vector environment with `Discrete` actions.
         partition: turns observations into cells and degrees; None takes
             `automatic_partition(env)`.
         learning_rate: alpha_rl, in (0, 1].
@@ -95,11 +95,11 @@ class QLearning(TabularAgent):
         self.epsilon = epsilon
         self.trace_decay = trace_decay
         self._kind = validation.one_of("traces", traces, TRACES)
+        self._traces: _Traces | None = None
         super().__init__(
             env, partition, max_steps=max_steps, seed=seed, n_actions=n_actions
         )
         self._values: FloatArray = np.zeros((self.partition.n_cells, self.n_actions))
-        self._traces: _Traces | None = None
 
     def learn(
         self,

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import gymnasium as gym
 import numpy as np
 import pytest
+from gymnasium import spaces
 
 from acl_gym import Crisp, Fuzzy, evaluate_policy_cost, fuzzy_q_iteration
 from acl_gym.agents import q_iteration
 from acl_gym.envs.control_env import ControlVectorEnv
+from acl_gym.envs.system import ControlSystem
 from acl_gym.partition import Partition
+from tests.agents import reference_colony as reference
 
 
 def pendulum(**parameters: object) -> ControlVectorEnv:
@@ -51,6 +56,63 @@ def test_sweeps_equal_the_reference(kind, discount) -> None:
     found = fuzzy_q_iteration(env, partition, discount=discount, max_iterations=3)
     np.testing.assert_allclose(found.policy.table, expected, rtol=1e-12)
     assert found.iterations == 3
+
+
+class Puck(ControlSystem):
+    """Position and velocity in the plane, pushed in nine ways, towards the origin.
+
+    The numbers keep every state off the borders between crisp cells.
+    """
+
+    PUSHES = np.array([[x, y] for x in (-0.31, 0.0, 0.31) for y in (-0.31, 0.0, 0.31)])
+    observation_space = spaces.Box(-1.0, 1.0, (4,), np.float64)
+    action_space = spaces.Discrete(9)
+    max_stage_cost = 2.0
+
+    def sample_states(self, rng, count):
+        return rng.uniform(-1, 1, (4, count))
+
+    def checked_states(self, states):
+        return np.asarray(states, dtype=np.float64)
+
+    def advance(self, states, actions, uniforms, rewards, reached):
+        states[2:] = np.clip(states[2:] + self.PUSHES[actions].T, -1, 1)
+        states[:2] = np.clip(states[:2] + 0.47 * states[2:], -1, 1)
+        rewards[:] = -(states[:2] ** 2).sum(axis=0) - 0.1
+        reached[:] = np.abs(states).max(axis=0) < 0.85
+
+    def evaluation_states(self):
+        return np.zeros((1, 4))
+
+    def draw(self, pygame, canvas, state, action):
+        """Nothing."""
+
+
+class PuckVectorEnv(ControlVectorEnv):
+    system_type = Puck
+
+
+@pytest.mark.parametrize("kind", [Fuzzy, Crisp])
+def test_four_dimensions_and_nine_actions(kind: Any) -> None:
+    """As navigation has them: k = 16; each axis with centres of its own."""
+    env, cells = PuckVectorEnv(1), (4, 3, 2, 3)
+    partition = kind.from_box(env.single_observation_space, cells)
+    axes = [(np.linspace(-1, 1, n), None) for n in cells]
+    states = partition.cell_states()
+    values = np.zeros((72, 9))
+    after, rewards, ends = np.empty((72, 9, 72)), np.empty((72, 9)), np.empty((72, 9))
+    for cell, u in np.ndindex(values.shape):
+        state, reward, reached = states[cell][:, None].copy(), np.empty(1), np.empty(1)
+        env.system.advance(state, np.array([u]), None, reward, reached)
+        after[cell, u] = reference.fuzzify(state[:, 0], axes, kind is Crisp)
+        rewards[cell, u], ends[cell, u] = reward[0], reached[0]
+    for _ in range(4):
+        for cell, u in np.ndindex(values.shape):
+            future = 0.0 if ends[cell, u] else (after[cell, u] @ values).max()
+            values[cell, u] = rewards[cell, u] + 0.9 * future
+    found = fuzzy_q_iteration(env, partition, discount=0.9, max_iterations=4)
+    np.testing.assert_allclose(found.policy.table, values, rtol=1e-9)
+    assert 0 < ends.sum() < ends.size
 
 
 def test_batches_of_cells_do_not_matter(monkeypatch: pytest.MonkeyPatch) -> None:

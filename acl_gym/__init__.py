@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from acl_gym.agents.q_iteration import fuzzy_q_iteration
     from acl_gym.agents.q_learning import QLearning
     from acl_gym.agents.sb3 import VectorEnvAdapter
+    from acl_gym.agents.value_iteration import value_iteration
     from acl_gym.callbacks import (
         Callback,
         Checkpoint,
@@ -53,6 +54,7 @@ _PUBLIC = {
     "automatic_partition": "acl_gym.partition.automatic",
     "evaluate_policy_cost": "acl_gym.evaluation",
     "fuzzy_q_iteration": "acl_gym.agents.q_iteration",
+    "value_iteration": "acl_gym.agents.value_iteration",
 }
 
 __all__ = [
@@ -76,6 +78,7 @@ __all__ = [
     "automatic_partition",
     "evaluate_policy_cost",
     "fuzzy_q_iteration",
+    "value_iteration",
 ]
 
 register_environments()

@@ -220,12 +220,13 @@ def _check_names(env_id: str, system: type, env_args: dict[str, Any]) -> None:
 
 def default_steps(env: VectorEnv) -> int:
     """T: that of the environment, 300 if it has none."""
+    from acl_gym.agents.tabular import DEFAULT_MAX_STEPS, time_limit
     from acl_gym.envs.control_env import ControlVectorEnv
 
     base = env.unwrapped
     if isinstance(base, ControlVectorEnv):
         return base.system.evaluation_steps
-    return int(getattr(base.spec, "max_episode_steps", None) or 300)
+    return time_limit(env) or DEFAULT_MAX_STEPS
 
 
 def load_agent(path: str) -> TabularAgent:

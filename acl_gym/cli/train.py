@@ -35,11 +35,12 @@ HELP = """Learn on an environment, print how it went, and save the agent.
 
 ENV_ID is any id of Gymnasium that can be a vector environment with Discrete actions;
 "module:id" imports a module first, also one in this folder. Rewards must be negative
-costs for ants, and observations a bounded Box.
+costs for ants, or --param deposit=return where they are never negative.
 
 \b
 Examples:
-  acl-gym train acl_gym/Pendulum-v0 --out pendulum.npz
+  acl-gym train acl_gym/Pendulum-v0
+  acl-gym train acl_gym/GridSearch2D-v0 --ants 86 --param tabu=true --out grid.npz
   acl-gym train acl_gym/Pendulum-v0 --ants 2000 --trials 50 --seed 3
   acl-gym train acl_gym/Pendulum-v0 --agent q-learning --param epsilon=0.05
   acl-gym train acl_gym/Pendulum-v0 --partition crisp --param global_decay=0.001
@@ -47,11 +48,8 @@ Examples:
   acl-gym train my_module:MyEnv-v0 --max-steps 200 --log run.csv --json
 """
 
-DEFAULT_CELLS = {"acl_gym/Pendulum-v0": (40, 41)}
-"""Cells of each variable, §5.3."""
-
-ABOUT_CELLS = 1600
-"""Cells altogether where nothing else is said."""
+RANDOM_STEPS = 10_000
+"""From which bounds are estimated where observations have none."""
 
 _OWN_OPTION = ("env", "partition", "max_steps", "seed", "n_actions")
 
@@ -72,8 +70,8 @@ def train(
     partition: Annotated[
         Literal["auto", "fuzzy", "crisp"],
         typer.Option(
-            help="How states become cells, spread evenly over the bounds of the "
-            "observations; auto is fuzzy."
+            help="How observations become cells, where they are not cells already; "
+            "auto is fuzzy. Bounds that are missing are estimated from random steps."
         ),
     ] = "auto",
     cells: Annotated[
@@ -81,7 +79,7 @@ def train(
         typer.Option(
             metavar="N,N,...",
             help="Cells of each variable, or one number for all.  "
-            "[default: 40,41 for the pendulum, else about 1600 altogether]",
+            "[default: those of the thesis, else a few thousand altogether]",
             show_default=False,
         ),
     ] = None,
@@ -120,7 +118,8 @@ def train(
         Path | None,
         typer.Option(
             metavar="FILE.npz",
-            help="Save the agent here.  [default: not saved]",
+            help="Save the agent here.  [default: the name of the environment, with a "
+            "number if there is such a file]",
             show_default=False,
         ),
     ] = None,
@@ -149,14 +148,15 @@ def train(
     from acl_gym import storage
 
     with bad_arguments():
-        if out is not None:
-            out = storage.checked_target(storage.with_suffix(out))
+        out = storage.checked_target(
+            _free_name(env_id) if out is None else storage.with_suffix(out)
+        )
         kind = agent_class(agent)
         settings = parse_settings("--param", param or (), parameter_names(kind))
         env_args = parse_settings("--env-arg", env_arg or ())
         env = make_env(env_id, ants, env_args)
         steps = max_steps or default_steps(env)
-        grid = _make_partition(env, partition, _cells(env_id, cells))
+        grid = _make_partition(env, partition, _cells(cells))
         learner = kind(env, grid, max_steps=steps, seed=seed, **settings)
         evaluation = _make_evaluation(env, env_id, env_args, evaluate_every, steps)
         watchers = [evaluation, *_make_logs(log, tensorboard)]
@@ -174,8 +174,7 @@ def train(
         callback=watchers,
         progress_bar=not quiet and sys.stderr.isatty(),
     )
-    if out is not None:
-        learner.save(out)
+    learner.save(out)
     if as_json:
         print_json(_summary(learner, agent, ants, out))
     elif not quiet:
@@ -195,10 +194,9 @@ def parameter_names(kind: type) -> list[str]:
     return [name for name in parameters if name not in _OWN_OPTION]
 
 
-def _cells(env_id: str, text: str | None) -> list[int] | None:
+def _cells(text: str | None) -> list[int] | None:
     if text is None:
-        default = DEFAULT_CELLS.get(env_id.rsplit(":", maxsplit=1)[-1])
-        return None if default is None else list(default)
+        return None
     try:
         return [int(part) for part in text.split(",")]
     except ValueError:
@@ -208,27 +206,15 @@ def _cells(env_id: str, text: str | None) -> list[int] | None:
 
 
 def _make_partition(env: VectorEnv, kind: str, cells: list[int] | None) -> Partition:
-    """Cells spread evenly over a bounded Box; its circular variables are known."""
-    from gymnasium import spaces
-
     from acl_gym import Crisp, Fuzzy
-    from acl_gym.envs.control_env import ControlVectorEnv
+    from acl_gym.partition.automatic import automatic_partition
 
-    space = env.single_observation_space
-    if not isinstance(space, spaces.Box) or len(space.shape) != 1:
-        raise BadArgumentError(
-            f"observations must be a Box with one axis, got {space}; use the Python "
-            "interface with a partition of your own."
-        )
-    dimensions = int(space.shape[0])
-    if cells is None:
-        cells = [max(3, round(ABOUT_CELLS ** (1 / dimensions)))]
-    if len(cells) == 1:
-        cells = cells * dimensions
-    base = env.unwrapped
-    circular = base.system.circular if isinstance(base, ControlVectorEnv) else ()
-    grid = Crisp if kind == "crisp" else Fuzzy
-    return grid.from_box(space, cells, circular)
+    return automatic_partition(
+        env,
+        kind=Crisp if kind == "crisp" else Fuzzy,
+        cells=cells[0] if cells and len(cells) == 1 else cells,
+        random_steps=max(RANDOM_STEPS, env.num_envs),
+    )
 
 
 def _make_evaluation(
@@ -254,9 +240,7 @@ def _make_logs(log: Path | None, tensorboard: Path | None) -> list[Callback]:
     return logs
 
 
-def _summary(
-    learner: TabularAgent, name: str, ants: int, out: Path | None
-) -> dict[str, Any]:
+def _summary(learner: TabularAgent, name: str, ants: int, out: Path) -> dict[str, Any]:
     last = learner.history[-1]
     return {
         **learner.metadata,
@@ -269,12 +253,12 @@ def _summary(
         "seconds": learner.seconds,
         "policy_cost": last["policy_cost"],
         "success_rate": last["success_rate"],
-        "file": None if out is None else str(out),
+        "file": str(out),
         "rows": learner.history,
     }
 
 
-def _print_rows(learner: TabularAgent, out: Path | None) -> None:
+def _print_rows(learner: TabularAgent, out: Path) -> None:
     from rich.table import Table
 
     table = Table(box=None, pad_edge=False, header_style="bold")
@@ -293,8 +277,15 @@ def _print_rows(learner: TabularAgent, out: Path | None) -> None:
             )
     target = console()
     target.print(table)
-    if out is None:
-        line = "The agent was not saved; --out FILE.npz does."
-    else:
-        line = f"Saved {out}; acl-gym evaluate {out} evaluates it again."
+    line = f"Saved {out}; acl-gym evaluate {out} evaluates it again."
     target.print(line, markup=False, highlight=False, soft_wrap=True)
+
+
+def _free_name(env_id: str) -> Path:
+    """A file in this folder that is not there yet: Pendulum-v0.npz, -2, -3, ..."""
+    stem = env_id.rpartition(":")[2].rpartition("/")[2]
+    path, number = Path(f"{stem}.npz"), 1
+    while path.exists():
+        number += 1
+        path = Path(f"{stem}-{number}.npz")
+    return path

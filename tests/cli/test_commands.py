@@ -166,7 +166,7 @@ def test_the_table_has_the_evaluated_rows_and_the_last() -> None:
     assert lines[0].split()[:3] == ["trial", "steps", "seconds"]
     assert [line.split()[0] for line in lines[1:4]] == ["2", "4", "5"]
     assert f"{rows[-1]['policy_cost']:.4f}" in lines[3]
-    assert "not saved" in lines[4]
+    assert lines[4].startswith("Saved Pendulum-v0.npz; acl-gym evaluate Pendulum-v0")
 
 
 def test_quiet_prints_nothing() -> None:
@@ -184,6 +184,20 @@ def test_partitions_and_cells() -> None:
     assert whole["partition"] == "Fuzzy(40 x 41 cells, circular=[0])"
     one = figures(*SMALL, "--cells", "5", "--trials", "1")
     assert one["partition"] == "Fuzzy(5 x 5 cells, circular=[0])"
+
+
+@pytest.mark.parametrize(
+    ("env_id", "partition"),
+    [
+        ("acl_gym/GridSearch1D-v0", "Discrete"),
+        ("CartPole-v1", "Fuzzy(7 x 7 x 7 x 7 cells"),
+        ("FrozenLake-v1", "Discrete"),
+    ],
+)
+def test_any_environment_gets_a_partition(env_id: str, partition: str) -> None:
+    arguments = ["train", env_id, "--ants", "5", "--trials", "2", "--max-steps", "20"]
+    found = figures(*arguments, "--agent", "q-learning")
+    assert found["partition"].startswith(partition)
 
 
 def test_an_environment_of_a_module_in_this_folder(tmp_path: Path) -> None:

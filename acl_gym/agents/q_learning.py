@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any, Self
 
 import numpy as np
-from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector import VectorEnv
 from numba import njit
 from numpy.typing import ArrayLike
 
@@ -257,11 +257,6 @@ def _next_allowed(walk: Walk, step: Step) -> BoolArray:
     if walk.action_mask is None:
         return ALL
     allowed = walk.action_mask[step.ants]
-    # Where slots are reset within the step, the mask of one that has finished belongs
-    # to its next episode already: take all actions as allowed.
-    mode = walk.env.metadata.get("autoreset_mode", AutoresetMode.NEXT_STEP)
-    if AutoresetMode(mode) is AutoresetMode.SAME_STEP:
-        allowed[step.finished] = True
     # Where an episode ends, an environment may allow nothing any more.
     allowed[~allowed.any(axis=1)] = True
     return allowed

@@ -264,6 +264,11 @@ class Walk:
             observation = observation.copy()
             for slot in ants[stopped]:
                 observation[slot] = infos["final_obs"][slot]
+            if self.action_mask is not None:
+                # The mask is that of the next episode already.
+                final = infos.get("final_info", {}).get("action_mask")
+                last = ants[stopped]
+                self.action_mask[last] = True if final is None else final[last] != 0
         return observation
 
 

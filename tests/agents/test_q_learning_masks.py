@@ -48,7 +48,7 @@ def test_only_what_a_state_offers_counts(mode: str, trace_decay: float) -> None:
     np.testing.assert_array_equal(agent.table, values)
 
 
-@pytest.mark.parametrize("mode", ["NextStep", "Disabled"])
+@pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize(("limit", "max_steps"), [(2, 50), (np.inf, 2)])
 def test_what_is_offered_counts_where_an_episode_is_cut_off(
     mode: str, limit: float, max_steps: int
@@ -71,7 +71,7 @@ def test_a_mask_of_the_next_episode_is_not_used() -> None:
 
     Cells 0 and 1, truncated after one step: from cell 1 action 0 leads to cell 0. A new
     episode begins in cell 1, which offers action 0 only, worth -1 by now; action 1
-    of cell 0 is worth more, and all actions are taken as allowed.
+    of cell 0, which the last state does offer, is worth more.
     """
     table: Table = {
         0: {u: [(1.0, 2, 0.0, True)] for u in range(2)},

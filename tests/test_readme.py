@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 README = Path(__file__).resolve().parents[1] / "README.md"
@@ -30,10 +29,19 @@ def test_ten_lines_learn_the_pendulum(
 
 
 def test_a_newcomers_environment_is_learned() -> None:
+    """Untrained, the cart hardly ever comes to rest; 18 steps is about the best."""
     names = run(BLOCKS[1])
-    states = np.linspace(0.1, 1.7, 17)[:, None]
-    actions = names["colony"].predict(states)[0]  # type: ignore[attr-defined]
-    assert actions.tolist() == [1] * 17
+    result = names["result"]
+    assert result.success_rate == 1.0  # type: ignore[attr-defined]
+    assert result.cost < 30.0  # type: ignore[attr-defined]
+
+
+def test_twenty_lines_of_theirs_and_five_of_ours() -> None:
+    lines = [line for line in BLOCKS[1].splitlines() if line.strip()]
+    start = next(i for i, line in enumerate(lines) if line.startswith("class"))
+    ours = next(i for i, line in enumerate(lines) if line.startswith("env ="))
+    assert ours - start <= 20
+    assert len(lines) - ours == 5
 
 
 @pytest.mark.parametrize("page", ["README.md", "CONTRIBUTING.md", *PAGES])

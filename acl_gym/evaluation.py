@@ -12,8 +12,13 @@ from numpy.typing import NDArray
 
 from acl_gym.agents.policy import PartitionPolicy
 from acl_gym.agents.walk import Walk, require_vector_env
-from acl_gym.costs import Cost, Episode, as_cost, solution_costs
+from acl_gym.costs import (
+    Cost,
+    as_cost,
+    solution_costs,
+)
 from acl_gym.envs.control_env import ControlVectorEnv
+from acl_gym.episodes import Episode
 
 FloatArray = NDArray[np.float64]
 

@@ -17,7 +17,13 @@ from gymnasium.wrappers.vector import TransformReward
 from tqdm.auto import tqdm
 
 from acl_gym import ACL, QLearning, evaluate_policy_cost
-from acl_gym.costs import Cost, Overshoot, RiseTime, SettlingTime, Steps
+from acl_gym.costs import (
+    Cost,
+    Overshoot,
+    RiseTime,
+    SettlingTime,
+    Steps,
+)
 from acl_gym.partition import named
 
 TURN = 2 * math.pi

@@ -10,8 +10,6 @@ from hypothesis import strategies as st
 from acl_gym.costs import (
     Constant,
     Cost,
-    Episode,
-    Episodes,
     Overshoot,
     OwnCost,
     Quadratic,
@@ -24,6 +22,7 @@ from acl_gym.costs import (
     cost_from_settings,
     solution_costs,
 )
+from acl_gym.episodes import Episode, Episodes
 from acl_gym.savable import to_settings
 
 Array = np.ndarray

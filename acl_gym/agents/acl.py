@@ -20,9 +20,15 @@ from acl_gym.agents.tabular import TabularAgent
 from acl_gym.agents.training import Training
 from acl_gym.agents.walk import Walk
 from acl_gym.callbacks import Callbacks, Row
-from acl_gym.costs import Cost, Episode, as_cost, cost_from_settings, solution_costs
+from acl_gym.costs import (
+    Cost,
+    as_cost,
+    cost_from_settings,
+    solution_costs,
+)
 from acl_gym.deposits import Deposit, InverseCost, as_deposit, deposit_from_settings
 from acl_gym.envs.control_env import ControlVectorEnv
+from acl_gym.episodes import Episode
 from acl_gym.membership import CellArray, FloatArray, IntArray
 from acl_gym.partition import Partition
 from acl_gym.savable import to_settings

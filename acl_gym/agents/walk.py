@@ -18,8 +18,8 @@ from numba import njit
 from numpy.typing import NDArray
 
 from acl_gym import validation
-from acl_gym.costs import Episodes
 from acl_gym.envs.control_env import ControlVectorEnv
+from acl_gym.episodes import Episodes
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]

@@ -12,8 +12,14 @@ from gymnasium import spaces
 
 from acl_gym import ACL, Crisp, Fuzzy, PolicyEvaluation, evaluate_policy_cost
 from acl_gym.agents.walk import Walk
-from acl_gym.costs import Episode, Overshoot, SettlingTime, StageCosts, Steps
+from acl_gym.costs import (
+    Overshoot,
+    SettlingTime,
+    StageCosts,
+    Steps,
+)
 from acl_gym.deposits import InverseCost, Rank
+from acl_gym.episodes import Episode
 from acl_gym.schedules import Exponential, Harmonic, Linear
 from tests.agents.reference_colony import Chain, chains
 

@@ -20,6 +20,7 @@ import gymnasium as gym
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from tqdm.auto import tqdm
 
 from acl_gym import (
@@ -108,10 +109,14 @@ def grid_2d() -> list[Setting]:
             ("epsilon 0.1", 10, {"selection": "max_boltzmann", "epsilon": 0.1}),
         )
     ]
-    for p in (0.5, 0.7, 0.9):
-        for name, changes in {"alpha 3": {}, "tabu": {"tabu": True}}.items():
-            env, colony = {"transition_probability": p}, {**CHAPTER_3, **changes}
-            found.append(Setting(f"2d p{p} {name}", GRID_2D, 86, 200, 10, env, colony))
+    for p, name, changes in (
+        (0.5, "alpha 3", {}),
+        (0.5, "tabu", {"tabu": True}),
+        (0.7, "alpha 3", {}),
+        (0.9, "alpha 3", {}),
+    ):
+        env, colony = {"transition_probability": p}, {**CHAPTER_3, **changes}
+        found.append(Setting(f"2d p{p} {name}", GRID_2D, 86, 200, 10, env, colony))
     return found
 
 
@@ -124,7 +129,7 @@ def sizes() -> list[Setting]:
             200,
             10,
             {"map_name": name},
-            {**CHAPTER_3, "tabu": True},
+            CHAPTER_3,
         )
         for name, states in (("11x11", 86), ("21x21", 278), ("31x31", 640))
         for share in (0.2, 1.0)
@@ -217,9 +222,9 @@ def baseline(setting: Setting) -> dict[str, Any]:
     return dict(zip(("cost", "success_rate", "discount"), min(found), strict=True))
 
 
-def quartiles(values: Any) -> str:
-    low, middle, high = np.percentile(values, [0, 50, 100])
-    return f"{middle:7.2f} [{low:.2f}, {high:.2f}]"
+def spread(values: Any) -> str:
+    """Median, lowest and highest; infinite ones count."""
+    return f"{np.median(values):.2f} [{np.min(values):.2f}, {np.max(values):.2f}]"
 
 
 def settled(costs: list[float], slack: float) -> int:
@@ -237,10 +242,10 @@ def tell(setting: Setting, runs: list[dict[str, Any]]) -> dict[str, Any]:
     line: dict[str, Any] = {
         "setting": setting.name,
         "runs": len(runs),
-        "final": quartiles(costs[:, -1]),
-        "best": quartiles(costs.min(axis=1)),
-        "last ten": quartiles(last_ten),
-        "success": quartiles(success),
+        "final": spread(costs[:, -1]),
+        "best": spread(costs.min(axis=1)),
+        "last ten": spread(last_ten),
+        "success": spread(success),
         "settled in trial": float(
             np.median([settled(c, 0.05) for c in costs.tolist()])
         ),
@@ -259,7 +264,7 @@ def tell(setting: Setting, runs: list[dict[str, Any]]) -> dict[str, Any]:
         optimum = runs[0]["optimal_cost"]
         line |= {
             "optimum": optimum,
-            "exact final": quartiles(exact),
+            "exact final": spread(exact),
             "median over optimum": float(np.median(exact) / optimum - 1),
             "at the optimum": int(np.sum(exact <= optimum * (1 + 1e-9))),
             "optimal actions": float(
@@ -285,13 +290,16 @@ def agreement(
 
 
 def draw(settings: list[Setting], runs: dict[str, Any], path: Path) -> None:
-    """Median and min-max band of the policy cost over the trials, a panel a setting."""
-    columns = min(len(settings), 3)
+    """Mean and min-max band of the policy cost over the trials, a panel a setting.
+
+    Settings that a reader will compare stand side by side, on one scale.
+    """
+    columns = 2 if settings[0].env_id == NAVIGATION or "x" in settings[0].name else 3
     rows = -(-len(settings) // columns)
-    figure = Figure(figsize=(7.2, 1.9 * rows), layout="constrained")
+    figure = Figure(figsize=(7.2, 1.75 * rows), layout="constrained")
     FigureCanvasAgg(figure)
-    for number, setting in enumerate(settings):
-        axes = figure.add_subplot(rows, columns, number + 1)
+    panels = figure.subplots(rows, columns, sharey="row", sharex=True, squeeze=False)
+    for setting, axes in zip(settings, panels.flat, strict=False):
         costs = np.array(
             [each["history"]["policy_cost"] for each in runs[setting.name]]
         )
@@ -303,13 +311,16 @@ def draw(settings: list[Setting], runs: dict[str, Any], path: Path) -> None:
             axes.axhline(optimum, color="#0072B2", linewidth=0.9, linestyle="--")
         axes.set_title(f"{setting.name}, {len(costs)} runs", fontsize=8)
         axes.set_yscale("log")
+        axes.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+        axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        axes.yaxis.set_minor_formatter(NullFormatter())
         axes.tick_params(labelsize=7, which="both")
         axes.spines[["top", "right"]].set_visible(False)
-        if number % columns == 0:
-            axes.set_ylabel("policy cost $J^h$", fontsize=8)
-        if number >= len(settings) - columns:
-            axes.set_xlabel("trial", fontsize=8)
-    figure.savefig(path, dpi=150)
+    for axes in panels.flat[len(settings) :]:
+        axes.remove()
+    figure.supylabel("policy cost $J^h$", fontsize=8)
+    figure.supxlabel("trial", fontsize=8)
+    figure.savefig(path, dpi=140)
 
 
 def study(name: str, options: argparse.Namespace) -> list[dict[str, Any]]:
@@ -347,17 +358,16 @@ def study(name: str, options: argparse.Namespace) -> list[dict[str, Any]]:
     if name == "navigation":
         for setting, line in zip(settings, lines, strict=True):
             line["Q-iteration"] = baseline(setting)
-    if {"2d p0.5 tabu", "2d p0.9 tabu"} <= runs.keys():
-        for kind in ("alpha 3", "tabu"):
-            low, high = runs[f"2d p0.5 {kind}"], runs[f"2d p0.9 {kind}"]
-            lines.append(
-                {
-                    "setting": f"same action, p = 0.5 and 0.9, {kind}",
-                    "same seed": agreement(low, high, 0),
-                    "two seeds at p = 0.5": agreement(low, low, 1),
-                    "two seeds at p = 0.9": agreement(high, high, 1),
-                }
-            )
+    if {"2d p0.5 alpha 3", "2d p0.9 alpha 3"} <= runs.keys():
+        low, high = runs["2d p0.5 alpha 3"], runs["2d p0.9 alpha 3"]
+        lines.append(
+            {
+                "setting": "cells with the same action",
+                "p = 0.5 and p = 0.9": agreement(low, high, 0),
+                "two seeds at p = 0.5": agreement(low, low, 1),
+                "two seeds at p = 0.9": agreement(high, high, 1),
+            }
+        )
     if options.figures:
         options.figures.mkdir(parents=True, exist_ok=True)
         draw(settings, runs, options.figures / f"{name}.png")

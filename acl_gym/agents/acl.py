@@ -126,12 +126,14 @@ class ACL(TabularAgent):
         super().__init__(
             env, partition, max_steps=max_steps, seed=seed, n_actions=n_actions
         )
+        if not isinstance(tabu, bool):
+            raise TypeError(f"tabu must be True or False, got {tabu!r}.")
         if tabu and self.partition.cells_per_state > 1:
             raise ValueError(
                 "tabu needs a partition with one cell a state, such as Crisp or "
                 f"Discrete, got {self.partition!r}; leave tabu out."
             )
-        self.tabu = bool(tabu)
+        self.tabu = tabu
         self.pheromone = Pheromone(
             self.partition.n_cells, self.n_actions, tau0, self._now("alpha")
         )

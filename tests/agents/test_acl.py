@@ -233,6 +233,10 @@ BAD: list[tuple[str, Any, type[Exception]]] = [
     *[("max_steps", value, TypeError) for value in (3.0, "3", True, math.nan)],
     *[("seed", value, TypeError) for value in (1.5, "1", True, math.nan)],
     ("seed", -1, ValueError),
+    *[("tabu", value, TypeError) for value in ("no", 1, None)],
+    *[("cost", value, TypeError) for value in ("steps", 3)],
+    ("deposit", "reward", ValueError),
+    ("deposit", None, TypeError),
     *[
         ("selection", value, ValueError)
         for value in ("greedy", "", None, 3, "Boltzmann")

@@ -1,8 +1,9 @@
 """What figures share: styles of agents, axes, legends, ticks.
 
 Figures are made without pyplot, so that nothing global is left behind. Colours are
-those of Okabe and Ito, which people who are colour-blind tell apart: a warm hue is a
-colony, a blue one Q-learning; a dashed line is a crisp partition.
+those of Okabe and Ito, and one of Tol's, which people who are colour-blind tell apart: a
+warm hue is a colony, a blue one Q-learning, a purple one Q(lambda). A crisp partition
+has a dashed line in the lighter shade.
 """
 
 from __future__ import annotations
@@ -36,9 +37,11 @@ STYLES = {
     "acl-crisp": Style("#E69F00", (0, (4, 1.2))),
     "q-fuzzy": Style("#0072B2"),
     "q-crisp": Style("#56B4E9", (0, (4, 1.2))),
+    "q-lambda-fuzzy": Style("#882255"),
+    "q-lambda-crisp": Style("#CC79A7", (0, (4, 1.2))),
     "dqn": Style("#009E73", (0, (6, 1, 1, 1))),
 }
-OTHER = Style("#CC79A7", (0, (1, 1)))
+OTHER = Style("#666666", (0, (1, 1)))
 """Of an agent that is not in STYLES."""
 
 BOUND: dict[str, Any] = {"color": "0.2", "linewidth": 0.9, "zorder": 1.2}
@@ -94,8 +97,10 @@ def legend(parent: Axes | Figure, handles: list[Any], **kwargs: Any) -> None:
     )
 
 
-def optimal_cost_line(ax: Axes, optimal_cost: float, *, vertical: bool = False) -> None:
-    """J*, with its name."""
+def optimal_cost_line(
+    ax: Axes, optimal_cost: float, symbol: str = "J*", *, vertical: bool = False
+) -> None:
+    """J*, or what stands for it, with its name."""
     if vertical:
         ax.axvline(optimal_cost, **BOUND)
         place: dict[str, Any] = {
@@ -111,7 +116,7 @@ def optimal_cost_line(ax: Axes, optimal_cost: float, *, vertical: bool = False) 
             "xytext": (0, -2),
         }
     ax.annotate(
-        f"J* = {wording.cost(optimal_cost)}",
+        f"{symbol} = {wording.cost(optimal_cost)}",
         textcoords="offset points",
         fontsize=TINY,
         va="top",

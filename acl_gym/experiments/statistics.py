@@ -220,7 +220,7 @@ def findings(
 
     Args:
         summary: of `summarise`.
-        reference: with `optimal_cost`, and perhaps `coarse`.
+        reference: with `optimal_cost` or `best_known_cost`, and perhaps `coarse`.
         preset: how much was run.
     """
     if not summary:
@@ -228,11 +228,13 @@ def findings(
     summary = [
         {**entry, "label": wording.in_a_sentence(entry["label"])} for entry in summary
     ]
-    optimal_cost = float(reference["optimal_cost"])
+    optimal_cost = wording.reference_cost(reference)
+    name = wording.the_reference(reference)
     sentences = []
     for measure in _TIMES:
         mark = int(measure.key.rsplit("_", 1)[1])
-        goal = f"within {mark}% of J* ({mark_cost(optimal_cost, mark):.1f})"
+        bound = wording.cost(mark_cost(optimal_cost, mark))
+        goal = f"within {mark}% of {name} ({bound})"
         if any(entry[measure.key]["median"] is not None for entry in summary):
             text = f"To come {goal}, {_ranking(summary, measure)}."
         elif measure.key.startswith("seconds"):
@@ -245,7 +247,7 @@ def findings(
             entry[measure.key.replace("policy_cost", "gap_percent")]["median"]
             for entry in summary
         )
-        above = f", {wording.percent_above(gap)} J* ({optimal_cost:.1f})"
+        above = f", {wording.percent_above(gap)} {name} ({wording.cost(optimal_cost)})"
         sentences.append(wording.sentence(_ranking(summary, measure, above)))
     sentences.append(_successes(summary))
     champion, rivals = _rivals(summary)
@@ -305,12 +307,12 @@ def _successes(summary: Sequence[Entry]) -> str:
 def _rivals(summary: Sequence[Entry]) -> tuple[Entry, list[Entry]]:
     """The colony that ends lowest; its other variants, and the best of each family.
 
-    The family is what the agent's name begins with. Without colonies, no rivals.
+    The family is the agent's name without its kind of partition. Without colonies, no rivals.
     """
     colonies: list[Entry] = []
     families: dict[str, Entry] = {}
     for entry in _ranked(summary, _COSTS[0]):
-        family = entry["agent"].split("-")[0]
+        family = entry["agent"].removesuffix("-fuzzy").removesuffix("-crisp")
         if family == "acl":
             colonies.append(entry)
         else:
@@ -359,12 +361,14 @@ def _circumstances(
         sentences.append(f"The budgets differ, in the median from {least} to {most}.")
     if coarse := reference.get("coarse"):
         cells = " x ".join(map(str, coarse["cells"]))
+        hovers = coarse["success_rate"] < 1
         sentences.append(
             f"Fuzzy Q-iteration, which knows the model, gets to a policy cost of "
             f"{coarse['policy_cost']:.1f} on {cells} cells, as many as the table-based "
             f"methods have, and reaches the goal from "
-            f"{wording.share(coarse['success_rate'])} of the starts: its greedy policy "
-            "hovers beside the goal. It is no bound on what these cells allow."
+            f"{wording.share(coarse['success_rate'])} of the starts"
+            f"{': its greedy policy hovers beside the goal' if hovers else ''}. It is "
+            "no bound on what these cells allow."
         )
     seeds = [int(entry["seeds"]) for entry in summary]
     number = " to ".join(map(str, sorted({min(seeds), max(seeds)})))

@@ -279,7 +279,7 @@ GRID_2D = Course(
     # tabu: the assumption of §3.4.2 that no ant walks in circles.
     acl={
         "tau0": 1e-3,
-        "local_decay": 0.0,
+        "local_decay": 0.01,
         "global_decay": 0.1,
         "alpha": 3.0,
         "selection": "boltzmann",
@@ -292,8 +292,8 @@ GRID_2D = Course(
         "epsilon": 0.1,
         "trace_decay": 0.8,
     },
-    dqn_short={},
-    dqn_long={},
+    dqn_short={"max_episode_steps": 50},
+    dqn_long={"max_episode_steps": 50},
     budgets={
         "smoke": Budget(trials=3, dqn_steps=1_200, dqn_every=600),
         "quick": Budget(trials=200, dqn_steps=10_000, dqn_every=500),

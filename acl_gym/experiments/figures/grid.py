@@ -66,7 +66,11 @@ def policy_maps(comparison: Comparison) -> Figure:
     for ax in axes.flat[len(panels) :]:
         ax.remove()
     shades = figure.colorbar(
-        ScalarMappable(norm, _SHADES), ax=list(axes.flat[: len(panels)]), shrink=0.8, pad=0.01, aspect=16 if is_strip else 30
+        ScalarMappable(norm, _SHADES),
+        ax=list(axes.flat[: len(panels)]),
+        shrink=0.8,
+        pad=0.01,
+        aspect=16 if is_strip else 30,
     )
     shades.set_label("Cost until the goal", fontsize=SMALL)
     shades.ax.tick_params(labelsize=TINY)

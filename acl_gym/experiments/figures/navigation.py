@@ -133,9 +133,8 @@ def _small_multiples(
             axis.set_major_locator(MultipleLocator(largest / 2))
         if number % columns == 0:
             ax.set_ylabel("$c_2$ (m)", fontsize=SMALL)
-        if number >= count - columns:
+        if number >= columns * (rows - 1):
             ax.set_xlabel("$c_1$ (m)", fontsize=SMALL)
-            ax.tick_params(labelbottom=True)
     return figure
 
 
@@ -180,7 +179,7 @@ def _end(color: str, *, reached: bool) -> dict[str, Any]:
     return {
         "color": color,
         "marker": "o" if reached else "x",
-        "markersize": 3.5 if reached else 4.5,
+        "markersize": 2.5 if reached else 4,
         "linestyle": "",
         "zorder": 3,
         "clip_on": False,

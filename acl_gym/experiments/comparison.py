@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 import sys
@@ -93,7 +94,7 @@ def list_tasks(
         "reference",
         _reference,
         (course.env_id, preset),
-        {"env": course.env_id, "preset": preset},
+        _reference_settings(course, preset),
     )
     return [
         reference,
@@ -113,6 +114,16 @@ def list_tasks(
             for seed in seeds
         ),
     ]
+
+
+def _reference_settings(course: Course, preset: str) -> dict[str, Any]:
+    """All that the reference depends on."""
+    settings: dict[str, Any] = {"env": course.env_id, "optimum": course.optimum}
+    if make := course.budgets[preset].reference:
+        grids = [make().settings(), course.partitions["fuzzy"]().settings()]
+        # Centres are many: what tells them apart is enough.
+        settings["grids"] = hashlib.sha256(json.dumps(grids).encode()).hexdigest()
+    return settings
 
 
 def _budget_of(course: Course, preset: str, method: str) -> dict[str, Any]:

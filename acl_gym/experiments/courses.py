@@ -72,6 +72,7 @@ class Course:
         acl: settings of `ACL`.
         q_learning: settings of `QLearning`.
         q_lambda: the same with `trace_decay`.
+        own: what differs for one method by itself, by its name.
         dqn_short: what differs from the defaults of `DQNSettings` in a short run.
         dqn_long: the same in a long run.
         budgets: one for each preset.
@@ -88,6 +89,7 @@ class Course:
     acl: Settings
     q_learning: Settings
     q_lambda: Settings
+    own: Mapping[str, Settings] = field(default_factory=dict)
     dqn_short: Settings = field(default_factory=dict)
     dqn_long: Settings = field(default_factory=dict)
     budgets: Mapping[str, Budget]
@@ -107,8 +109,8 @@ class Course:
         if method == "dqn":
             return self.dqn_long if long_run else self.dqn_short
         family = method.rpartition("-")[0]
-        own = {"acl": self.acl, "q": self.q_learning, "q-lambda": self.q_lambda}
-        return own[family]
+        shared = {"acl": self.acl, "q": self.q_learning, "q-lambda": self.q_lambda}
+        return {**shared[family], **self.own.get(method, {})}
 
     def partition(self, method: str) -> Partition:
         """The partition of a table-based method."""
@@ -213,14 +215,24 @@ NAVIGATION = Course(
         "alpha": 3.0,
         "selection": "boltzmann",
     },
-    q_learning={"learning_rate": 0.3, "discount": 0.95, "epsilon": 0.1},
+    q_learning={"learning_rate": 0.3, "discount": 0.9, "epsilon": 0.1},
     q_lambda={
         "learning_rate": 0.3,
         "discount": 0.95,
         "epsilon": 0.1,
-        "trace_decay": 0.5,
+        "trace_decay": 0.9,
     },
-    dqn_long={"exploration_fraction": 0.02, "final_learning_rate": 1e-5},
+    # Bins make the next state uncertain: smaller steps average over it.
+    own={
+        "q-crisp": {"learning_rate": 0.1, "discount": 0.95},
+        "q-lambda-crisp": {"learning_rate": 0.1},
+    },
+    dqn_short={"reward_scale": 1.0},
+    dqn_long={
+        "reward_scale": 1.0,
+        "exploration_fraction": 0.02,
+        "final_learning_rate": 1e-5,
+    },
     budgets={
         "smoke": Budget(
             trials=2, dqn_steps=1_200, dqn_every=600, reference=_navigation_coarse

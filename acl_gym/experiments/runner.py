@@ -209,11 +209,13 @@ def _write(task: Task, result: Result, directory: Path) -> None:
     write_atomically(_file(task, directory), text.encode())
 
 
-# Modules and packages that draw and tell what has been run, and change nothing in it.
-_PRESENTATION = frozenset(
+# Modules and packages that draw and tell what has been run, and change nothing in it,
+# and the courses, whose settings are in the keys of the runs that they are for.
+_LEFT_OUT = frozenset(
     {
         "captions",
         "comparison",
+        "courses",
         "drawing",
         "figures",
         "intervals",
@@ -261,7 +263,7 @@ def code_fingerprint() -> str:
     package = Path(acl_gym.__file__).parent
     for source in sorted(package.rglob("*.py")):
         parts = source.relative_to(package).with_suffix("").parts
-        if parts[0] == "experiments" and not _PRESENTATION.isdisjoint(parts):
+        if parts[0] == "experiments" and not _LEFT_OUT.isdisjoint(parts):
             continue
         digest.update(source.relative_to(package).as_posix().encode())
         digest.update(source.read_bytes())

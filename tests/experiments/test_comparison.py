@@ -7,11 +7,16 @@ import re
 import runpy
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pyarrow.parquet as pq
 import pytest
 from typer.testing import CliRunner
+
+from acl_gym.experiments import comparison
+from acl_gym.experiments.courses import NAVIGATION, Course
 
 ROOT = Path(__file__).resolve().parents[2]
 SCRIPT = ROOT / "benchmarks" / "compare_acl_rl.py"
@@ -107,6 +112,31 @@ def test_bad_arguments_exit_with_2(arguments: list[str], message: str) -> None:
     assert failed.returncode == 2
     assert message in failed.stderr
     assert len(failed.stderr.strip().splitlines()) == 1
+
+
+def test_runs_are_kept_as_long_as_their_own_settings_stay() -> None:
+    def keys(course: Course) -> dict[str, str]:
+        tasks = comparison.list_tasks(course, "quick", list(course.methods), [0])
+        return {task.name: task.key for task in tasks}
+
+    def changed(**settings: Any) -> set[str]:
+        before, after = keys(NAVIGATION), keys(replace(NAVIGATION, **settings))
+        return {name for name in before if before[name] != after[name]}
+
+    assert changed() == set()
+    assert changed(acl={**NAVIGATION.acl, "alpha": 2.0}) == {
+        "acl-fuzzy-0",
+        "acl-crisp-0",
+    }
+    assert changed(dqn_short={"discount": 0.5}) == {"dqn-0"}
+    assert changed(optimum=True) == {"reference"}
+    assert changed(own={**NAVIGATION.own, "q-fuzzy": {"epsilon": 0.5}}) == {"q-fuzzy-0"}
+    others = {**NAVIGATION.partitions, "crisp": NAVIGATION.partitions["fuzzy"]}
+    assert changed(partitions=others) == {
+        *("acl-crisp-0", "q-crisp-0", "q-lambda-crisp-0")
+    }
+    budgets = {**NAVIGATION.budgets, "quick": NAVIGATION.budgets["smoke"]}
+    assert changed(budgets=budgets) == set(keys(NAVIGATION))
 
 
 @pytest.mark.parametrize("name", ["Navigation", "GridSearch1D", "GridSearch2D"])

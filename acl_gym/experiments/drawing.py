@@ -124,9 +124,18 @@ def optimal_cost_line(
     )
 
 
-def plain_log(axis: Axis) -> None:
-    """Ticks of a logarithmic axis that spans little: 40, 50, 60, 80, 100, ..."""
-    axis.set_major_locator(LogLocator(subs=(1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0)))
+def plain_log(axis: Axis, *, sparse: bool = False) -> None:
+    """Ticks of a logarithmic axis that spans little: 40, 50, 60, 80, 100, ...
+
+    Args:
+        axis: its limits are set.
+        sparse: fewer of them where it spans more, for a short axis.
+    """
+    low, high = axis.get_view_interval()
+    subs: tuple[float, ...] = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0)
+    if sparse and high > 4 * low:
+        subs = (1.0, 2.0, 5.0)
+    axis.set_major_locator(LogLocator(subs=subs))
     axis.set_minor_formatter(NullFormatter())
     plain_numbers(axis)
 

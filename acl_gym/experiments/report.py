@@ -98,8 +98,8 @@ def write_report(
     symbol = wording.symbol(comparison["reference"])
     columns = [
         column._replace(
-            group=column.group.replace("J*", symbol),
-            title=column.title.replace("J*", symbol),
+            group=_without_symbol(column.group, symbol),
+            title=_without_symbol(column.title, symbol),
         )
         for column in COLUMNS
     ]
@@ -129,6 +129,13 @@ def write_report(
         settings=_settings(comparison["runs"]),
     )
     write_atomically(path, text.encode())
+
+
+def _without_symbol(heading: str, symbol: str) -> str:
+    """A heading as it is where J* is known; else without what has only a long name."""
+    if symbol == "J*":
+        return heading
+    return heading.removesuffix(" J*").removesuffix(" of")
 
 
 def print_summary(

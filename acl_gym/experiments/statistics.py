@@ -168,6 +168,7 @@ class _Measure(NamedTuple):
     key: str
     name: str  # in a comparison of two agents
     lead: str  # what the agent with the lowest value does
+    together: str  # what several with the same value do
 
     def value(self, estimate: Estimate, end: str = "median", unit: str = " s") -> str:
         value = estimate[end]
@@ -200,11 +201,26 @@ class _Measure(NamedTuple):
 
 
 _COSTS = (
-    _Measure("final_policy_cost", "last policy", "ends lowest with its last policy"),
-    _Measure("best_policy_cost", "best policy", "finds the cheapest policy on its way"),
+    _Measure(
+        "final_policy_cost",
+        "last policy",
+        "ends lowest with its last policy",
+        "end lowest with their last policies",
+    ),
+    _Measure(
+        "best_policy_cost",
+        "best policy",
+        "finds the cheapest policy on its way",
+        "find the cheapest policies on their ways",
+    ),
 )
 _TIMES = tuple(
-    _Measure(f"{x}_to_{mark}", f"{name} to {mark}%", f"needs the {most} {name}")
+    _Measure(
+        f"{x}_to_{mark}",
+        f"{name} to {mark}%",
+        f"needs the {most} {name}",
+        f"need the {most} {name}",
+    )
     for mark in MARKS
     for x, name, most in (
         ("seconds", "wall-clock time", "least"),
@@ -261,9 +277,14 @@ def _ranked(summary: Sequence[Entry], measure: _Measure) -> list[Entry]:
 
 
 def _ranking(summary: Sequence[Entry], measure: _Measure, note: str = "") -> str:
-    """The first, with a note, and the second."""
+    """The first, with a note, and the second; or those that share the first place."""
     first, *others = _ranked(summary, measure)
     best = first[measure.key]
+    alike = [e for e in others if e[measure.key]["median"] == best["median"]]
+    if alike:
+        names = wording.listed([entry["label"] for entry in (first, *alike)])
+        value = measure.value(best)
+        return f"{names} {measure.together}, in the median all at {value}{note}"
     text = f"{first['label']} {measure.lead}: {measure.with_interval(best)}{note}"
     if others and others[0][measure.key]["median"] is not None:
         second = others[0][measure.key]

@@ -321,6 +321,15 @@ class TestFindings:
         assert "J*" not in text
         assert "9 x 3 x 9 x 3 cells" in text
 
+    def test_those_that_share_the_first_place(self):
+        runs = [make_run(agent, 0, [40.0]) for agent in ("acl-crisp", "q-crisp", "dqn")]
+        text = say(*runs, make_run("q-fuzzy", 0, [50.0]))
+        assert (
+            "Crisp ACL, crisp Q-learning and DQN end lowest with their last policies, "
+            "in the median all at 40.0, equal to J* (40.0)."
+        ) in text
+        assert "fuzzy Q-learning find" not in text
+
     def test_equal_to_the_optimum(self):
         text = say(make_run("dqn", 0, [40.0]))
         assert "40.0, equal to J* (40.0)" in text

@@ -30,7 +30,8 @@ def summary_dots(comparison: Comparison) -> Figure:
     figure = drawing.new_figure(1.2 + 0.36 * len(summary))
     axes = figure.subplots(1, 3, sharey=True, width_ratios=(1.2, 1, 1))
     marks = statistics.MARKS
-    close = (f"within {marks[0]}%", f"within {marks[1]}% of {symbol}")
+    of_it = " of J*" if symbol == "J*" else ""  # another name would be too long
+    close = (f"within {marks[0]}%", f"within {marks[1]}%{of_it}")
     panels: tuple[tuple[str, str, tuple[Any, Any], tuple[str, str]], ...] = (
         (
             "Policy cost",
@@ -68,7 +69,7 @@ def summary_dots(comparison: Comparison) -> Figure:
         )
     axes[0].set_xlim(left=0.94 * optimal_cost)
     drawing.optimal_cost_line(axes[0], optimal_cost, symbol, vertical=True)
-    drawing.plain_log(axes[0].xaxis)
+    drawing.plain_log(axes[0].xaxis, sparse=True)
     drawing.plain_numbers(axes[1].xaxis)
     axes[0].set_yticks(range(len(summary)), [entry["label"] for entry in summary])
     axes[0].set_ylim(len(summary) - 0.5, -0.7)

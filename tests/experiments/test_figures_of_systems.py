@@ -23,6 +23,14 @@ def test_every_kind_has_figures_that_can_be_drawn(kind, tmp_path, monkeypatch):
     assert all(path.stat().st_size > 1000 for path in paths.values())
 
 
+def test_figures_of_another_system_do_not_stay(tmp_path, monkeypatch):
+    monkeypatch.setattr(figures, "DPI", 30)
+    figures.save_figures(make_navigation(), tmp_path)
+    assert (tmp_path / "trajectories.png").exists()
+    paths = figures.save_figures(make_grid(), tmp_path)
+    assert sorted(tmp_path.iterdir()) == sorted(paths.values())
+
+
 def test_every_course_has_figures():
     for course in COURSES.values():
         assert course.pictures in figures.OF_SYSTEM

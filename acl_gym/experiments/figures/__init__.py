@@ -24,6 +24,8 @@ DPI = 300
 def save_figures(comparison: Comparison, directory: Path) -> dict[str, Path]:
     """Draw every figure and write it as a PNG, whole or not at all.
 
+    A figure that this system does not have, left by another one, is removed.
+
     Args:
         comparison: all of it.
         directory: exists.
@@ -37,6 +39,8 @@ def save_figures(comparison: Comparison, directory: Path) -> dict[str, Path]:
         draw(comparison).savefig(buffer, format="png", dpi=DPI)
         paths[name] = directory / f"{name}.png"
         write_atomically(paths[name], buffer.getvalue())
+    for name in {name for own in OF_SYSTEM.values() for name in own} - set(paths):
+        (directory / f"{name}.png").unlink(missing_ok=True)
     return paths
 
 

@@ -280,7 +280,7 @@ def _ranking(summary: Sequence[Entry], measure: _Measure, note: str = "") -> str
     """The first, with a note, and the second; or those that share the first place."""
     first, *others = _ranked(summary, measure)
     best = first[measure.key]
-    alike = [e for e in others if e[measure.key]["median"] == best["median"]]
+    alike = [e for e in others if _equal(e[measure.key], best)]
     if alike:
         names = wording.listed([entry["label"] for entry in (first, *alike)])
         value = measure.value(best)
@@ -294,6 +294,12 @@ def _ranking(summary: Sequence[Entry], measure: _Measure, note: str = "") -> str
         if overlap(best, second):
             text += "; the intervals overlap"
     return text
+
+
+def _equal(first: Estimate, second: Estimate) -> bool:
+    """Whether two medians are one, but for rounding."""
+    pair = [each["median"] for each in (first, second)]
+    return None not in pair and math.isclose(*pair, rel_tol=1e-9)
 
 
 def _laggards(summary: Sequence[Entry], measure: _Measure) -> list[str]:
@@ -349,7 +355,7 @@ def _duel(champion: Entry, other: Entry) -> list[str]:
     gains: list[str] = []
     for measure in (*_COSTS, *_TIMES):
         mine, yours = champion[measure.key], other[measure.key]
-        if mine["median"] == yours["median"]:
+        if mine["median"] == yours["median"] or _equal(mine, yours):
             continue
         ahead = or_infinity(mine["median"]) < or_infinity(yours["median"])
         values = (measure.of(champion), measure.of(other))

@@ -15,7 +15,13 @@ from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, LogLocator, MultipleLocator, NullFormatter
+from matplotlib.ticker import (
+    FuncFormatter,
+    LogLocator,
+    MaxNLocator,
+    MultipleLocator,
+    NullFormatter,
+)
 
 from acl_gym.experiments import wording
 
@@ -129,13 +135,17 @@ def plain_log(axis: Axis, *, sparse: bool = False) -> None:
 
     Args:
         axis: its limits are set.
-        sparse: fewer of them where it spans more, for a short axis.
+        sparse: for a short axis, with fewer of them where it spans more, and evenly
+            spread ones where it spans next to nothing.
     """
     low, high = axis.get_view_interval()
     subs: tuple[float, ...] = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0)
     if sparse and high > 4 * low:
         subs = (1.0, 2.0, 5.0)
-    axis.set_major_locator(LogLocator(subs=subs))
+    if sparse and high < 1.5 * low:
+        axis.set_major_locator(MaxNLocator(4))
+    else:
+        axis.set_major_locator(LogLocator(subs=subs))
     axis.set_minor_formatter(NullFormatter())
     plain_numbers(axis)
 

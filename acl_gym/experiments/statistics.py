@@ -284,7 +284,7 @@ def _ranking(summary: Sequence[Entry], measure: _Measure, note: str = "") -> str
     if alike:
         names = wording.listed([entry["label"] for entry in (first, *alike)])
         value = measure.value(best)
-        return f"{names} {measure.together}, in the median all at {value}{note}"
+        return f"{names} {measure.together}, in the median at {value}{note}"
     text = f"{first['label']} {measure.lead}: {measure.with_interval(best)}{note}"
     if others and others[0][measure.key]["median"] is not None:
         second = others[0][measure.key]

@@ -326,7 +326,7 @@ class TestFindings:
         text = say(*runs, make_run("q-fuzzy", 0, [50.0]))
         assert (
             "Crisp ACL, crisp Q-learning and DQN end lowest with their last policies, "
-            "in the median all at 40.0, equal to J* (40.0)."
+            "in the median at 40.0, equal to J* (40.0)."
         ) in text
         assert "fuzzy Q-learning find" not in text
 

@@ -3,6 +3,10 @@
 `make_dqn` puts the pieces together. What it returns is a plain `stable_baselines3.DQN`;
 its hyperparameters are `DQNSettings`, chosen by measuring (docs/dqn-tuning.md).
 
+A network sees continuous observations scaled (`Scaling`), and those of a finite space as
+Stable-Baselines3 encodes them: one input for each value, 1 for that of the state and 0
+for the others. It is then told as much about the states as a table is, and no more.
+
 The networks are small: one thread is the fastest, `torch.set_num_threads(1)`. And
 Stable-Baselines3 seeds the global generators of Python, NumPy and torch when an agent
 with a seed is made, so train one such agent at a time in a process.
@@ -34,6 +38,7 @@ from acl_gym.callbacks import Row
 from acl_gym.envs.control_env import ControlVectorEnv
 from acl_gym.envs.wrappers import ScaledVectorObservation, Scaling
 from acl_gym.evaluation import PolicyCost, evaluate_policy_cost
+from acl_gym.partition.discrete import FINITE_SPACES
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -183,7 +188,7 @@ def scaled_env(
     *,
     circular: Iterable[int] | None = None,
     **env_kwargs: Any,
-) -> ScaledVectorObservation:
+) -> VectorEnv[Any, Any, Any]:
     """Make a vector environment that shows a network what it likes to see.
 
     Autoreset is disabled. For an environment that cannot be made so, put
@@ -191,7 +196,8 @@ def scaled_env(
 
     Args:
         env_id: a registered id whose vector environment takes `autoreset_mode`, as
-            all of this package do; its observations are a bounded box of one axis.
+            all of this package do; its observations are a bounded box of one axis,
+            which are scaled, or of a finite space, which stay as they are.
         num_envs: slots. None makes one for each state that an environment of this
             package evaluates policies from.
         circular: the circular variables, see `Scaling`. None takes those that the
@@ -199,7 +205,8 @@ def scaled_env(
         env_kwargs: keywords of the environment.
 
     Raises:
-        ValueError: `num_envs` is None and the environment is not of this package.
+        ValueError: `num_envs` is None and the environment is not of this package; or
+            there are `circular` variables in a finite space.
     """
     env = gym.make_vec(
         env_id,
@@ -218,7 +225,15 @@ def scaled_env(
             f"num_envs is needed for {env_id}, which has no evaluation states; only "
             "environments of acl_gym have."
         )
-    return ScaledVectorObservation(env, () if circular is None else circular)
+    circular = () if circular is None else tuple(circular)
+    if isinstance(env.single_observation_space, FINITE_SPACES):
+        if circular:
+            raise ValueError(
+                "circular must be empty where observations are of a finite space, got "
+                f"{circular} for {env.single_observation_space}; leave it out."
+            )
+        return env
+    return ScaledVectorObservation(env, circular)
 
 
 def make_dqn(
@@ -233,8 +248,9 @@ def make_dqn(
     """Make a DQN agent that is ready to `learn`.
 
     Its environment is, from the inside out: the native vector environment with
-    autoreset disabled, `ScaledVectorObservation`, `VectorEnvAdapter`, `VecMonitor`
-    (returns of episodes as they are), `ScaledReward`.
+    autoreset disabled, `ScaledVectorObservation` (not around a finite space of
+    observations), `VectorEnvAdapter`, `VecMonitor` (returns of episodes as they are),
+    `ScaledReward`.
 
     Args:
         env_id: a registered id whose actions are discrete, otherwise as `scaled_env`
@@ -247,7 +263,8 @@ def make_dqn(
 
     Returns:
         The agent. Its observations are the scaled ones: evaluate it in a `scaled_env`,
-        or as a `ScaledPolicy` in the environment as it is.
+        or as a `ScaledPolicy` in the environment as it is. One that learned from a
+        finite space is evaluated in the environment as it is.
 
     Example:
         >>> from acl_gym.agents.dqn import PolicyCostCallback, make_dqn, scaled_env

@@ -18,7 +18,7 @@ from acl_gym.cli.common import (
 
 HELP = """Compare ACL with reinforcement learning on one task.
 
-Trains crisp and fuzzy ACL, Q-learning and Stable-Baselines3's DQN over several seeds,
+Trains ACL, Q-learning, Q(lambda) and Stable-Baselines3's DQN over several seeds,
 evaluates them alike, and writes results.json, results.parquet, figures and report.html.
 A run that was killed goes on where it stopped when the same command is given again.
 
@@ -26,6 +26,7 @@ A run that was killed goes on where it stopped when the same command is given ag
 Examples:
   acl-gym compare
   acl-gym compare --agents acl-fuzzy,q-fuzzy --seeds 5 --out results/tables
+  acl-gym compare --env acl_gym/GridSearch2D-v0 --out results/grid
   acl-gym compare --preset full --out results/full
 """
 
@@ -35,21 +36,23 @@ class CompareCommand(Command):
 
     def format_help(self, ctx: Any, formatter: Any) -> None:
         """Write the help."""
-        from acl_gym.experiments.comparison import ENVIRONMENTS
         from acl_gym.experiments.contestants import CONTESTANTS, PRESETS
+        from acl_gym.experiments.courses import CONTINUOUS, COURSES
 
         presets = "\n".join(
-            f"  {name:8} seeds: {preset.seeds}, trials: {preset.trials}, "
-            f"steps of DQN: {preset.dqn_steps:,}"
-            for name, preset in PRESETS.items()
+            f"  {name:8} runs of each method: {seeds}"
+            for name, seeds in PRESETS.items()
         )
-        methods = "\n".join(
-            f"  {name:12} {each.label}" for name, each in CONTESTANTS.items()
+        methods = "\n".join(f"  {name:15} {CONTINUOUS[name]}" for name in CONTESTANTS)
+        environments = "\n".join(
+            f"  {env_id}\n    trials: {budget.trials}, steps of DQN: "
+            f"{budget.dqn_steps:,} (quick)\n    {', '.join(course.methods)}"
+            for env_id, course in COURSES.items()
+            for budget in (course.budgets["quick"],)
         )
-        environments = "\n".join(f"  {each}" for each in ENVIRONMENTS)
         self.epilog = (
             f"\b\nPresets:\n{presets}\n\n\b\nMethods:\n{methods}\n\n"
-            f"\b\nEnvironments:\n{environments}"
+            f"\b\nEnvironments, and the methods that they have:\n{environments}"
         )
         super().format_help(ctx, formatter)
 
@@ -76,7 +79,7 @@ def compare(
         str | None,
         typer.Option(
             metavar="A,B,...",
-            help="Methods, see below.  [default: all]",
+            help="Methods, see below.  [default: all it has]",
             show_default=False,
         ),
     ] = None,
@@ -116,17 +119,18 @@ def compare(
 ) -> None:
     """Compare; see `HELP`."""
     from acl_gym.experiments import comparison
-    from acl_gym.experiments.contestants import CONTESTANTS, PRESETS
+    from acl_gym.experiments.contestants import PRESETS
+    from acl_gym.experiments.courses import COURSES
 
     _check_choice("--preset", preset, list(PRESETS))
     env = env or comparison.ENVIRONMENTS[0]
     _check_choice("--env", env, list(comparison.ENVIRONMENTS))
-    names = list(CONTESTANTS)
+    names = list(COURSES[env].methods)
     if agents is not None:
         wanted = [name.strip() for name in agents.split(",") if name.strip()]
         if not wanted or not set(wanted) <= set(names):
             raise BadArgumentError(
-                f"--agents must be among {', '.join(names)}, got {agents!r}."
+                f"--agents must be among {', '.join(names)} for {env}, got {agents!r}."
             )
         names = list(dict.fromkeys(wanted))
     try:

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import datetime
+import hashlib
 import json
 import os
-import platform
 import sys
 from collections.abc import Sequence
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -24,21 +22,23 @@ from rich.progress import (
 )
 
 import acl_gym
-from acl_gym.experiments import contestants, figures, report, statistics
-from acl_gym.experiments.contestants import CONTESTANTS, PRESETS, Preset
+from acl_gym.experiments import contestants, figures, report, statistics, wording
+from acl_gym.experiments.contestants import PRESETS
+from acl_gym.experiments.courses import COURSES, Course
+from acl_gym.experiments.pictures import PICTURES
 from acl_gym.experiments.runner import Task, run_tasks
 from acl_gym.storage import write_atomically
 
 Comparison = dict[str, Any]
 """All that a report needs, JSON types only; see `_collect`."""
 
-ENVIRONMENTS = (contestants.ENVIRONMENT,)
+ENVIRONMENTS = tuple(COURSES)
 
 
 def compare(
     env_id: str,
-    preset_name: str,
-    agents: Sequence[str],
+    preset: str,
+    agents: Sequence[str] | None,
     seeds: int | None,
     directory: Path,
     *,
@@ -51,8 +51,8 @@ def compare(
 
     Args:
         env_id: one of `ENVIRONMENTS`.
-        preset_name: a key of `PRESETS`.
-        agents: keys of `CONTESTANTS`.
+        preset: a key of `PRESETS`.
+        agents: some of the methods of the environment's course; None takes them all.
         seeds: runs of each agent; None takes the preset's number.
         directory: receives results.json, results.parquet, report.html, figures, and
             in runs/ the result of each run.
@@ -65,100 +65,119 @@ def compare(
         TaskFailedError: a run failed; the others are kept.
     """
     console = console or Console()
-    preset = PRESETS[preset_name]
-    count = preset.seeds if seeds is None else seeds
+    course, count = COURSES[env_id], PRESETS[preset] if seeds is None else seeds
+    methods = list(course.methods) if agents is None else list(agents)
     workers = workers or os.cpu_count() or 1
-    tasks = list_tasks(env_id, preset, agents, range(first_seed, first_seed + count))
+    tasks = list_tasks(course, preset, methods, range(first_seed, first_seed + count))
     runs_directory = directory / "runs"
     if fresh:
         for task in tasks:
             (runs_directory / f"{task.name}.json").unlink(missing_ok=True)
     # Here once, not in every process: Numba's cache is no place for a race.
     with console.status("Compiling the kernels (some 30 seconds, the first time)"):
-        contestants.compile_all(env_id)
+        contestants.compile_all(course, course.budgets[preset])
     with _Bar(console, [task.name for task in tasks]) as bar:
         reference, *runs = run_tasks(
             tasks, runs_directory, workers=workers, progress=bar.tell
         )
-    comparison = _collect(env_id, preset_name, reference, runs, workers)
+    comparison = _collect(course, preset, reference, runs)
     write_results(comparison, directory, console)
     return comparison
 
 
 def list_tasks(
-    env_id: str, preset: Preset, agents: Sequence[str], seeds: Sequence[int]
+    course: Course, preset: str, methods: Sequence[str], seeds: Sequence[int]
 ) -> list[Task]:
     """The reference, then every run; the longest first, so that no core idles late."""
-    order = sorted(agents, key=lambda name: name != "dqn")
+    order = sorted(methods, key=lambda name: name != "dqn")
     reference = Task(
         "reference",
         _reference,
-        (env_id, preset),
-        {"env": env_id, "cells": list(preset.optimum_cells)},
+        (course.env_id, preset),
+        _reference_settings(course, preset),
     )
     return [
         reference,
         *(
             Task(
-                f"{agent}-{seed}",
-                contestants.run,
-                (agent, env_id, seed, preset),
+                f"{method}-{seed}",
+                _run,
+                (method, course.env_id, seed, preset),
                 {
-                    "env": env_id,
-                    "agent": agent,
+                    "env": course.env_id,
+                    "agent": method,
                     "seed": seed,
-                    "trials": preset.trials,
-                    "dqn_steps": preset.dqn_steps,
-                    "dqn_every": preset.dqn_every,
-                    "long_run": preset.long_run,
+                    **_budget_of(course, preset, method),
                 },
             )
-            for agent in order
+            for method in order
             for seed in seeds
         ),
     ]
 
 
+def _reference_settings(course: Course, preset: str) -> dict[str, Any]:
+    """All that the reference depends on."""
+    settings: dict[str, Any] = {"env": course.env_id, "optimum": course.optimum}
+    if make := course.budgets[preset].reference:
+        grids = [make().settings(), course.partitions["fuzzy"]().settings()]
+        # Centres are many: what tells them apart is enough.
+        settings["grids"] = hashlib.sha256(json.dumps(grids).encode()).hexdigest()
+    return settings
+
+
+def _budget_of(course: Course, preset: str, method: str) -> dict[str, Any]:
+    """All that a run of a method depends on beside its seed."""
+    budget = course.budgets[preset]
+    settings = dict(course.settings(method, long_run=budget.long_run))
+    if method == "dqn":
+        return {
+            "steps": budget.dqn_steps,
+            "every": budget.dqn_every,
+            "settings": settings,
+        }
+    return {
+        "trials": budget.trials,
+        "slots": course.slots,
+        "max_steps": course.max_steps,
+        "partition": course.partition(method).settings(),
+        "settings": settings,
+    }
+
+
+# A course holds functions, which do not travel to other processes; its id does.
 def _reference(
-    env_id: str, preset: Preset, report_fraction: contestants.Report
+    env_id: str, preset: str, report_fraction: contestants.Report
 ) -> dict[str, Any]:
-    return contestants.find_reference(env_id, preset)
+    course = COURSES[env_id]
+    return contestants.find_reference(course, course.budgets[preset])
+
+
+def _run(
+    method: str, env_id: str, seed: int, preset: str, report_fraction: Any
+) -> dict[str, Any]:
+    course = COURSES[env_id]
+    budget = course.budgets[preset]
+    return contestants.run(method, course, seed, budget, report_fraction)
 
 
 def _collect(
-    env_id: str,
-    preset_name: str,
+    course: Course,
+    preset: str,
     reference: dict[str, Any],
     runs: list[dict[str, Any]],
-    workers: int,
 ) -> Comparison:
-    env = contestants.make_env(env_id, 1)
-    theta, omega = contestants.map_axes(env)
-    order = list(CONTESTANTS)
+    env = contestants.make_env(course.env_id, 1)
+    order = list(course.methods)
     runs = sorted(runs, key=lambda run: (order.index(run["agent"]), run["seed"]))
+    made = [run.pop("made") for run in (reference, *runs)]
     states = env.system.evaluation_states()
     return {
-        "env": env_id,
-        "preset": preset_name,
+        "env": course.env_id,
+        "preset": preset,
         "version": acl_gym.__version__,
-        "date": datetime.date.today().isoformat(),
         "command": _command(),
-        "machine": {
-            "python": platform.python_version(),
-            "cpu": _cpu_name(),
-            "cores": os.cpu_count(),
-            "workers": workers,
-            **{
-                name: version(name)
-                for name in (
-                    "numpy",
-                    "numba",
-                    "gymnasium",
-                    "stable-baselines3",
-                    "torch",
-                )
-            },
-        },
+        "made": _merged(made),
         "evaluation": {
             "states": len(states),
             "max_steps": env.system.evaluation_steps,
@@ -166,14 +185,23 @@ def _collect(
                 f"mean undiscounted cost from {len(states)} fixed initial states over "
                 f"at most {env.system.evaluation_steps} steps, an episode ending at "
                 "the goal (3.47); table-based methods are evaluated after every trial, "
-                f"DQN every {PRESETS[preset_name].dqn_every:,} steps, which favours the "
-                "former a little in best policies and times"
+                f"DQN every {course.budgets[preset].dqn_every:,} steps, which favours "
+                "the former a little in best policies and times"
             ),
         },
         "reference": reference,
-        "map_axes": {"theta": theta.tolist(), "omega": omega.tolist()},
-        "torques": list(contestants.torques(env)),
+        "pictures": course.pictures,
+        "scene": PICTURES[course.pictures].scene(env),
         "runs": runs,
+    }
+
+
+def _merged(made: list[dict[str, Any]]) -> dict[str, str]:
+    """Where and when the runs were made: each different value, in order."""
+    names = dict.fromkeys(name for facts in made for name in facts)
+    return {
+        name: ", ".join(sorted({str(facts[name]) for facts in made if name in facts}))
+        for name in names
     }
 
 
@@ -182,7 +210,8 @@ def write_results(
 ) -> dict[str, Any]:
     """Write results, figures and report; print the table. Returns results.json."""
     reference = comparison["reference"]
-    summary = statistics.summarise(comparison["runs"], reference["optimal_cost"])
+    cost = wording.reference_cost(reference)
+    summary = statistics.summarise(comparison["runs"], cost)
     found = statistics.findings(summary, reference, comparison["preset"])
     rows = [
         {"agent": run["agent"], "seed": run["seed"], **row}
@@ -192,11 +221,7 @@ def write_results(
     results = {
         "env": comparison["env"],
         "preset": comparison["preset"],
-        "reference": {
-            key: value
-            for key, value in reference.items()
-            if key not in ("policy_map", "trajectory")
-        },
+        "reference": {k: v for k, v in reference.items() if k != "picture"},
         "rows": rows,
         "summary": summary,
         "findings": found,
@@ -254,12 +279,3 @@ def _command() -> str:
     program, *arguments = sys.argv
     known = {"acl-gym": "acl-gym", "__main__.py": "python -m acl_gym"}
     return " ".join([known.get(Path(program).name, f"python {program}"), *arguments])
-
-
-def _cpu_name() -> str:
-    try:
-        lines = Path("/proc/cpuinfo").read_text().splitlines()
-    except OSError:
-        return platform.processor() or "unknown"
-    names = (line.split(":", 1)[1].strip() for line in lines if "model name" in line)
-    return next(names, platform.processor() or "unknown")

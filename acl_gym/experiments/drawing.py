@@ -1,8 +1,9 @@
 """What figures share: styles of agents, axes, legends, ticks.
 
 Figures are made without pyplot, so that nothing global is left behind. Colours are
-those of Okabe and Ito, which people who are colour-blind tell apart: a warm hue is a
-colony, a blue one Q-learning; a dashed line is a crisp partition.
+those of Okabe and Ito, and one of Tol's, which people who are colour-blind tell apart: a
+warm hue is a colony, a blue one Q-learning, a purple one Q(lambda). A crisp partition
+has a dashed line in the lighter shade.
 """
 
 from __future__ import annotations
@@ -14,7 +15,13 @@ from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, LogLocator, MultipleLocator, NullFormatter
+from matplotlib.ticker import (
+    FuncFormatter,
+    LogLocator,
+    MaxNLocator,
+    MultipleLocator,
+    NullFormatter,
+)
 
 from acl_gym.experiments import wording
 
@@ -36,9 +43,11 @@ STYLES = {
     "acl-crisp": Style("#E69F00", (0, (4, 1.2))),
     "q-fuzzy": Style("#0072B2"),
     "q-crisp": Style("#56B4E9", (0, (4, 1.2))),
+    "q-lambda-fuzzy": Style("#882255"),
+    "q-lambda-crisp": Style("#CC79A7", (0, (4, 1.2))),
     "dqn": Style("#009E73", (0, (6, 1, 1, 1))),
 }
-OTHER = Style("#CC79A7", (0, (1, 1)))
+OTHER = Style("#666666", (0, (1, 1)))
 """Of an agent that is not in STYLES."""
 
 BOUND: dict[str, Any] = {"color": "0.2", "linewidth": 0.9, "zorder": 1.2}
@@ -94,8 +103,10 @@ def legend(parent: Axes | Figure, handles: list[Any], **kwargs: Any) -> None:
     )
 
 
-def optimal_cost_line(ax: Axes, optimal_cost: float, *, vertical: bool = False) -> None:
-    """J*, with its name."""
+def optimal_cost_line(
+    ax: Axes, optimal_cost: float, symbol: str = "J*", *, vertical: bool = False
+) -> None:
+    """J*, or what stands for it, with its name."""
     if vertical:
         ax.axvline(optimal_cost, **BOUND)
         place: dict[str, Any] = {
@@ -111,7 +122,7 @@ def optimal_cost_line(ax: Axes, optimal_cost: float, *, vertical: bool = False) 
             "xytext": (0, -2),
         }
     ax.annotate(
-        f"J* = {wording.cost(optimal_cost)}",
+        f"{symbol} = {wording.cost(optimal_cost)}",
         textcoords="offset points",
         fontsize=TINY,
         va="top",
@@ -119,9 +130,22 @@ def optimal_cost_line(ax: Axes, optimal_cost: float, *, vertical: bool = False) 
     )
 
 
-def plain_log(axis: Axis) -> None:
-    """Ticks of a logarithmic axis that spans little: 40, 50, 60, 80, 100, ..."""
-    axis.set_major_locator(LogLocator(subs=(1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0)))
+def plain_log(axis: Axis, *, sparse: bool = False) -> None:
+    """Ticks of a logarithmic axis that spans little: 40, 50, 60, 80, 100, ...
+
+    Args:
+        axis: its limits are set.
+        sparse: for a short axis, with fewer of them where it spans more, and evenly
+            spread ones where it spans next to nothing.
+    """
+    low, high = axis.get_view_interval()
+    subs: tuple[float, ...] = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0)
+    if sparse and high > 4 * low:
+        subs = (1.0, 2.0, 5.0)
+    if sparse and high < 1.5 * low:
+        axis.set_major_locator(MaxNLocator(4))
+    else:
+        axis.set_major_locator(LogLocator(subs=subs))
     axis.set_minor_formatter(NullFormatter())
     plain_numbers(axis)
 

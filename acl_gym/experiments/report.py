@@ -13,7 +13,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from acl_gym.experiments import intervals, statistics, wording
+from acl_gym.experiments import captions, intervals, statistics, wording
 from acl_gym.storage import write_atomically
 
 Comparison = dict[str, Any]
@@ -71,32 +71,6 @@ COLUMNS = (
     Column("Whole training", "time, s", "seconds", "none"),
 )
 
-_CAPTIONS = {
-    "summary": (
-        "Median over seeds and 95% interval. Left: policy cost, the optimum J* as a "
-        "line. Middle and right: training until the first policy within a margin of "
-        "J*. An arrow says that the interval has no upper end, because some seeds "
-        "never came so close; how many did stands at the margin."
-    ),
-    "learning_curves": (
-        "Policy cost against environment steps and against wall-clock time; above, of "
-        "the policy as it was at the time, below, of the best one until then. Line: "
-        "median over seeds. Band: from the smallest to the largest. A policy counts "
-        "from its evaluation to the next, the last one to the end. Costs beyond ten "
-        "times J* are cut off."
-    ),
-    "policy_maps": (
-        "Torque that the policy chooses at each angle and angular velocity: the last "
-        "policy of the seed whose final cost is the median, and the optimum."
-    ),
-    "trajectories": (
-        "From hanging at rest, under the last policy of the seed whose final cost is "
-        "the median, and under the optimum. A dot is the arrival at the goal, where an "
-        "episode ends; π and −π are the same upright position. The time axis ends "
-        "soon after the last arrival; how the others end, the legend says."
-    ),
-}
-
 
 def write_report(
     comparison: Comparison,
@@ -121,14 +95,23 @@ def write_report(
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    groups = [column.group for column in COLUMNS]
+    symbol = wording.symbol(comparison["reference"])
+    columns = [
+        column._replace(
+            group=_without_symbol(column.group, symbol),
+            title=_without_symbol(column.title, symbol),
+        )
+        for column in COLUMNS
+    ]
+    groups = [column.group for column in columns]
     text = environment.get_template("report.html.j2").render(
         comparison=comparison,
         reference=comparison["reference"],
-        optimal_cost=wording.cost(comparison["reference"]["optimal_cost"]),
+        symbol=symbol,
+        explanation=captions.reference(comparison["reference"]),
         findings=findings,
         groups={group: groups.count(group) for group in groups},
-        columns=COLUMNS,
+        columns=columns,
         starts=[i for i in range(len(groups)) if groups[i - 1] != groups[i]],
         rows=table_rows(summary),
         seeds=_seeds(summary),
@@ -138,14 +121,21 @@ def write_report(
             {
                 "name": name,
                 "data": base64.b64encode(file.read_bytes()).decode("ascii"),
-                "alt": _alternative(name, comparison, summary),
-                "caption": _CAPTIONS.get(name, name),
+                "alt": captions.alternative(name, comparison, summary),
+                "caption": captions.caption(name, comparison),
             }
             for name, file in figures.items()
         ],
         settings=_settings(comparison["runs"]),
     )
     write_atomically(path, text.encode())
+
+
+def _without_symbol(heading: str, symbol: str) -> str:
+    """A heading as it is where J* is known; else without what has only a long name."""
+    if symbol == "J*":
+        return heading
+    return heading.removesuffix(" J*").removesuffix(" of")
 
 
 def print_summary(
@@ -155,11 +145,13 @@ def print_summary(
 
     Args:
         summary: of `statistics.summarise`.
-        reference: with `optimal_cost`.
+        reference: with `optimal_cost` or `best_known_cost`.
         console: where to print.
     """
+    symbol = wording.symbol(reference)
+    cost = wording.cost(wording.reference_cost(reference))
     table = Table(
-        title=f"Medians over seeds; J* = {wording.cost(reference['optimal_cost'])}",
+        title=f"Medians over seeds; {symbol} = {cost}",
         box=box.SIMPLE_HEAD,
         show_edge=False,
         padding=0,
@@ -182,9 +174,10 @@ def print_summary(
         table.add_row(Text(label), *texts)
     console.print(table)
     console.print(
-        "last, best: cost of the policy with its 95% interval, percent above J*, and "
-        "share of the starts from which it reaches the goal. 25%, 10%: training until "
-        "within so much of J*; under it, in how many of the seeds.",
+        "last, best: cost of the policy with its 95% interval, percent above "
+        f"{wording.the_reference(reference)}, and share of the starts from which it "
+        "reaches the goal. 25%, 10%: training until within so much of it; under it, "
+        "in how many of the seeds.",
         style="dim",
         highlight=False,
     )
@@ -269,49 +262,3 @@ def _setting(value: Any) -> str:
     if isinstance(value, list | tuple):
         return " × ".join(map(_setting, value))
     return str(value)
-
-
-def _alternative(
-    name: str, comparison: Comparison, summary: Sequence[statistics.Entry]
-) -> str:
-    """What a figure shows, in words, for those who do not see it."""
-    labels = wording.listed(
-        [wording.in_a_sentence(entry["label"]) for entry in summary]
-    )
-    costs = "; ".join(
-        f"{wording.in_a_sentence(entry['label'])} "
-        f"{wording.cost(entry['final_policy_cost']['median'])} at the end, "
-        f"{wording.cost(entry['best_policy_cost']['median'])} at best"
-        for entry in summary
-    )
-    if name == "summary":
-        return (
-            "Dot plot with a row for each method: policy cost, and time and "
-            f"environment steps to come close to J*. Median policy cost: {costs}."
-        )
-    if name == "learning_curves":
-        return (
-            "Four panels of policy cost, both axes logarithmic, against environment "
-            "steps and seconds, for the policy at the time and for the best so far. "
-            f"Median policy cost: {costs}."
-        )
-    if name == "policy_maps":
-        return (
-            "Pictures of the torque chosen over angle and angular velocity, for the "
-            f"last policy of {labels}, and for the optimum."
-        )
-    if name == "trajectories":
-        runs = map(
-            statistics.median_run, statistics.by_agent(comparison["runs"]).values()
-        )
-        endings = "; ".join(
-            f"{wording.in_a_sentence(run['label'])} "
-            f"{'reaches' if run['trajectory']['reached'] else 'does not reach'} the "
-            f"goal, cost {wording.cost(run['trajectory']['cost'][-1])}"
-            for run in runs
-        )
-        return (
-            "Angle, angular velocity, torque and cost so far against time, from "
-            f"hanging at rest: {endings}."
-        )
-    return f"Figure {name}."

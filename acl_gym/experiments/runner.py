@@ -7,10 +7,12 @@ that was killed goes on where it stopped.
 
 from __future__ import annotations
 
+import datetime
 import hashlib
 import json
 import multiprocessing
 import os
+import platform
 import queue
 import signal
 import threading
@@ -19,6 +21,7 @@ from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wai
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from functools import cache
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -49,8 +52,10 @@ class Task:
 
     @property
     def key(self) -> str:
-        """What must be equal for a kept result to be used: settings and code."""
-        text = json.dumps([self.name, self.settings, code_fingerprint()])
+        """What must be equal for a kept result to be used: settings, code, versions."""
+        text = json.dumps(
+            [self.name, self.settings, code_fingerprint(), versions()], sort_keys=True
+        )
         return hashlib.sha256(text.encode()).hexdigest()
 
 
@@ -66,6 +71,9 @@ def run_tasks(
     progress: Progress | None = None,
 ) -> list[Result]:
     """Return the result of every task, in order, running those that are not there.
+
+    Each has a key `made` as well: where, when and with what it was made, whenever that
+    was.
 
     Args:
         tasks: what to run.
@@ -113,7 +121,10 @@ def _run_in_processes(
                 _pass_on(reports, tell)
                 for future in done:
                     task = waiting.pop(future)
-                    results[task.name] = _outcome(task, future)
+                    results[task.name] = {
+                        **_outcome(task, future),
+                        "made": circumstances(workers),
+                    }
                     _write(task, results[task.name], directory)
                     tell(task.name, 1.0)
         except BaseException:
@@ -198,10 +209,51 @@ def _write(task: Task, result: Result, directory: Path) -> None:
     write_atomically(_file(task, directory), text.encode())
 
 
-# Modules that draw and tell what has been run, and change nothing in it.
-_PRESENTATION = frozenset(
-    {"comparison", "drawing", "figures", "intervals", "report", "statistics", "wording"}
+# Modules and packages that draw and tell what has been run, and change nothing in it,
+# and the courses, whose settings are in the keys of the runs that they are for.
+_LEFT_OUT = frozenset(
+    {
+        "captions",
+        "comparison",
+        "courses",
+        "drawing",
+        "figures",
+        "intervals",
+        "report",
+        "statistics",
+        "wording",
+    }
 )
+_PACKAGES = ("numpy", "numba", "scipy", "gymnasium", "stable-baselines3", "torch")
+
+
+@cache
+def versions() -> dict[str, str]:
+    """The versions of what computes results."""
+    installed = {name: version(name) for name in _PACKAGES}
+    return {"acl-gym": acl_gym.__version__, **installed}
+
+
+def circumstances(workers: int) -> dict[str, Any]:
+    """Where, when and with what a result is made."""
+    return {
+        "date": datetime.date.today().isoformat(),
+        "python": platform.python_version(),
+        "cpu": _cpu_name(),
+        "cores": os.cpu_count(),
+        "processes": workers,
+        **versions(),
+    }
+
+
+@cache
+def _cpu_name() -> str:
+    try:
+        lines = Path("/proc/cpuinfo").read_text().splitlines()
+    except OSError:
+        return platform.processor() or "unknown"
+    names = (line.split(":", 1)[1].strip() for line in lines if "model name" in line)
+    return next(names, platform.processor() or "unknown")
 
 
 @cache
@@ -210,7 +262,8 @@ def code_fingerprint() -> str:
     digest = hashlib.sha256()
     package = Path(acl_gym.__file__).parent
     for source in sorted(package.rglob("*.py")):
-        if source.stem in _PRESENTATION:
+        parts = source.relative_to(package).with_suffix("").parts
+        if parts[0] == "experiments" and not _LEFT_OUT.isdisjoint(parts):
             continue
         digest.update(source.relative_to(package).as_posix().encode())
         digest.update(source.read_bytes())

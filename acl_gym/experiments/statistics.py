@@ -168,6 +168,7 @@ class _Measure(NamedTuple):
     key: str
     name: str  # in a comparison of two agents
     lead: str  # what the agent with the lowest value does
+    together: str  # what several with the same value do
 
     def value(self, estimate: Estimate, end: str = "median", unit: str = " s") -> str:
         value = estimate[end]
@@ -200,11 +201,26 @@ class _Measure(NamedTuple):
 
 
 _COSTS = (
-    _Measure("final_policy_cost", "last policy", "ends lowest with its last policy"),
-    _Measure("best_policy_cost", "best policy", "finds the cheapest policy on its way"),
+    _Measure(
+        "final_policy_cost",
+        "last policy",
+        "ends lowest with its last policy",
+        "end lowest with their last policies",
+    ),
+    _Measure(
+        "best_policy_cost",
+        "best policy",
+        "finds the cheapest policy on its way",
+        "find the cheapest policies on their ways",
+    ),
 )
 _TIMES = tuple(
-    _Measure(f"{x}_to_{mark}", f"{name} to {mark}%", f"needs the {most} {name}")
+    _Measure(
+        f"{x}_to_{mark}",
+        f"{name} to {mark}%",
+        f"needs the {most} {name}",
+        f"need the {most} {name}",
+    )
     for mark in MARKS
     for x, name, most in (
         ("seconds", "wall-clock time", "least"),
@@ -220,7 +236,7 @@ def findings(
 
     Args:
         summary: of `summarise`.
-        reference: with `optimal_cost`, and perhaps `coarse`.
+        reference: with `optimal_cost` or `best_known_cost`, and perhaps `coarse`.
         preset: how much was run.
     """
     if not summary:
@@ -228,11 +244,13 @@ def findings(
     summary = [
         {**entry, "label": wording.in_a_sentence(entry["label"])} for entry in summary
     ]
-    optimal_cost = float(reference["optimal_cost"])
+    optimal_cost = wording.reference_cost(reference)
+    name = wording.the_reference(reference)
     sentences = []
     for measure in _TIMES:
         mark = int(measure.key.rsplit("_", 1)[1])
-        goal = f"within {mark}% of J* ({mark_cost(optimal_cost, mark):.1f})"
+        bound = wording.cost(mark_cost(optimal_cost, mark))
+        goal = f"within {mark}% of {name} ({bound})"
         if any(entry[measure.key]["median"] is not None for entry in summary):
             text = f"To come {goal}, {_ranking(summary, measure)}."
         elif measure.key.startswith("seconds"):
@@ -245,7 +263,7 @@ def findings(
             entry[measure.key.replace("policy_cost", "gap_percent")]["median"]
             for entry in summary
         )
-        above = f", {wording.percent_above(gap)} J* ({optimal_cost:.1f})"
+        above = f", {wording.percent_above(gap)} {name} ({wording.cost(optimal_cost)})"
         sentences.append(wording.sentence(_ranking(summary, measure, above)))
     sentences.append(_successes(summary))
     champion, rivals = _rivals(summary)
@@ -259,9 +277,14 @@ def _ranked(summary: Sequence[Entry], measure: _Measure) -> list[Entry]:
 
 
 def _ranking(summary: Sequence[Entry], measure: _Measure, note: str = "") -> str:
-    """The first, with a note, and the second."""
+    """The first, with a note, and the second; or those that share the first place."""
     first, *others = _ranked(summary, measure)
     best = first[measure.key]
+    alike = [e for e in others if _equal(e[measure.key], best)]
+    if alike:
+        names = wording.listed([entry["label"] for entry in (first, *alike)])
+        value = measure.value(best)
+        return f"{names} {measure.together}, in the median at {value}{note}"
     text = f"{first['label']} {measure.lead}: {measure.with_interval(best)}{note}"
     if others and others[0][measure.key]["median"] is not None:
         second = others[0][measure.key]
@@ -271,6 +294,12 @@ def _ranking(summary: Sequence[Entry], measure: _Measure, note: str = "") -> str
         if overlap(best, second):
             text += "; the intervals overlap"
     return text
+
+
+def _equal(first: Estimate, second: Estimate) -> bool:
+    """Whether two medians are one, but for rounding."""
+    pair = [each["median"] for each in (first, second)]
+    return None not in pair and math.isclose(*pair, rel_tol=1e-9)
 
 
 def _laggards(summary: Sequence[Entry], measure: _Measure) -> list[str]:
@@ -305,12 +334,12 @@ def _successes(summary: Sequence[Entry]) -> str:
 def _rivals(summary: Sequence[Entry]) -> tuple[Entry, list[Entry]]:
     """The colony that ends lowest; its other variants, and the best of each family.
 
-    The family is what the agent's name begins with. Without colonies, no rivals.
+    The family is the agent's name without its kind of partition. Without colonies, no rivals.
     """
     colonies: list[Entry] = []
     families: dict[str, Entry] = {}
     for entry in _ranked(summary, _COSTS[0]):
-        family = entry["agent"].split("-")[0]
+        family = entry["agent"].removesuffix("-fuzzy").removesuffix("-crisp")
         if family == "acl":
             colonies.append(entry)
         else:
@@ -326,7 +355,7 @@ def _duel(champion: Entry, other: Entry) -> list[str]:
     gains: list[str] = []
     for measure in (*_COSTS, *_TIMES):
         mine, yours = champion[measure.key], other[measure.key]
-        if mine["median"] == yours["median"]:
+        if mine["median"] == yours["median"] or _equal(mine, yours):
             continue
         ahead = or_infinity(mine["median"]) < or_infinity(yours["median"])
         values = (measure.of(champion), measure.of(other))
@@ -359,12 +388,14 @@ def _circumstances(
         sentences.append(f"The budgets differ, in the median from {least} to {most}.")
     if coarse := reference.get("coarse"):
         cells = " x ".join(map(str, coarse["cells"]))
+        hovers = coarse["success_rate"] < 1
         sentences.append(
             f"Fuzzy Q-iteration, which knows the model, gets to a policy cost of "
             f"{coarse['policy_cost']:.1f} on {cells} cells, as many as the table-based "
             f"methods have, and reaches the goal from "
-            f"{wording.share(coarse['success_rate'])} of the starts: its greedy policy "
-            "hovers beside the goal. It is no bound on what these cells allow."
+            f"{wording.share(coarse['success_rate'])} of the starts"
+            f"{': its greedy policy hovers beside the goal' if hovers else ''}. It is "
+            "no bound on what these cells allow."
         )
     seeds = [int(entry["seeds"]) for entry in summary]
     number = " to ".join(map(str, sorted({min(seeds), max(seeds)})))

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 
 def steps(value: float | None, *, short: bool = False) -> str:
@@ -25,8 +26,28 @@ def seconds(value: float | None, *, unit: str = "") -> str:
 
 
 def cost(value: float | None) -> str:
-    """A policy cost to one decimal."""
-    return "infinity" if value is None else f"{value:.1f}"
+    """A policy cost to three figures or more: 9.99, 45.2, 1204.0."""
+    if value is None:
+        return "infinity"
+    return f"{value:.2f}" if abs(value) < 19.995 else f"{value:.1f}"
+
+
+def reference_cost(reference: Mapping[str, Any]) -> float:
+    """What policies are held against: the optimal cost, or the best that is known."""
+    cost = reference.get("optimal_cost", reference.get("best_known_cost"))
+    if cost is None:
+        raise ValueError("a reference must have an optimal_cost or a best_known_cost.")
+    return float(cost)
+
+
+def symbol(reference: Mapping[str, Any]) -> str:
+    """Its name in tables and figures."""
+    return "J*" if "optimal_cost" in reference else "best known"
+
+
+def the_reference(reference: Mapping[str, Any]) -> str:
+    """Its name in a sentence."""
+    return "J*" if "optimal_cost" in reference else "the best known cost"
 
 
 def share(value: float) -> str:
@@ -40,7 +61,9 @@ def ratio(value: float) -> str:
 
 
 def percent_above(value: float) -> str:
-    """Percent above, or of a negative value below."""
+    """Percent above, or of a negative value below; of none, equal to."""
+    if abs(value) < 1e-9:
+        return "equal to"
     return f"{abs(value):.1f}% {'above' if value >= 0 else 'below'}"
 
 

@@ -370,3 +370,32 @@ def test_time_in_evaluations_is_not_counted(monkeypatch: pytest.MonkeyPatch) -> 
     assert len(costs.history) >= 4
     for row in costs.history:
         assert row["seconds"] == row["env_steps"] / TINY.num_envs
+
+
+class TestFiniteObservations:
+    """On the grids a state is a number, and the network is told which."""
+
+    def test_observations_stay_as_they_are(self):
+        env = scaled_env("acl_gym/GridSearch1D-v0", 3, n_states=6)
+        assert env.single_observation_space == gym.spaces.Discrete(6)
+        observation, _ = env.reset(seed=0)
+        assert observation.shape == (3,)
+        assert scaled_env("acl_gym/GridSearch1D-v0").num_envs == 9
+
+    def test_the_network_has_an_input_for_each_state(self):
+        model = make_dqn("acl_gym/GridSearch1D-v0", seed=0, n_states=6)
+        first = next(iter(model.q_net.parameters()))
+        assert first.shape == (64, 6)
+
+    def test_nothing_is_circular_there(self):
+        with pytest.raises(ValueError, match="circular must be empty"):
+            scaled_env("acl_gym/GridSearch1D-v0", 2, circular=[0])
+
+    def test_it_learns_to_walk_east(self):
+        settings = DQNSettings(learning_starts=100, max_episode_steps=20)
+        model = make_dqn("acl_gym/GridSearch1D-v0", settings, 0, n_states=4)
+        evaluation = scaled_env("acl_gym/GridSearch1D-v0", n_states=4)
+        costs = PolicyCostCallback(evaluation, every=200)
+        model.learn(800, callback=costs)
+        assert costs.best.cost == 2.0
+        assert costs.best.success_rate == 1.0

@@ -4,12 +4,19 @@ from __future__ import annotations
 
 import json
 import re
+import runpy
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pyarrow.parquet as pq
 import pytest
+from typer.testing import CliRunner
+
+from acl_gym.experiments import comparison
+from acl_gym.experiments.courses import NAVIGATION, Course
 
 ROOT = Path(__file__).resolve().parents[2]
 SCRIPT = ROOT / "benchmarks" / "compare_acl_rl.py"
@@ -94,13 +101,75 @@ def test_a_second_call_runs_nothing_again(finished, folder: Path) -> None:
         (["--agents", "acl-fuzzy,sarsa"], "must be among"),
         (["--seeds", "0"], "whole number >= 1"),
         (["--env", "CartPole-v1"], "invalid choice"),
+        (
+            ["--env", "acl_gym/GridSearch1D-v0", "--agents", "acl-fuzzy"],
+            "must be among acl-crisp, q-crisp, q-lambda-crisp, dqn for",
+        ),
     ],
 )
 def test_bad_arguments_exit_with_2(arguments: list[str], message: str) -> None:
     failed = compare(*arguments)
     assert failed.returncode == 2
     assert message in failed.stderr
-    assert "Traceback" not in failed.stderr
+    assert len(failed.stderr.strip().splitlines()) == 1
+
+
+def test_runs_are_kept_as_long_as_their_own_settings_stay() -> None:
+    def keys(course: Course) -> dict[str, str]:
+        tasks = comparison.list_tasks(course, "quick", list(course.methods), [0])
+        return {task.name: task.key for task in tasks}
+
+    def changed(**settings: Any) -> set[str]:
+        before, after = keys(NAVIGATION), keys(replace(NAVIGATION, **settings))
+        return {name for name in before if before[name] != after[name]}
+
+    assert changed() == set()
+    assert changed(acl={**NAVIGATION.acl, "alpha": 2.0}) == {
+        "acl-fuzzy-0",
+        "acl-crisp-0",
+    }
+    assert changed(dqn_short={"discount": 0.5}) == {"dqn-0"}
+    assert changed(optimum=True) == {"reference"}
+    assert changed(own={**NAVIGATION.own, "q-fuzzy": {"epsilon": 0.5}}) == {"q-fuzzy-0"}
+    others = {**NAVIGATION.partitions, "crisp": NAVIGATION.partitions["fuzzy"]}
+    assert changed(partitions=others) == {
+        *("acl-crisp-0", "q-crisp-0", "q-lambda-crisp-0")
+    }
+    budgets = {**NAVIGATION.budgets, "quick": NAVIGATION.budgets["smoke"]}
+    assert changed(budgets=budgets) == set(keys(NAVIGATION))
+
+
+@pytest.mark.parametrize("name", ["Navigation", "GridSearch1D", "GridSearch2D"])
+def test_the_other_systems(name: str, tmp_path: Path) -> None:
+    env_id = f"acl_gym/{name}-v0"
+    agents = "acl-crisp,q-lambda-crisp"
+    # In this process; only the runs are in one of their own.
+    script = runpy.run_path(str(SCRIPT))
+    done = CliRunner().invoke(
+        script["app"],
+        [
+            *("--preset", "smoke", "--env", env_id, "--agents", agents),
+            *("--workers", "1", "--out", str(tmp_path)),
+        ],
+    )
+    assert done.exit_code == 0, done.output
+    results = json.loads((tmp_path / "results.json").read_text())
+    assert set(results) == {
+        *("env", "preset", "reference", "rows", "summary", "findings")
+    }
+    assert (results["env"], results["preset"]) == (env_id, "smoke")
+    assert {row["agent"] for row in results["rows"]} == set(agents.split(","))
+    assert [entry["seeds"] for entry in results["summary"]] == [1, 1]
+    wanted = "best_known_cost" if name == "Navigation" else "optimal_cost"
+    assert results["reference"][wanted] > 0
+    assert "picture" not in results["reference"]
+    drawn = {path.stem for path in tmp_path.glob("*.png")}
+    assert {"summary", "learning_curves", "policy_maps"} <= drawn
+    page = (tmp_path / "report.html").read_text()
+    text = re.sub(r'src="[^"]*"', "", page).lower()
+    for word in ("pendulum", "torque"):
+        assert word not in text
+    assert ("optimum is not known" in text) == (name == "Navigation")
 
 
 def test_a_folder_that_cannot_be_made_is_one_line(tmp_path: Path) -> None:

@@ -24,7 +24,9 @@ def comparison():
 @pytest.fixture(scope="module")
 def drawn(comparison):
     """Every figure of the comparison, drawn once."""
-    made = {name: draw(comparison) for name, draw in figures.FIGURES.items()}
+    made = {
+        name: draw(comparison) for name, draw in figures.figures_of(comparison).items()
+    }
     for figure in made.values():
         figure.canvas.draw()
     return made
@@ -107,9 +109,9 @@ class TestPolicyMaps:
             statistics.median_run(own)
             for own in statistics.by_agent(comparison["runs"]).values()
         ]
-        maps = [run["policy_map"] for run in runs]
-        maps.append(comparison["reference"]["policy_map"])
-        assert len(axes) == 6
+        maps = [run["picture"]["policy_map"] for run in runs]
+        maps.append(comparison["reference"]["picture"]["policy_map"])
+        assert len(axes) == 8
         for ax, actions in zip(axes, maps, strict=True):
             # One more column closes the circle.
             shown = ax.collections[0].get_array().reshape(9, 9)
@@ -133,9 +135,10 @@ class TestPolicyMaps:
             assert goal.get_xydata().tolist() == [[math.pi, 0.0]]
 
     def test_white_is_the_largest_torque_in_whatever_order(self, comparison):
-        turned = {**comparison, "torques": [0.8, -0.8, 0.0]}
-        mesh = figures.policy_maps(turned).axes[-1].collections[0]
-        actions = np.array(comparison["reference"]["policy_map"])
+        scene = {**comparison["scene"], "torques": [0.8, -0.8, 0.0]}
+        turned = {**comparison, "scene": scene}
+        mesh = figures.pendulum.policy_maps(turned).axes[-1].collections[0]
+        actions = np.array(comparison["reference"]["picture"]["policy_map"])
         colors = mesh.to_rgba(mesh.get_array()).reshape(9, 9, 4)[:, :8, 0]
         for action, grey in ((0, 1.0), (1, 0.0), (2, 0.5)):
             np.testing.assert_allclose(colors[actions == action], grey, atol=0.01)
@@ -151,7 +154,7 @@ class TestTrajectories:
         assert len(axes) == 4
         for run in statistics.by_agent(comparison["runs"]).values():
             chosen = statistics.median_run(run)
-            path = chosen["trajectory"]
+            path = chosen["picture"]["trajectory"]
             for panel, key in ((0, "theta"), (1, "omega"), (3, "cost")):
                 line = lines_of(axes[panel], chosen["agent"])[0]
                 np.testing.assert_array_equal(line.get_xdata(), path["time"])
@@ -163,7 +166,7 @@ class TestTrajectories:
         assert rows == ["Optimum", *LABELS.values()]
         run = statistics.median_run(comparison["runs"][:3])
         (line,) = lines_of(ax, "acl-fuzzy")
-        torque = run["trajectory"]["torque"]
+        torque = run["picture"]["trajectory"]["torque"]
         # Upwards is positive on an axis that counts rows downwards.
         np.testing.assert_allclose(
             (1 - line.get_ydata()) * 0.8 / 0.38, [*torque, torque[-1]], atol=1e-12
@@ -175,25 +178,26 @@ class TestTrajectories:
         shown = [text.get_text() for text in legend.get_texts()]
         assert shown[0] == "Optimum: goal at 1.8 s, cost 90.0"
         assert shown[1] == "ACL, fuzzy (seed 1): goal at 2.1 s, cost 90.0"
-        assert shown[5] == "DQN (seed 1): no goal in 2 s, cost 90.0"
+        assert shown[7] == "DQN (seed 1): no goal in 2 s, cost 90.0"
 
     def test_hovering_does_not_push_the_rest_aside(self, comparison):
         runs = [
             *comparison["runs"][:3],
             {
                 **make_run("dqn", 0, [90.0]),
-                "trajectory": make_trajectory(steps=300, reached=False),
+                "picture": {"trajectory": make_trajectory(steps=300, reached=False)},
             },
         ]
-        axes = figures.trajectories({**comparison, "runs": runs}).axes
+        axes = figures.pendulum.trajectories({**comparison, "runs": runs}).axes
         assert axes[0].get_xlim() == pytest.approx((0.0, 1.3 * 2.1))
 
     def test_nobody_arrives(self, comparison):
         lost = make_trajectory(steps=300, reached=False)
-        runs = [{**make_run("dqn", 0, [90.0]), "trajectory": lost}]
-        reference = {**comparison["reference"], "trajectory": lost}
+        picture = {"trajectory": lost}
+        runs = [{**make_run("dqn", 0, [90.0]), "picture": picture}]
+        reference = {**comparison["reference"], "picture": picture}
         given = {**comparison, "runs": runs, "reference": reference}
-        assert figures.trajectories(given).axes[0].get_xlim() == (0.0, 30.0)
+        assert figures.pendulum.trajectories(given).axes[0].get_xlim() == (0.0, 30.0)
 
 
 class TestSummaryDots:
@@ -233,16 +237,20 @@ class TestSummaryDots:
             *(make_run("dqn", i, [c]) for i, c in enumerate([43.0, 90.0, 95.0])),
             make_run("acl-crisp", 0, [90.0]),
         ]
-        shown = texts(figures.summary_dots({**comparison, "runs": runs}))
+        shown = texts(figures.common.summary_dots({**comparison, "runs": runs}))
         assert shown.count("1 of 3") == 4
         assert shown.count("never") == 4
 
     def test_nobody_came_close(self, comparison):
         runs = [make_run("dqn", 0, [90.0])]
-        assert "never" in texts(figures.summary_dots({**comparison, "runs": runs}))
+        assert "never" in texts(
+            figures.common.summary_dots({**comparison, "runs": runs})
+        )
 
 
-@pytest.mark.parametrize("draw", figures.FIGURES.values())
+@pytest.mark.parametrize(
+    "draw", [*figures.COMMON.values(), *figures.OF_SYSTEM["pendulum"].values()]
+)
 def test_one_agent_with_one_seed_and_one_evaluation(draw):
     given = make_comparison(("q-fuzzy",), seeds=1, evaluations=1)
     # Warnings are errors here: a figure that cannot be laid out fails.
@@ -268,14 +276,14 @@ def test_a_figure_that_fails_leaves_the_old_one(comparison, tmp_path, monkeypatc
     def fail(comparison):
         raise RuntimeError("no ink")
 
-    monkeypatch.setitem(figures.FIGURES, "summary", fail)
+    monkeypatch.setitem(figures.COMMON, "summary", fail)
     with pytest.raises(RuntimeError, match="no ink"):
         figures.save_figures(comparison, tmp_path)
     assert (tmp_path / "summary.png").read_bytes() == b"old"
 
 
 def test_pyplot_is_not_touched(comparison):
-    figures.learning_curves(comparison)
+    figures.common.learning_curves(comparison)
     pyplot = sys.modules.get("matplotlib.pyplot")
     assert pyplot is None or pyplot.get_fignums() == []
 

@@ -71,12 +71,37 @@ def test_other_settings_or_other_code_run_again(
     assert calls_in(calls) == ["1", "1", "1"]
 
 
+def test_other_versions_run_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    calls = tmp_path / "calls"
+    run_tasks(tasks(calls, [1]), tmp_path / "runs", workers=1)
+    others = {**runner.versions(), "torch": "0.1"}
+    monkeypatch.setattr(runner, "versions", lambda: others)
+    run_tasks(tasks(calls, [1]), tmp_path / "runs", workers=1)
+    assert calls_in(calls) == ["1", "1"]
+
+
+def test_a_kept_result_says_where_it_was_made(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    calls = tmp_path / "calls"
+    (first,) = run_tasks(tasks(calls, [1]), tmp_path / "runs", workers=1)
+    assert first["made"]["processes"] == 1
+    assert first["made"]["numba"] == runner.versions()["numba"]
+    monkeypatch.setattr(runner, "circumstances", lambda workers: {"cpu": "another"})
+    kept, new = run_tasks(tasks(calls, [1, 2]), tmp_path / "runs", workers=2)
+    assert kept["made"] == first["made"]
+    assert new["made"] == {"cpu": "another"}
+
+
 @pytest.mark.parametrize("damage", [b"", b"{", b"[]", b"\xff\xfe", b'{"key": 1}'])
 def test_a_damaged_result_is_made_again(tmp_path: Path, damage: bytes) -> None:
     calls, runs = tmp_path / "calls", tmp_path / "runs"
     run_tasks(tasks(calls, [3]), runs, workers=1)
     (runs / "square-3.json").write_bytes(damage)
-    assert run_tasks(tasks(calls, [3]), runs, workers=1) == [{"square": 9}]
+    (result,) = run_tasks(tasks(calls, [3]), runs, workers=1)
+    assert result["square"] == 9
     assert calls_in(calls) == ["3", "3"]
 
 

@@ -5,7 +5,12 @@ import numpy as np
 import pytest
 
 from acl_gym.experiments import intervals, statistics, wording
-from tests.experiments.factory import OPTIMAL_COST, make_comparison, make_run
+from tests.experiments.factory import (
+    OPTIMAL_COST,
+    make_comparison,
+    make_navigation,
+    make_run,
+)
 
 REFERENCE = {"optimal_cost": 40.0}
 
@@ -26,9 +31,11 @@ class TestSummarise:
             "acl-crisp",
             "q-fuzzy",
             "q-crisp",
+            "q-lambda-fuzzy",
+            "q-lambda-crisp",
             "dqn",
         ]
-        assert [entry["seeds"] for entry in summary] == [3] * 5
+        assert [entry["seeds"] for entry in summary] == [3] * 7
 
     def test_figures_computed_by_hand(self):
         # Within 25% of 40 is 50, within 10% is 44.
@@ -294,6 +301,38 @@ class TestFindings:
         run["rows"][-1]["success_rate"] = 0.996
         text = say(run, make_run("acl-fuzzy", 0, [45.0]))
         assert "from 99.6% of the starts with DQN; from every start with" in text
+
+    def test_kinds_of_traces_are_families_of_their_own(self):
+        text = say(
+            make_run("acl-fuzzy", 0, [48.0]),
+            make_run("q-fuzzy", 0, [42.0]),
+            make_run("q-lambda-fuzzy", 0, [43.0]),
+            make_run("q-lambda-crisp", 0, [44.0]),
+        )
+        assert "fuzzy ACL loses to fuzzy Q-learning" in text
+        assert "fuzzy ACL loses to fuzzy Q(λ)" in text
+        assert "fuzzy ACL loses to crisp Q(λ)" not in text
+
+    def test_where_the_optimum_is_not_known(self):
+        comparison = make_navigation()
+        summary = statistics.summarise(comparison["runs"], OPTIMAL_COST)
+        text = "\n".join(statistics.findings(summary, comparison["reference"], "quick"))
+        assert "within 25% of the best known cost (50.0)" in text
+        assert "J*" not in text
+        assert "9 x 3 x 9 x 3 cells" in text
+
+    def test_those_that_share_the_first_place(self):
+        runs = [make_run(agent, 0, [40.0]) for agent in ("acl-crisp", "q-crisp", "dqn")]
+        text = say(*runs, make_run("q-fuzzy", 0, [50.0]))
+        assert (
+            "Crisp ACL, crisp Q-learning and DQN end lowest with their last policies, "
+            "in the median at 40.0, equal to J* (40.0)."
+        ) in text
+        assert "fuzzy Q-learning find" not in text
+
+    def test_equal_to_the_optimum(self):
+        text = say(make_run("dqn", 0, [40.0]))
+        assert "40.0, equal to J* (40.0)" in text
 
     def test_what_the_partition_allows(self):
         comparison = make_comparison(seeds=1)

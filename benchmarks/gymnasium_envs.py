@@ -14,6 +14,7 @@ import json
 import statistics
 import warnings
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -87,9 +88,12 @@ def follow(
 def run(name: str, method: str, candidate: Candidate, seed: int, report: Report) -> Run:
     """Train once and follow the final and the best policy."""
     warnings.simplefilter("ignore", PheromoneBoundWarning)
-    environment = ENVIRONMENTS[name]
+    environment, settings = ENVIRONMENTS[name], dict(candidate)
+    if "episodes" in settings:
+        episodes = settings.pop("episodes")
+        environment = replace(environment, episodes=episodes, choosing=episodes)
     train = train_dqn if method == "dqn" else train_tabular
-    result = train(environment, method, dict(candidate), seed, report)
+    result = train(environment, method, settings, seed, report)
     return {"env": name, "method": method, "seed": seed, **result}
 
 
@@ -218,9 +222,15 @@ COSTS: dict[str, Callable[[Episode], float]] = {"highest_point": highest_point}
 
 
 SMOKE: dict[str, Candidate] = {
-    "acl": {"slots": 20, "trials": 2, "every": 1},
-    "q-learning": {"slots": 5, "trials": 2, "every": 1},
-    "dqn": {"steps": 400, "every": 200, "learning_starts": 100, "train_freq": 4},
+    "acl": {"slots": 10, "trials": 2, "every": 1, "episodes": 2},
+    "q-learning": {"slots": 5, "trials": 2, "every": 1, "episodes": 2},
+    "dqn": {
+        "episodes": 2,
+        "steps": 400,
+        "every": 200,
+        "learning_starts": 100,
+        "train_freq": 4,
+    },
 }
 """To see that all of it works; its figures mean nothing."""
 

@@ -65,8 +65,13 @@ class WaitingVectorEnv(SyncVectorEnv):
         """Begin episodes in all slots, or in those of `options["reset_mask"]`."""
         mask = None if options is None else options.get("reset_mask")
         observation, infos = super().reset(seed=seed, options=options)
-        self._finished[slice(None) if mask is None else mask] = False
-        self._shown = np.array(observation)
+        if mask is None:
+            self._finished[:] = False
+            self._shown = np.array(observation)
+        else:
+            self._finished[mask] = False
+            # Of the other slots, the base class knows only how they began.
+            self._shown[mask] = np.asarray(observation)[mask]
         return self._shown.copy(), infos
 
     def step(

@@ -244,7 +244,7 @@ ENVIRONMENTS: dict[str, Environment] = {
     "FrozenLake-v1-slippery": Environment(
         "FrozenLake-v1",
         0.72,
-        "the optimum within 100 steps is 0.74; less the error of 500 episodes",
+        "the optimum within 100 steps is 0.744; 500 episodes tell it to 0.02",
         episodes=500,
         choosing=100,
         candidates={
@@ -307,8 +307,8 @@ ENVIRONMENTS: dict[str, Environment] = {
     ),
     "Taxi-v4": Environment(
         "Taxi-v4",
-        7.8,
-        "the optimum is 7.93 in the mean over the starts",
+        8.0,
+        "the optimum is 8.05 from the starts of the table, 7.93 over all",
         choosing=100,
         candidates={
             "acl": [

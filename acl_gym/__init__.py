@@ -25,6 +25,7 @@ if TYPE_CHECKING:
         PolicyEvaluation,
         TensorBoardLog,
     )
+    from acl_gym.envs.waiting import WaitingVectorEnv
     from acl_gym.envs.wrappers import ScaledObservation, ScaledVectorObservation
     from acl_gym.evaluation import PolicyCost, evaluate_policy_cost
     from acl_gym.partition import Crisp, Discrete, Fuzzy, Partition
@@ -51,6 +52,7 @@ _PUBLIC = {
     "ScaledVectorObservation": "acl_gym.envs.wrappers",
     "TensorBoardLog": "acl_gym.callbacks",
     "VectorEnvAdapter": "acl_gym.agents.sb3",
+    "WaitingVectorEnv": "acl_gym.envs.waiting",
     "automatic_partition": "acl_gym.partition.automatic",
     "evaluate_policy_cost": "acl_gym.evaluation",
     "fuzzy_q_iteration": "acl_gym.agents.q_iteration",
@@ -74,6 +76,7 @@ __all__ = [
     "ScaledVectorObservation",
     "TensorBoardLog",
     "VectorEnvAdapter",
+    "WaitingVectorEnv",
     "__version__",
     "automatic_partition",
     "evaluate_policy_cost",

@@ -364,6 +364,8 @@ class PolicyCostCallback(BaseCallback):
         every: steps between evaluations, >= 1. The policy at the end of `learn` is
             always evaluated.
         max_steps: T of the evaluation; None takes that of the environment.
+        seed: of an environment that is random, as in `PolicyEvaluation`: every
+            evaluation is from the same initial states, with the same luck.
 
     Attributes:
         history: one row an evaluation: `env_steps`, `seconds` (spent in `learn`, less
@@ -380,12 +382,16 @@ class PolicyCostCallback(BaseCallback):
         *,
         every: int = 1_000,
         max_steps: int | None = None,
+        seed: int | None = 0,
     ) -> None:
         super().__init__()
         self.env = env
         self.states = states
         self.every = validation.integer("every", every, at_least=1)
         self.max_steps = max_steps
+        if seed is not None:
+            seed = validation.integer("seed", seed, at_least=0)
+        self.seed = seed
         self.history: list[Row] = []
         self.best: PolicyCost | None = None
         self.best_parameters: dict[str, Tensor] | None = None
@@ -430,7 +436,11 @@ class PolicyCostCallback(BaseCallback):
     def _evaluate(self) -> None:
         self._seconds += time.perf_counter() - self._clock
         result = evaluate_policy_cost(
-            self.model, self.env, self.states, max_steps=self.max_steps
+            self.model,
+            self.env,
+            self.states,
+            max_steps=self.max_steps,
+            seed=self.seed,
         )
         self.history.append(
             {

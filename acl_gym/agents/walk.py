@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from acl_gym import validation
 from acl_gym.envs.control_env import ControlVectorEnv
+from acl_gym.envs.waiting import WaitingVectorEnv
 from acl_gym.episodes import Episodes
 
 FloatArray = NDArray[np.float64]
@@ -59,7 +60,8 @@ class Walk:
     """Steps each slot through one episode of at most `max_steps` steps.
 
     - Environments of this package are told to let finished slots wait
-      (`reset(options={"finished": "wait"})`): idle ants cost nothing.
+      (`reset(options={"finished": "wait"})`): idle ants cost nothing. In a
+      `WaitingVectorEnv` they do so by themselves.
     - Where autoreset is disabled, finished slots are reset by mask, walk on as
       dummies, and are masked out.
     - Where the environment resets slots itself, those that have finished are masked
@@ -93,7 +95,8 @@ class Walk:
         self.env = env
         self.max_steps = validation.integer("max_steps", max_steps, at_least=1)
         self.n_actions = int(space.n)
-        self._waits = isinstance(env.unwrapped, ControlVectorEnv)
+        self._told_to_wait = isinstance(env.unwrapped, ControlVectorEnv)
+        self._waits = isinstance(env.unwrapped, (ControlVectorEnv, WaitingVectorEnv))
         self._mode = AutoresetMode(
             env.metadata.get("autoreset_mode", AutoresetMode.NEXT_STEP)
         )
@@ -121,7 +124,7 @@ class Walk:
             The first observations, `(num_envs, ...)`.
         """
         options: dict[str, Any] = {}
-        if self._waits:
+        if self._told_to_wait:
             options["finished"] = "wait"
         if states is not None:
             options["state"] = states

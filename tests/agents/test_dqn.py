@@ -399,3 +399,24 @@ class TestFiniteObservations:
         model.learn(800, callback=costs)
         assert costs.best.cost == 2.0
         assert costs.best.success_rate == 1.0
+
+
+def test_evaluations_of_a_random_environment_begin_with_the_same_luck() -> None:
+    def model_and_callback(seed: int | None) -> PolicyCostCallback:
+        env = acl_gym.WaitingVectorEnv.make("CartPole-v1", 2)
+        callback = PolicyCostCallback(
+            acl_gym.WaitingVectorEnv.make("CartPole-v1", 5), every=20, seed=seed
+        )
+        # It never learns, so that only the starts can differ.
+        model = DQN(
+            "MlpPolicy", acl_gym.VectorEnvAdapter(env), learning_starts=1_000, seed=0
+        )
+        model.learn(60, callback=callback)
+        return callback
+
+    same = {row["policy_cost"] for row in model_and_callback(3).history}
+    assert len(same) == 1
+    others = {row["policy_cost"] for row in model_and_callback(None).history}
+    assert len(others) > 1
+    with pytest.raises(ValueError, match="seed"):
+        PolicyCostCallback(acl_gym.WaitingVectorEnv.make("CartPole-v1", 1), seed=-1)

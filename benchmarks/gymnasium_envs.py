@@ -1,0 +1,437 @@
+"""Measure ACL, Q-learning and DQN on environments that Gymnasium brings itself.
+
+Every run trains once, with the settings of gymnasium_settings.py and one seed. Its
+final policy, and the best of those that were seen on the way, are then followed,
+without exploring, through the same fresh episodes for all methods. The figures go to
+results.json and, as a Markdown table, to table.md in the folder of --out; each run is
+kept there as soon as it is done, so that a command that was stopped goes on where it was.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import statistics
+import warnings
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+from gymnasium.vector import VectorEnv
+from gymnasium_settings import ENVIRONMENTS, Candidate, Environment
+
+from acl_gym import ACL, Crisp, Fuzzy, PolicyEvaluation, QLearning, WaitingVectorEnv
+from acl_gym.agents.acl import PheromoneBoundWarning
+from acl_gym.costs import Episode
+from acl_gym.evaluation import Predictor, evaluate_policy_cost
+from acl_gym.experiments.runner import Task, run_tasks
+from acl_gym.partition.automatic import automatic_partition
+from acl_gym.storage import write_atomically
+
+Report = Callable[[float], None]
+Run = dict[str, Any]
+
+METHODS = {"acl": "ACL", "q-learning": "Q-learning", "dqn": "DQN"}
+CHOOSING_SEED, TABLE_SEED = 20_000, 10_000
+"""Slot i of an evaluation is seeded with this + i; training seeds are drawn anew."""
+
+
+def make_env(
+    environment: Environment, slots: int, angles: bool = False
+) -> WaitingVectorEnv:
+    """Gymnasium's own environment in so many slots; `angles` is for Acrobot's."""
+    kwargs = dict(environment.kwargs)
+    if environment.limit is not None:
+        kwargs["max_episode_steps"] = environment.limit
+    if not angles:
+        return WaitingVectorEnv.make(environment.env_id, slots, **kwargs)
+    return WaitingVectorEnv(
+        [lambda: with_angles(gym.make(environment.env_id, **kwargs))] * slots
+    )
+
+
+def with_angles(env: gym.Env[Any, Any]) -> gym.Env[Any, Any]:
+    """Acrobot's two angles in place of their cosines and sines: 4 variables, not 6."""
+    box = env.observation_space
+    low = np.array([-np.pi, -np.pi, *box.low[4:]])
+    return gym.wrappers.TransformObservation(
+        env,
+        lambda o: np.array(
+            [np.arctan2(o[1], o[0]), np.arctan2(o[3], o[2]), o[4], o[5]]
+        ),
+        gym.spaces.Box(low, -low, dtype=np.float64),
+    )
+
+
+def time_limit(environment: Environment) -> int:
+    return environment.limit or gym.spec(environment.env_id).max_episode_steps or 300
+
+
+def follow(
+    policy: Predictor, environment: Environment, angles: bool = False
+) -> dict[str, float]:
+    """The mean return over the episodes of the table."""
+    env = make_env(environment, environment.episodes, angles)
+    limit = time_limit(environment)
+    result = evaluate_policy_cost(policy, env, max_steps=limit, seed=TABLE_SEED)
+    env.close()
+    return {
+        "return": -result.cost,
+        "terminated": result.success_rate,
+        "length": float(result.lengths.mean()),
+    }
+
+
+def run(name: str, method: str, candidate: Candidate, seed: int, report: Report) -> Run:
+    """Train once and follow the final and the best policy."""
+    warnings.simplefilter("ignore", PheromoneBoundWarning)
+    environment, settings = ENVIRONMENTS[name], dict(candidate)
+    if "episodes" in settings:
+        episodes = settings.pop("episodes")
+        environment = replace(environment, episodes=episodes, choosing=episodes)
+    train = train_dqn if method == "dqn" else train_tabular
+    result = train(environment, method, settings, seed, report)
+    return {"env": name, "method": method, "seed": seed, **result}
+
+
+def train_tabular(
+    environment: Environment,
+    method: str,
+    settings: Candidate,
+    seed: int,
+    report: Report,
+) -> Run:
+    """ACL or Q-learning; Numba has compiled before the clock starts."""
+    slots, trials, every, kind, cells, bounds, angles = (
+        settings.pop(key, None)
+        for key in ("slots", "trials", "every", "kind", "cells", "bounds", "angles")
+    )
+    angles = bool(angles)
+    env: VectorEnv[Any, Any, Any] = make_env(environment, slots, angles)
+    if gym.spec(environment.env_id).vector_entry_point is not None:
+        env = gym.make_vec(environment.env_id, num_envs=slots)  # native, and faster
+    partition = automatic_partition(
+        env, kind=Crisp if kind == "crisp" else Fuzzy, cells=cells, bounds=bounds
+    )
+    if "cost" in settings:
+        settings["cost"] = COSTS[settings["cost"]]
+    make = ACL if method == "acl" else QLearning
+    steps = time_limit(environment)
+    warm = make(
+        make_env(environment, 2, angles), partition, max_steps=2, seed=0, **settings
+    )
+    warm.learn(trials=1)  # Numba compiles
+    agent = make(env, partition, max_steps=steps, seed=seed, **settings)
+    watch = PolicyEvaluation(
+        make_env(environment, environment.choosing, angles),
+        every=every,
+        max_steps=time_limit(environment),
+        seed=CHOOSING_SEED,
+    )
+    agent.learn(
+        trials=trials,
+        callback=[watch, lambda agent, row: report(row["trial"] / trials)],
+    )
+    rows = [row for row in agent.history if "policy_cost" in row]
+    return outcome(agent.policy, watch.best_policy, rows, environment, angles)
+
+
+def train_dqn(
+    environment: Environment,
+    method: str,
+    settings: Candidate,
+    seed: int,
+    report: Report,
+) -> Run:
+    """DQN of Stable-Baselines3; discrete observations become one-hot there."""
+    import torch
+    from stable_baselines3 import DQN
+    from stable_baselines3.common.callbacks import ConvertCallback
+
+    from acl_gym.agents.dqn import PolicyCostCallback
+    from acl_gym.agents.sb3 import VectorEnvAdapter
+
+    torch.set_num_threads(1)  # the fastest for such small networks
+    slots, steps, every, net_arch = (
+        settings.pop(key) for key in ("slots", "steps", "every", "net_arch")
+    )
+    model = DQN(
+        "MlpPolicy",
+        VectorEnvAdapter(make_env(environment, slots)),
+        seed=seed,
+        device="cpu",
+        policy_kwargs={
+            "net_arch": list(net_arch),
+            "optimizer_kwargs": {"fused": True},
+        },
+        **settings,
+    )
+    watch = PolicyCostCallback(
+        make_env(environment, environment.choosing),
+        every=every,
+        max_steps=time_limit(environment),
+        seed=CHOOSING_SEED,
+    )
+
+    def tell(local: dict[str, Any], _: dict[str, Any]) -> bool:
+        report(min(local["self"].num_timesteps / steps, 1.0))
+        return True
+
+    model.learn(steps, callback=[watch, ConvertCallback(tell)])
+    final = follow(model, environment)
+    watch.restore_best()
+    result = outcome(model, model, watch.history, environment)
+    return {**result, "final": final}
+
+
+def outcome(
+    final: Predictor,
+    best: Any,
+    rows: list[dict[str, float]],
+    environment: Environment,
+    angles: bool = False,
+) -> Run:
+    """What a run comes to, in JSON types."""
+    cheapest = min(rows, key=lambda row: row["policy_cost"])
+    return {
+        "final": follow(final, environment, angles),
+        "best": follow(best, environment, angles),
+        "steps": rows[-1]["env_steps"],
+        "seconds": rows[-1]["seconds"],
+        "best_steps": cheapest["env_steps"],
+        "best_seconds": cheapest["seconds"],
+        "curve": [[row["env_steps"], -row["policy_cost"]] for row in rows],
+    }
+
+
+def highest_point(episode: Episode) -> float:
+    """Steps to the flag; without it, the more the lower the car has stayed.
+
+    For MountainCar, where a solution that never arrives costs 200 however near it came.
+    """
+    if episode.success:
+        return float(episode.actions.size)
+    return 200.0 + 200.0 * (0.5 - float(episode.observations[:, 0].max()))
+
+
+COSTS: dict[str, Callable[[Episode], float]] = {"highest_point": highest_point}
+"""Costs of whole solutions that candidates name."""
+
+
+SMOKE: dict[str, Candidate] = {
+    "acl": {"slots": 10, "trials": 2, "every": 1, "episodes": 2},
+    "q-learning": {"slots": 5, "trials": 2, "every": 1, "episodes": 2},
+    "dqn": {
+        "episodes": 2,
+        "steps": 400,
+        "every": 200,
+        "learning_starts": 100,
+        "train_freq": 4,
+    },
+}
+"""To see that all of it works; its figures mean nothing."""
+
+
+def list_tasks(
+    names: Sequence[str], methods: Sequence[str], seeds: Sequence[int], preset: str
+) -> list[Task]:
+    """Every run: of the chosen settings, or of all candidates in a search."""
+    tasks = []
+    for name in names:
+        for method in methods:
+            candidates = ENVIRONMENTS[name].candidates[method]
+            if preset != "search":
+                candidates = candidates[:1]
+            for number, candidate in enumerate(candidates):
+                if preset == "smoke":
+                    candidate = {**candidate, **SMOKE[method]}
+                shown = {key: _shown(value) for key, value in candidate.items()}
+                tasks += [
+                    Task(
+                        f"{name}-{method}-{number}-{seed}",
+                        run,
+                        (name, method, candidate, seed),
+                        {"number": number, "settings": shown},
+                    )
+                    for seed in seeds
+                ]
+    return tasks
+
+
+def _shown(value: Any) -> Any:
+    return value if isinstance(value, (int, float, str, bool)) else repr(value)
+
+
+def kept_runs(tasks: Sequence[Task], directory: Path) -> list[tuple[Task, Run]]:
+    """The tasks that have been run with the same settings, whatever the code."""
+    kept = []
+    for task in tasks:
+        path = directory / f"{task.name}.json"
+        if path.exists():
+            stored = json.loads(path.read_text())
+            if stored["settings"] == task.settings:
+                kept.append((task, stored["result"]))
+    return kept
+
+
+def summarise(done: Sequence[tuple[Task, Run]]) -> list[dict[str, Any]]:
+    """One row for each environment, method and candidate, over its seeds."""
+    groups: dict[tuple[str, str, int], list[Run]] = {}
+    for task, result in done:
+        key = (result["env"], result["method"], task.settings["number"])
+        groups.setdefault(key, []).append(result)
+    rows = []
+    for (name, method, number), runs in groups.items():
+        target = ENVIRONMENTS[name].target
+        row: dict[str, Any] = {"env": name, "method": method, "candidate": number}
+        row["seeds"] = [result["seed"] for result in runs]
+        for which in ("final", "best"):
+            returns = [result[which]["return"] for result in runs]
+            row[which] = {
+                "median": statistics.median(returns),
+                "lowest": min(returns),
+                "highest": max(returns),
+                "reached": sum(value >= target for value in returns),
+            }
+        for measure in ("steps", "seconds", "best_steps", "best_seconds"):
+            row[measure] = statistics.median(result[measure] for result in runs)
+        rows.append(row)
+    return rows
+
+
+def as_markdown(rows: Sequence[dict[str, Any]]) -> str:
+    """The table of docs/gymnasium.md."""
+    lines = [
+        "| environment (target) | method | final policy | best policy seen "
+        "| steps | seconds |",
+        "| --- | --- | --- | --- | --- | --- |",
+    ]
+    for row in rows:
+        candidate = f", candidate {row['candidate']}" if row["candidate"] else ""
+        cells = [
+            f"{row['env']} ({ENVIRONMENTS[row['env']].target:g})",
+            METHODS[row["method"]] + candidate,
+            *(_cell(row[which], len(row["seeds"])) for which in ("final", "best")),
+            f"{row['steps']:,.0f}",
+            f"{row['seconds']:.0f}",
+        ]
+        lines.append(f"| {' | '.join(cells)} |")
+    return "\n".join(lines) + "\n"
+
+
+def _cell(figures: dict[str, float], seeds: int) -> str:
+    low, median, high = (
+        f"{figures[name] + 0.0:.4g}" for name in ("lowest", "median", "highest")
+    )
+    spread = "" if low == high else f" ({low} to {high})"
+    return f"{median}{spread}; {figures['reached']} of {seeds}"
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run, write and print; returns the exit code."""
+    options = _parser().parse_args(arguments)
+    seeds = options.seeds
+    if seeds is None:
+        seeds = {"smoke": [0], "search": [100], "full": [0, 1, 2]}[options.preset]
+    tasks = list_tasks(options.env, options.agents, seeds, options.preset)
+    folder = options.out / "runs"
+    if options.table_only:
+        done = kept_runs(tasks, folder)
+    else:
+        results = run_tasks(tasks, folder, workers=1, progress=_tell)
+        done = list(zip(tasks, results, strict=True))
+    if not done:
+        print(f"There are no runs in {folder}; leave out --table-only to make them.")
+        return 1
+    rows = summarise(done)
+    stored = {
+        "preset": options.preset,
+        "gymnasium": gym.__version__,
+        "environments": {
+            name: {
+                "id": ENVIRONMENTS[name].env_id,
+                "target": ENVIRONMENTS[name].target,
+                "why": ENVIRONMENTS[name].why,
+                "episodes": ENVIRONMENTS[name].episodes,
+                "time_limit": time_limit(ENVIRONMENTS[name]),
+            }
+            for name in options.env
+        },
+        "table": rows,
+        "runs": [{**result, **task.settings} for task, result in done],
+    }
+    table = as_markdown(rows)
+    write_atomically(
+        options.out / "results.json", json.dumps(stored, indent=1).encode()
+    )
+    write_atomically(options.out / "table.md", table.encode())
+    print(table)
+    return 0
+
+
+def _tell(name: str, fraction: float) -> None:
+    if fraction == 1.0:
+        print(f"done: {name}", flush=True)
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument(
+        "--preset",
+        choices=("smoke", "search", "full"),
+        default="full",
+        help="smoke: seconds, figures without meaning. full: the chosen settings with "
+        "seeds 0, 1 and 2; about half an hour of one core. search: every candidate of "
+        "gymnasium_settings.py with seed 100 (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--env",
+        type=_names(ENVIRONMENTS),
+        default=list(ENVIRONMENTS),
+        help=f"some of {', '.join(ENVIRONMENTS)}, with commas (default: all)",
+    )
+    parser.add_argument(
+        "--agents",
+        type=_names(METHODS),
+        default=list(METHODS),
+        help=f"some of {', '.join(METHODS)}, with commas (default: all)",
+    )
+    parser.add_argument(
+        "--seeds",
+        type=lambda text: [int(seed) for seed in text.split(",")],
+        help="seeds of training, such as 0,1,2 (default: those of the preset)",
+    )
+    parser.add_argument(
+        "--out",
+        type=Path,
+        default=Path("runs/gymnasium"),
+        help="where results go, and where runs are kept (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--table-only",
+        action="store_true",
+        help="make no runs, only the table of those that are kept",
+    )
+    return parser
+
+
+def _names(known: Iterable[str]) -> Callable[[str], list[str]]:
+    def names(text: str) -> list[str]:
+        given = text.split(",")
+        for name in given:
+            if name not in known:
+                raise argparse.ArgumentTypeError(
+                    f"{name!r} is not one of {', '.join(known)}"
+                )
+        return given
+
+    return names
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

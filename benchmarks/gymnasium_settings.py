@@ -1,0 +1,337 @@
+"""What gymnasium_envs.py runs: every environment, method and setting, as data.
+
+The first candidate of each list is the one that the published table was made with;
+docs/gymnasium.md says how it was chosen.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+from acl_gym.deposits import InverseCost, Rank
+from acl_gym.schedules import Linear
+
+Candidate = dict[str, Any]
+"""Settings of one method. For "acl" and "q-learning": `slots`, `trials`, `every`
+(trials between evaluations), and as needed `cells`, `bounds`, `kind` ("crisp"),
+`limit` (steps of an episode in training); the rest goes to the agent. For "dqn":
+`slots`, `steps`, `every` (steps), `net_arch`; the rest goes to it."""
+
+
+@dataclass(frozen=True)
+class Environment:
+    """One row of the table.
+
+    Attributes:
+        env_id: as registered with Gymnasium.
+        target: mean return from which a policy counts as a success.
+        why: what that figure is.
+        kwargs: keywords of the environment.
+        episodes: evaluated for the table; one where all episodes are the same.
+        choosing: evaluated, on other seeds, to choose the best policy.
+        limit: steps of an episode, where Gymnasium has no limit of its own.
+        candidates: method -> settings; the first is the chosen one.
+    """
+
+    env_id: str
+    target: float
+    why: str
+    kwargs: dict[str, Any] = field(default_factory=dict)
+    episodes: int = 100
+    choosing: int = 50
+    limit: int | None = None
+    candidates: dict[str, list[Candidate]] = field(default_factory=dict)
+
+
+# Stable-Baselines3's zoo was where the search for DQN's settings began.
+_CARTPOLE_DQN: Candidate = {
+    "slots": 1,
+    "steps": 50_000,
+    "every": 2_500,
+    "net_arch": (256, 256),
+    "learning_rate": 2.3e-3,
+    "batch_size": 64,
+    "buffer_size": 100_000,
+    "learning_starts": 1_000,
+    "gamma": 0.99,
+    "target_update_interval": 10,
+    "train_freq": 256,
+    "gradient_steps": 128,
+    "exploration_fraction": 0.16,
+    "exploration_final_eps": 0.04,
+}
+_MOUNTAIN_DQN: Candidate = {
+    "slots": 1,
+    "steps": 120_000,
+    "every": 5_000,
+    "net_arch": (256, 256),
+    "learning_rate": 4e-3,
+    "batch_size": 128,
+    "buffer_size": 10_000,
+    "learning_starts": 1_000,
+    "gamma": 0.98,
+    "target_update_interval": 600,
+    "train_freq": 16,
+    "gradient_steps": 8,
+    "exploration_fraction": 0.2,
+    "exploration_final_eps": 0.07,
+}
+_ACROBOT_DQN: Candidate = {
+    "slots": 1,
+    "steps": 80_000,
+    "every": 5_000,
+    "net_arch": (256, 256),
+    "learning_rate": 6.3e-4,
+    "batch_size": 128,
+    "buffer_size": 50_000,
+    "learning_starts": 1_000,
+    "gamma": 0.99,
+    "target_update_interval": 250,
+    "train_freq": 4,
+    "gradient_steps": 2,
+    "exploration_fraction": 0.12,
+    "exploration_final_eps": 0.1,
+}
+_TOY_DQN: Candidate = {
+    "slots": 4,
+    "steps": 40_000,
+    "every": 2_000,
+    "net_arch": (64,),
+    "learning_rate": 1e-3,
+    "batch_size": 64,
+    "buffer_size": 50_000,
+    "learning_starts": 1_000,
+    "gamma": 0.99,
+    "target_update_interval": 500,
+    "train_freq": 1,
+    "gradient_steps": 1,
+    "exploration_fraction": 0.3,
+    "exploration_final_eps": 0.05,
+}
+
+_POLE = {0: (-2.4, 2.4), 1: (-3.0, 3.0), 2: (-0.21, 0.21), 3: (-3.5, 3.5)}
+_CAR = {1: (-0.05, 0.05)}
+# Only the few best ants of a trial count, and the colony commits itself slowly.
+_ELITE: Candidate = {"deposit": Rank(20), "alpha": 1.5, "global_decay": 0.2}
+
+ENVIRONMENTS: dict[str, Environment] = {
+    "CartPole-v1": Environment(
+        "CartPole-v1",
+        475,
+        "Gymnasium's threshold",
+        candidates={
+            "acl": [
+                {
+                    "slots": 200,
+                    "trials": 60,
+                    "every": 3,
+                    "cells": (3, 3, 7, 7),
+                    "bounds": _POLE,
+                    "deposit": Rank(5),
+                },
+            ],
+            "q-learning": [
+                {
+                    "slots": 10,
+                    "trials": 150,
+                    "every": 10,
+                    "cells": (3, 3, 7, 7),
+                    "bounds": _POLE,
+                    "learning_rate": 0.1,
+                    "discount": 0.99,
+                    "epsilon": 0.05,
+                    "trace_decay": 0.9,
+                },
+            ],
+            "dqn": [
+                _CARTPOLE_DQN,
+            ],
+        },
+    ),
+    "MountainCar-v0": Environment(
+        "MountainCar-v0",
+        -110,
+        "Gymnasium's threshold",
+        candidates={
+            "acl": [
+                {
+                    "slots": 100,
+                    "trials": 60,
+                    "every": 5,
+                    "cells": (41, 41),
+                    "bounds": _CAR,
+                    **_ELITE,
+                    "epsilon": 0.05,
+                    "local_decay": 0.0,
+                    "cost": "highest_point",
+                },
+            ],
+            "q-learning": [
+                {
+                    "slots": 10,
+                    "trials": 150,
+                    "every": 10,
+                    "cells": (21, 21),
+                    "discount": 0.99,
+                    "epsilon": 0.02,
+                },
+            ],
+            "dqn": [
+                _MOUNTAIN_DQN,
+            ],
+        },
+    ),
+    "Acrobot-v1": Environment(
+        "Acrobot-v1",
+        -100,
+        "Gymnasium's threshold",
+        candidates={
+            "acl": [
+                {
+                    "slots": 50,
+                    "trials": 30,
+                    "every": 5,
+                    "angles": True,
+                    "cells": (7, 7, 7, 7),
+                    **_ELITE,
+                    "epsilon": 0.05,
+                    "local_decay": 0.0,
+                },
+            ],
+            "q-learning": [
+                {
+                    "slots": 10,
+                    "trials": 60,
+                    "every": 5,
+                    "angles": True,
+                    "cells": (7, 7, 7, 7),
+                    "discount": 0.99,
+                    "epsilon": 0.02,
+                },
+            ],
+            "dqn": [
+                _ACROBOT_DQN,
+            ],
+        },
+    ),
+    "FrozenLake-v1": Environment(
+        "FrozenLake-v1",
+        1.0,
+        "the optimum",
+        kwargs={"is_slippery": False},
+        episodes=1,
+        choosing=1,
+        candidates={
+            "acl": [{"slots": 50, "trials": 30, "every": 2, "deposit": "return"}],
+            "q-learning": [
+                {"slots": 10, "trials": 60, "every": 2, "discount": 0.95},
+                {"slots": 50, "trials": 30, "every": 2, "discount": 0.95},
+            ],
+            "dqn": [
+                {**_TOY_DQN, "steps": 20_000, "every": 1_000},
+                {**_TOY_DQN, "steps": 20_000, "every": 1_000, "learning_rate": 3e-3},
+                {**_TOY_DQN, "steps": 20_000, "every": 1_000, "gamma": 0.95},
+                {
+                    **_TOY_DQN,
+                    "steps": 20_000,
+                    "every": 1_000,
+                    "exploration_fraction": 0.8,
+                },
+            ],
+        },
+    ),
+    "FrozenLake-v1-slippery": Environment(
+        "FrozenLake-v1",
+        0.72,
+        "the optimum within 100 steps is 0.744; 500 episodes tell it to 0.02",
+        episodes=500,
+        choosing=100,
+        candidates={
+            "acl": [
+                {
+                    "slots": 500,
+                    "trials": 40,
+                    "every": 4,
+                    "deposit": "return",
+                    "selection": "boltzmann",
+                    "alpha": Linear(0.3, 1, 40),
+                    "global_decay": 0.05,
+                    "local_decay": 0.0,
+                },
+            ],
+            "q-learning": [
+                {
+                    "slots": 10,
+                    "trials": 400,
+                    "every": 20,
+                    "learning_rate": 0.1,
+                    "discount": 0.99,
+                    "epsilon": 0.3,
+                },
+            ],
+            "dqn": [
+                _TOY_DQN,
+                {**_TOY_DQN, "learning_rate": 3e-4},
+            ],
+        },
+    ),
+    "CliffWalking-v1": Environment(
+        "CliffWalking-v1",
+        -13,
+        "the optimum",
+        limit=200,
+        episodes=1,
+        choosing=1,
+        candidates={
+            "acl": [
+                {
+                    "slots": 100,
+                    "trials": 40,
+                    "every": 4,
+                    "deposit": Rank(30),
+                    "alpha": 1.0,
+                    "epsilon": 0.05,
+                    "global_decay": 0.3,
+                },
+                {"slots": 50, "trials": 30, "every": 2},
+            ],
+            "q-learning": [{"slots": 10, "trials": 40, "every": 2}],
+            "dqn": [
+                {**_TOY_DQN, "exploration_fraction": 0.8},
+                _TOY_DQN,
+                {**_TOY_DQN, "learning_rate": 3e-4},
+                {**_TOY_DQN, "net_arch": (128, 128)},
+            ],
+        },
+    ),
+    "Taxi-v4": Environment(
+        "Taxi-v4",
+        8.0,
+        "the optimum is 8.05 from the starts of the table, 7.93 over all",
+        choosing=100,
+        candidates={
+            "acl": [
+                {
+                    "slots": 200,
+                    "trials": 30,
+                    "every": 3,
+                    "deposit": InverseCost(21),
+                    "alpha": 1.0,
+                    "epsilon": 0.05,
+                    "global_decay": 0.3,
+                    "local_decay": 0.0,
+                },
+            ],
+            "q-learning": [{"slots": 10, "trials": 150, "every": 15}],
+            "dqn": [
+                {
+                    **_TOY_DQN,
+                    "steps": 60_000,
+                    "net_arch": (128, 128),
+                    "exploration_fraction": 0.6,
+                },
+            ],
+        },
+    ),
+}

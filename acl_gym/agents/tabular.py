@@ -368,6 +368,9 @@ class TabularAgent(PartitionPolicy):
 
 def time_limit(env: Any) -> int | None:
     """The time limit that an environment was made or registered with; None: none."""
-    own = getattr(getattr(env, "unwrapped", None), "max_episode_steps", None)
-    limit = own or getattr(getattr(env, "spec", None), "max_episode_steps", None)
+    base = getattr(env, "unwrapped", None)
+    limit = getattr(base, "max_episode_steps", None)
+    # A vector of single environments may know its limit by those only.
+    for each in (env, *getattr(base, "envs", ())[:1]):
+        limit = limit or getattr(getattr(each, "spec", None), "max_episode_steps", None)
     return int(limit) if limit and limit > 0 else None

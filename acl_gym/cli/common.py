@@ -10,6 +10,7 @@ import warnings
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import fields, is_dataclass
+from importlib import import_module
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
@@ -195,16 +196,22 @@ def make_env(env_id: str, num_envs: int, env_args: dict[str, Any]) -> VectorEnv:
     import gymnasium as gym
 
     from acl_gym.envs.control_env import ControlVectorEnv
+    from acl_gym.envs.waiting import WaitingVectorEnv
 
-    if ":" in env_id and os.getcwd() not in sys.path:
+    module, _, name = env_id.rpartition(":")
+    if module and os.getcwd() not in sys.path:
         sys.path.insert(0, os.getcwd())
     with bad_arguments():
+        if module:
+            import_module(module)
         # A first one without arguments tells which there are.
         plain = gym.make_vec(env_id, num_envs=1) if env_args else None
         if plain is not None:
             if isinstance(plain.unwrapped, ControlVectorEnv):
                 _check_names(env_id, plain.unwrapped.system_type, env_args)
             plain.close()
+        if gym.spec(name).vector_entry_point is None:
+            return WaitingVectorEnv.make(name, num_envs, **env_args)
         return gym.make_vec(env_id, num_envs=num_envs, **env_args)
 
 

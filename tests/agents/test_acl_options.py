@@ -266,6 +266,8 @@ def test_the_time_limit_of_the_environment_is_t() -> None:
     assert ACL(env, grid, max_steps=7).max_steps == 7
     assert ACL(chains(2), ROW).max_steps == 300
     assert ACL(None, ROW, n_actions=2).max_steps == 300
+    taxis = gym.vector.SyncVectorEnv([lambda: gym.make("Taxi-v4")] * 2)
+    assert ACL(taxis).max_steps == 200
     limited = gym.make_vec(PENDULUM, num_envs=2, max_episode_steps=120)
     pendulum_grid = Fuzzy.from_box(spaces.Box(0.0, 1.0, (2,), np.float64), 3)
     assert ACL(limited, pendulum_grid).max_steps == 120

@@ -26,7 +26,7 @@ Comparison = dict[str, Any]
 Picture = dict[str, Any]
 
 _COLUMNS = 3
-_DAMPING = LinearSegmentedColormap.from_list("damping", ["#FFFFFF", "#8A929E"])
+_DAMPING = LinearSegmentedColormap.from_list("damping", ["#FFFFFF", "#8A929E"], N=14)
 _DARK = "#B9BEC6"  # of the legend
 _GOAL = "#009E73"
 _FORCE = "#1F2A36"

@@ -18,7 +18,8 @@ PYTHON ?= $(shell for python in python3.11 python3; do \
 PIP_INSTALL := -m pip install -qq --disable-pip-version-check
 
 PRESET ?= quick
-OUT ?= results/compare
+ENV_ID ?= acl_gym/Pendulum-v0
+OUT ?=
 WORKERS ?= 2
 
 help: ## Show this list
@@ -26,7 +27,7 @@ help: ## Show this list
 		$(firstword $(MAKEFILE_LIST))
 	@echo
 	@echo "  Variables: ARGS (added to the command of compare, bench and test),"
-	@echo "  PRESET and OUT (compare), WORKERS (test), PYTHON (makes .venv)."
+	@echo "  ENV_ID, PRESET and OUT (compare), WORKERS (test), PYTHON (makes .venv)."
 
 # The stamp is renewed, and pip asked again, only when one of these two has changed.
 install: $(STAMP) ## Make .venv with the locked dependencies and this package
@@ -45,7 +46,8 @@ $(STAMP): requirements.lock pyproject.toml
 	@touch $@
 
 compare: $(STAMP) ## Train ants, Q-learning and DQN on one task and compare them
-	$(BIN)/python benchmarks/compare_acl_rl.py --preset $(PRESET) --out $(OUT) $(ARGS)
+	$(BIN)/python benchmarks/compare_acl_rl.py --env $(ENV_ID) --preset $(PRESET) \
+		$(if $(OUT),--out $(OUT)) $(ARGS)
 
 bench: $(STAMP) ## Measure the throughput of environments and kernels
 	$(BIN)/python benchmarks/throughput.py $(ARGS)

@@ -97,8 +97,14 @@ def compare(
         typer.Option(min=0, metavar="N", help="The first seed; the others follow it."),
     ] = 0,
     out: Annotated[
-        Path, typer.Option(metavar="DIR", help="Where the files go.")
-    ] = Path("results/compare"),
+        Path | None,
+        typer.Option(
+            metavar="DIR",
+            help="Where the files go.  [default: results/compare, or beside it a folder "
+            "named after the environment if that is not the first]",
+            show_default=False,
+        ),
+    ] = None,
     workers: Annotated[
         int | None,
         typer.Option(
@@ -125,6 +131,10 @@ def compare(
     _check_choice("--preset", preset, list(PRESETS))
     env = env or comparison.ENVIRONMENTS[0]
     _check_choice("--env", env, list(comparison.ENVIRONMENTS))
+    if out is None:
+        first = env == comparison.ENVIRONMENTS[0]
+        name = "" if first else f"-{comparison.short_name(env)}"
+        out = Path(f"results/compare{name}")
     names = list(COURSES[env].methods)
     if agents is not None:
         wanted = [name.strip() for name in agents.split(",") if name.strip()]

@@ -55,7 +55,7 @@ def compare(
         agents: some of the methods of the environment's course; None takes them all.
         seeds: runs of each agent; None takes the preset's number.
         directory: receives results.json, results.parquet, report.html, figures, and
-            in runs/ the result of each run.
+            in runs/, for each environment apart, the result of each run.
         first_seed: the seeds are this one and those that follow it.
         fresh: make every run anew, also those that are there.
         workers: processes; None takes one for each core.
@@ -69,7 +69,7 @@ def compare(
     methods = list(course.methods) if agents is None else list(agents)
     workers = workers or os.cpu_count() or 1
     tasks = list_tasks(course, preset, methods, range(first_seed, first_seed + count))
-    runs_directory = directory / "runs"
+    runs_directory = directory / "runs" / short_name(env_id)
     if fresh:
         for task in tasks:
             (runs_directory / f"{task.name}.json").unlink(missing_ok=True)
@@ -83,6 +83,11 @@ def compare(
     comparison = _collect(course, preset, reference, runs)
     write_results(comparison, directory, console)
     return comparison
+
+
+def short_name(env_id: str) -> str:
+    """The name of an environment in files: Pendulum of acl_gym/Pendulum-v0."""
+    return env_id.rpartition("/")[2].rpartition("-")[0]
 
 
 def list_tasks(

@@ -192,7 +192,8 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
             last observation in `infos["final_obs"]`) or "Disabled" (the caller
             resets, `reset(options={"reset_mask": finished})`).
         render_mode: "rgb_array" lets `render` return a frame of each slot, None
-            draws nothing. For a window use `gymnasium.wrappers.vector.HumanRendering`.
+            draws nothing. For a window use `gymnasium.wrappers.vector.HumanRendering`,
+            which needs OpenCV as well (`pip install opencv-python`).
         parameters: the parameters of the system, see its class.
 
     Note:

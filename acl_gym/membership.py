@@ -13,54 +13,80 @@ IntArray = NDArray[np.int64]
 CellArray = NDArray[np.int32]
 
 
+BLOCK = 256
+"""States that `locate` takes at a time: their scratch stays in the nearest cache."""
+
+Axis = tuple[int, int, int, float, float]
+"""What `locate` knows of an axis: where its centres begin in `edges` and how many
+there are (a circular axis repeats its first centre at the end, one period on), its
+number of cells, its period (0: none), and 1 / spacing (0: irregular)."""
+
+
+MOST_WRITTEN_OUT = 16
+
+
+def written_out(size: int) -> tuple[int, ...]:
+    """A tuple of `size` zeros, for kernels with a short loop of that many rounds.
+
+    The length of a tuple belongs to its type: a kernel that is given one is compiled
+    for that number of actions, or of cells a state, with the loop written out, which
+    halves its time. Longer loops than `MOST_WRITTEN_OUT` get an empty tuple and stay
+    loops.
+    """
+    return (0,) * size if size <= MOST_WRITTEN_OUT else ()
+
+
 @njit(cache=True, error_model="numpy")
 def locate_on_axis(
-    x: float, edges: FloatArray, first: int, count: int, period: float, rate: float
-) -> tuple[int, float]:
-    """Find the interval of `x` between centres, and how far along it x lies.
+    x: FloatArray,
+    edges: FloatArray,
+    period: float,
+    rate: float,
+    low: CellArray,
+    fraction: FloatArray,
+) -> None:
+    """Find the interval of each x between centres, and how far along it x lies.
+
+    x lies between centres `low` and `low` + 1, and the membership (4.7) is 1 -
+    `fraction` to the former, `fraction` to the latter. Outside the centres the
+    fraction saturates at 0 or 1. Short loops one after the other: all but the last
+    are vectorised.
 
     Args:
-        x: one state variable, finite.
-        edges: the centres of all axes in a row; this axis owns
-            `edges[first : first + count]`. A circular axis repeats its first centre
-            at the end, one period on.
-        first: see `edges`.
-        count: see `edges`.
+        x: values of one state variable, finite, `(m,)`; changed into values between
+            the outermost centres.
+        edges: the centres of the axis.
         period: of a circular axis, 0 for any other.
         rate: 1 / spacing of a regular axis, 0 for an irregular one.
-
-    Returns:
-        `(i, fraction)`: x lies between centres i and i + 1, and the membership (4.7)
-        is 1 - fraction to the former, fraction to the latter. Outside the centres
-        the fraction saturates at 0 or 1.
+        low: receives the intervals, `(>= m,)`.
+        fraction: receives the fractions, `(>= m,)`.
     """
-    if count == 1:
-        return 0, 0.0
+    first, last = edges[0], edges.size - 2
+    if last < 0:
+        low[: x.size] = 0
+        fraction[: x.size] = 0.0
+        return
     if period > 0.0:
-        turns = np.floor((x - edges[first]) / period)
-        x -= period * turns
-    last = count - 2
-    if x <= edges[first]:
-        return 0, 0.0
-    if x >= edges[first + count - 1]:
-        return last, 1.0
+        for i in range(x.size):
+            x[i] -= period * np.floor((x[i] - first) / period)
+    for i in range(x.size):
+        x[i] = min(max(x[i], first), edges[edges.size - 1])
     if rate > 0.0:
         # On a regular axis the interval is known but for the rounding of the guess.
-        low = min(int((x - edges[first]) * rate), last)
-        while x < edges[first + low]:
-            low -= 1
-        while x >= edges[first + low + 1]:
-            low += 1
+        for i in range(x.size):
+            low[i] = np.int32(min((x[i] - first) * rate, float(last)))
     else:
-        low, high = 0, count - 1
-        while high - low > 1:
-            middle = (low + high) // 2
-            if x < edges[first + middle]:
-                high = middle
-            else:
-                low = middle
-    left = edges[first + low]
-    return low, (x - left) / (edges[first + low + 1] - left)
+        for i in range(x.size):
+            low[i] = min(np.searchsorted(edges, x[i], side="right") - 1, last)
+    for i in range(x.size):
+        interval = low[i]
+        while x[i] < edges[interval]:
+            interval -= 1
+        while x[i] >= edges[interval + 1] and interval < last:
+            interval += 1
+        left = edges[interval]
+        low[i] = interval
+        fraction[i] = (x[i] - left) / (edges[interval + 1] - left)
 
 
 @njit(cache=True, error_model="numpy")
@@ -68,44 +94,53 @@ def locate(
     states: FloatArray,
     slots: IntArray,
     edges: FloatArray,
-    first: IntArray,
-    count: IntArray,
-    cells: IntArray,
-    periods: FloatArray,
-    rates: FloatArray,
+    axes: tuple[Axis, ...],
     fuzzy: bool,
     index: CellArray,
     degree: FloatArray,
 ) -> int:
-    """Fill rows of `index` and `degree`; return a slot that is not finite, or -1."""
-    dimensions = cells.size
-    for j in range(slots.size):
-        slot = slots[j]
-        index[j, 0] = 0
-        degree[j, 0] = 1.0
-        corners = 1
-        for axis in range(dimensions):
-            x = states[slot, axis]
-            if not np.isfinite(x):
-                return int(slot)
-            low, fraction = locate_on_axis(
-                x, edges, first[axis], count[axis], periods[axis], rates[axis]
-            )
-            n = cells[axis]
-            # A circular axis ends where it begins; one cell alone is its own end.
-            high = (low + 1) % n
-            if not fuzzy:
-                index[j, 0] = index[j, 0] * n + (high if fraction >= 0.5 else low)
-                continue
-            # Each corner splits in two along this axis: product of memberships (4.8).
-            for c in range(corners - 1, -1, -1):
-                cell = index[j, c] * n
-                weight = degree[j, c]
-                index[j, 2 * c] = cell + low
-                degree[j, 2 * c] = weight * (1.0 - fraction)
-                index[j, 2 * c + 1] = cell + high
-                degree[j, 2 * c + 1] = weight * fraction
-            corners *= 2
+    """Fill rows of `index` and `degree`; return a slot that is not finite, or -1.
+
+    `axes` is a tuple, so that their number is known when the kernel is compiled and
+    the loops over the corners of a cell are written out.
+    """
+    x = np.empty(BLOCK)
+    low = np.empty((len(axes), BLOCK), np.int32)
+    fraction = np.empty((len(axes), BLOCK))
+    for start in range(0, slots.size, BLOCK):
+        size = min(BLOCK, slots.size - start)
+        for a in range(len(axes)):
+            first, count, _, period, rate = axes[a]
+            finite = True
+            for i in range(size):
+                x[i] = states[slots[start + i], a]
+                finite &= np.isfinite(x[i])
+            if not finite:
+                return int(slots[start + np.argmin(np.isfinite(x[:size]))])
+            own_edges = edges[first : first + count]
+            locate_on_axis(x[:size], own_edges, period, rate, low[a], fraction[a])
+        for i in range(size):
+            j = start + i
+            index[j, 0] = 0
+            degree[j, 0] = 1.0
+            corners = 1
+            for a in range(len(axes)):
+                cells = axes[a][2]
+                below, share = low[a, i], fraction[a, i]
+                # A circular axis ends where it begins; one cell alone is its own end.
+                above = below + 1 if below + 1 < cells else 0
+                if not fuzzy:
+                    nearest = above if share >= 0.5 else below
+                    index[j, 0] = index[j, 0] * cells + nearest
+                    continue
+                # Each corner splits in two along this axis: the product (4.8).
+                for c in range(corners - 1, -1, -1):
+                    cell, weight = index[j, c] * cells, degree[j, c]
+                    index[j, 2 * c] = cell + below
+                    degree[j, 2 * c] = weight * (1.0 - share)
+                    index[j, 2 * c + 1] = cell + above
+                    degree[j, 2 * c + 1] = weight * share
+                corners *= 2
     return -1
 
 

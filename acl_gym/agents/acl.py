@@ -13,9 +13,10 @@ from numba import njit
 from numpy.typing import ArrayLike
 
 from acl_gym import validation
-from acl_gym.agents.pheromone import BoolArray, Pheromone, Solutions
+from acl_gym.agents.pheromone import BoolArray, Pheromone
 from acl_gym.agents.policy import SoftPolicy
 from acl_gym.agents.selection import RULES, choose_actions
+from acl_gym.agents.solutions import Solutions
 from acl_gym.agents.tabular import TabularAgent
 from acl_gym.agents.training import Training
 from acl_gym.agents.walk import Walk
@@ -184,7 +185,7 @@ class ACL(TabularAgent):
                     allowed = self._allowed(walk, solutions, index)
                     actions = self._choose(index, degree, epsilon, self.rng, allowed)
                     # 10: add the pairs to the partial solutions
-                    solutions.append(ants, index, degree, actions)
+                    solutions.append(ants, observation, index, actions)
                     # 11, 13-16: apply the actions; who is at the goal leaves C
                     observation = walk.step(actions).observation
                     # 12: local pheromone update (4.12)
@@ -368,8 +369,8 @@ class ACL(TabularAgent):
     def _empty_solutions(self) -> Solutions:
         """Memory for a trial, the same for one after the other."""
         kept, shape = self._solutions, (self.num_envs, self.max_steps)
-        if kept is None or kept.action.shape != shape:
-            kept = Solutions(*shape, self.partition.cells_per_state)
+        if kept is None or (kept.n_ants, kept.max_steps) != shape:
+            kept = Solutions(*shape, self.n_actions, self.partition)
             self._solutions = kept
         kept.clear()
         return kept

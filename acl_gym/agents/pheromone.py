@@ -6,70 +6,10 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from acl_gym.membership import CellArray, FloatArray, IntArray
+from acl_gym.agents.solutions import ActionArray, Solutions
+from acl_gym.membership import CellArray, FloatArray, IntArray, written_out
 
-ActionArray = NDArray[np.int32]
 BoolArray = NDArray[np.bool_]
-
-
-class Solutions:
-    """The multiset S_trial: what every ant did in one trial.
-
-    Memory is reserved for `max_steps` steps but touched only as far as ants walk.
-
-    Args:
-        n_ants: M.
-        max_steps: T.
-        cells_per_state: k.
-    """
-
-    def __init__(self, n_ants: int, max_steps: int, cells_per_state: int) -> None:
-        shape = (n_ants, max_steps, cells_per_state)
-        self.index: CellArray = np.empty(shape, dtype=np.int32)
-        self.degree: FloatArray = np.empty(shape)
-        self.action: ActionArray = np.empty(shape[:2], dtype=np.int32)
-        self.length: IntArray = np.zeros(n_ants, dtype=np.int64)
-
-    def clear(self) -> None:
-        """Forget all solutions."""
-        self.length[:] = 0
-
-    def untried(
-        self, ants: IntArray, index: CellArray, allowed: BoolArray
-    ) -> BoolArray:
-        """The tabu list of §3.4.2: no action twice from the same state in a trial.
-
-        Each ant's own partial solution is its list, so that none has to be kept. An
-        ant that has tried all that is allowed may choose from all of it again (a
-        decision; the thesis is silent).
-
-        Args:
-            ants: who chooses, `(m,)`.
-            index: their cells, `(m, 1)`.
-            allowed: the actions they may take, `(m, n_actions)`.
-
-        Returns:
-            Those of `allowed` that the ant has not taken from its cell, `(m,
-            n_actions)`.
-        """
-        left = allowed.copy()
-        _strike_tried(ants, index, self.index, self.action, self.length, allowed, left)
-        return left
-
-    def append(
-        self, ants: IntArray, index: CellArray, degree: FloatArray, actions: IntArray
-    ) -> None:
-        """Add one state-action pair to the solution of each of `ants`, shape `(m,)`."""
-        _append(
-            ants,
-            index,
-            degree,
-            actions,
-            self.index,
-            self.degree,
-            self.action,
-            self.length,
-        )
 
 
 class Pheromone:
@@ -91,16 +31,18 @@ class Pheromone:
 
     def __init__(self, n_cells: int, n_actions: int, tau0: float, alpha: float) -> None:
         self.tau0 = tau0
+        self.n_actions = n_actions
         self._alpha = alpha
         self.levels: FloatArray = np.full((n_cells, n_actions), tau0)
         self.probabilities: FloatArray = np.empty_like(self.levels)
         self.stale: BoolArray = np.ones(n_cells, dtype=np.bool_)
-        # Scratch of the global update: zero between calls.
-        self._own: FloatArray = np.zeros(self.levels.size)
-        self._deposit: FloatArray = np.zeros(self.levels.size)
-        self._union: FloatArray = np.zeros(self.levels.size)
-        self._touched: IntArray = np.empty(self.levels.size, dtype=np.int64)
-        self._touched_by_ant: IntArray = np.empty(self.levels.size, dtype=np.int64)
+        # Scratch of the global update: zero between calls. Union and sum of a pair
+        # lie side by side, as they are used together.
+        pairs = self.levels.size
+        self._own: FloatArray = np.zeros(pairs)
+        self._sums: FloatArray = np.zeros((pairs, 2))
+        self._touched: IntArray = np.empty(pairs + 1, dtype=np.int64)
+        self._touched_by_ant: IntArray = np.empty(pairs + 1, dtype=np.int64)
 
     @property
     def alpha(self) -> float:
@@ -137,7 +79,14 @@ class Pheromone:
         """
         if local_decay > 0.0:
             _decay(
-                index, degree, actions, local_decay, self.tau0, self.levels, self.stale
+                index,
+                degree,
+                written_out(index.shape[1]),
+                actions,
+                local_decay,
+                self.tau0,
+                self.levels,
+                self.stale,
             )
 
     def global_update(
@@ -167,72 +116,36 @@ class Pheromone:
                 "deposits must be > 0 and their sum finite, got "
                 f"{deposits[ant]} for ant {ant}; scale the cost, or check the deposit."
             )
-        _deposit(
-            solutions.index,
-            solutions.degree,
-            solutions.action,
-            solutions.length,
-            deposits,
+        n_touched = 0
+        for block in solutions.blocks():
+            n_touched = _sum_deposits(
+                block.index,
+                block.degree,
+                written_out(block.index.shape[1]),
+                block.action,
+                block.ends,
+                deposits[block.ants],
+                self._own,
+                self._sums,
+                self._touched,
+                n_touched,
+                self._touched_by_ant,
+                self.n_actions,
+            )
+        _reinforce(
+            self._touched[:n_touched],
+            self._sums,
             global_decay,
             self.levels,
             self.stale,
-            self._own,
-            self._deposit,
-            self._union,
-            self._touched,
-            self._touched_by_ant,
         )
-
-
-@njit(cache=True)
-def _strike_tried(
-    ants: IntArray,
-    index: CellArray,
-    all_index: CellArray,
-    all_action: ActionArray,
-    length: IntArray,
-    allowed: BoolArray,
-    left: BoolArray,
-) -> None:
-    for j in range(ants.size):
-        ant = ants[j]
-        count = allowed[j].sum()
-        for t in range(length[ant]):
-            u = all_action[ant, t]
-            if all_index[ant, t, 0] == index[j, 0] and left[j, u]:
-                left[j, u] = False
-                count -= 1
-                if count == 0:
-                    # Begin the list of this cell anew: what follows counts again.
-                    left[j] = allowed[j]
-                    count = allowed[j].sum()
-
-
-@njit(cache=True)
-def _append(
-    ants: IntArray,
-    index: CellArray,
-    degree: FloatArray,
-    actions: IntArray,
-    all_index: CellArray,
-    all_degree: FloatArray,
-    all_action: ActionArray,
-    length: IntArray,
-) -> None:
-    for j in range(ants.size):
-        ant = ants[j]
-        t = length[ant]
-        for c in range(index.shape[1]):
-            all_index[ant, t, c] = index[j, c]
-            all_degree[ant, t, c] = degree[j, c]
-        all_action[ant, t] = actions[j]
-        length[ant] = t + 1
 
 
 @njit(cache=True)
 def _decay(
     index: CellArray,
     degree: FloatArray,
+    corners: tuple[int, ...],
     actions: IntArray,
     local_decay: float,
     tau0: float,
@@ -240,10 +153,10 @@ def _decay(
     stale: BoolArray,
 ) -> None:
     for j in range(actions.size):
-        action = actions[j]
-        for c in range(index.shape[1]):
+        action = np.uint64(actions[j])
+        for c in range(len(corners) or index.shape[1]):
             if degree[j, c] > 0.0:
-                cell = index[j, c]
+                cell = np.uint64(index[j, c])
                 # (4.17): written around tau0, a level at tau0 stays there exactly.
                 excess = levels[cell, action] - tau0
                 levels[cell, action] = (
@@ -253,48 +166,78 @@ def _decay(
 
 
 @njit(cache=True)
-def _deposit(
+def _sum_deposits(
     index: CellArray,
     degree: FloatArray,
+    corners: tuple[int, ...],
     action: ActionArray,
-    length: IntArray,
+    ends: IntArray,
     laid: FloatArray,
+    own: FloatArray,
+    sums: FloatArray,
+    touched: IntArray,
+    n_touched: int,
+    touched_by_ant: IntArray,
+    n_actions: int,
+) -> int:
+    """The sums of (4.14) and (4.15) over some ants and the pairs that they visited.
+
+    The lists of pairs are written without a branch, always one place beyond their
+    end, which the processor could not guess.
+
+    Args:
+        index: cells, the rows of one ant after those of the other, `(r, k)`.
+        degree: degrees, `(r, k)`.
+        corners: k, written out.
+        action: actions, `(r,)`.
+        ends: where the rows of each ant end, `(b,)`.
+        laid: what each ant lays, `(b,)`.
+        own: scratch, zero before and after: the union (4.13) of one ant, by pair.
+        sums: by pair, the union over ants (4.14) and the sum of deposits; added to.
+        touched: the pairs visited so far by any ant; added to.
+        n_touched: their number.
+        touched_by_ant: scratch for those of one ant.
+        n_actions: columns of the table.
+
+    Returns:
+        The number of `touched` pairs.
+    """
+    row = 0
+    for ant in range(ends.size):
+        n_own = 0
+        while row < ends[ant]:
+            for c in range(len(corners) or index.shape[1]):
+                cell, weight = np.uint64(index[row, c]), degree[row, c]
+                pair = cell * np.uint64(n_actions) + np.uint64(action[row])
+                before = own[pair]
+                touched_by_ant[np.uint64(n_own)] = pair
+                n_own += (before == 0.0) & (weight > 0.0)
+                own[pair] = max(before, weight)
+            row += 1
+        for i in range(n_own):
+            pair = np.uint64(touched_by_ant[i])
+            before = sums[pair, 0]
+            touched[np.uint64(n_touched)] = pair
+            n_touched += before == 0.0
+            sums[pair, 0] = max(before, own[pair])
+            sums[pair, 1] += laid[ant] * own[pair]
+            own[pair] = 0.0
+    return n_touched
+
+
+@njit(cache=True)
+def _reinforce(
+    touched: IntArray,
+    sums: FloatArray,
     global_decay: float,
     levels: FloatArray,
     stale: BoolArray,
-    own: FloatArray,
-    deposit: FloatArray,
-    union: FloatArray,
-    touched: IntArray,
-    touched_by_ant: IntArray,
 ) -> None:
-    """(4.13)-(4.15) over the touched pairs only; leaves the scratch arrays zero."""
+    """(4.15) on the touched pairs; leaves `sums` zero."""
     n_actions = levels.shape[1]
-    n_touched = 0
-    for ant in range(length.size):
-        n_own = 0
-        for t in range(length[ant]):
-            for c in range(index.shape[2]):
-                weight = degree[ant, t, c]
-                if weight > 0.0:
-                    pair = index[ant, t, c] * n_actions + action[ant, t]
-                    if own[pair] == 0.0:
-                        touched_by_ant[n_own] = pair
-                        n_own += 1
-                    own[pair] = max(own[pair], weight)
-        for i in range(n_own):
-            pair = touched_by_ant[i]
-            if union[pair] == 0.0:
-                touched[n_touched] = pair
-                n_touched += 1
-            union[pair] = max(union[pair], own[pair])
-            deposit[pair] += laid[ant] * own[pair]
-            own[pair] = 0.0
-    for i in range(n_touched):
-        pair = touched[i]
+    for pair in touched:
         cell, u = pair // n_actions, pair % n_actions
-        kept = (1.0 - global_decay * union[pair]) * levels[cell, u]
-        levels[cell, u] = kept + global_decay * deposit[pair]
+        kept = (1.0 - global_decay * sums[pair, 0]) * levels[cell, u]
+        levels[cell, u] = kept + global_decay * sums[pair, 1]
         stale[cell] = True
-        union[pair] = 0.0
-        deposit[pair] = 0.0
+        sums[pair] = 0.0

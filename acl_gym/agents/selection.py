@@ -10,7 +10,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from acl_gym.agents.pheromone import BoolArray, Pheromone
-from acl_gym.membership import CellArray, FloatArray, IntArray
+from acl_gym.membership import CellArray, FloatArray, IntArray, written_out
 
 RULES = ("boltzmann", "epsilon_greedy", "max_boltzmann")
 
@@ -65,6 +65,8 @@ def choose_actions(
         choice,
         epsilon if rule == "max_boltzmann" else 0.0,
         ALL if allowed is None else allowed,
+        written_out(pheromone.n_actions),
+        written_out(index.shape[1]),
         actions,
     )
     return actions
@@ -166,12 +168,16 @@ def mark_greedy(
         greedy[j] = value >= best_value(table, index, degree, j, allowed)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", inline="always")
 def _repair(
-    levels: FloatArray, alpha: float, cell: int, probabilities: FloatArray
+    levels: FloatArray,
+    alpha: float,
+    cell: int,
+    columns: tuple[int, ...],
+    probabilities: FloatArray,
 ) -> None:
     """Compute one row of (4.3). Levels are scaled by the largest: no underflow."""
-    n_actions = levels.shape[1]
+    n_actions = len(columns) or levels.shape[1]
     largest = levels[cell, 0]
     for u in range(1, n_actions):
         largest = max(largest, levels[cell, u])
@@ -257,33 +263,40 @@ def _boltzmann(
     choice: FloatArray,
     epsilon: float,
     allowed: BoolArray,
+    columns: tuple[int, ...],
+    corners: tuple[int, ...],
     actions: IntArray,
 ) -> None:
-    n_actions = levels.shape[1]
+    n_actions = len(columns) or levels.shape[1]
+    if allowed.size > 0:
+        for j in range(actions.size):
+            if coin[j] < epsilon:
+                actions[j] = _any_action(choice[j], j, n_actions, allowed)
+            else:
+                actions[j] = _boltzmann_allowed(
+                    levels, alpha, index[j], degree[j], allowed[j], choice[j]
+                )
+        return
     for j in range(actions.size):
-        if coin[j] < epsilon:
-            actions[j] = _any_action(choice[j], j, n_actions, allowed)
-            continue
-        if allowed.size > 0:
-            actions[j] = _boltzmann_allowed(
-                levels, alpha, index[j], degree[j], allowed[j], choice[j]
-            )
-            continue
-        for c in range(index.shape[1]):
-            cell = index[j, c]
+        for c in range(len(corners) or index.shape[1]):
+            cell = np.uint64(index[j, c])
             if stale[cell]:
-                _repair(levels, alpha, cell, probabilities)
+                _repair(levels, alpha, cell, columns, probabilities)
                 stale[cell] = False
+    for j in range(actions.size):
         # Invert the distribution (4.11). Rounding may leave its sum below 1, so the
-        # last action takes what is left.
+        # last action takes what is left. Counting the sums that are passed needs no
+        # branch, where the processor would guess wrong every other time.
         cumulated = 0.0
-        action = n_actions - 1
+        action = 0
         for u in range(n_actions - 1):
-            cumulated += _value(probabilities, index[j], degree[j], u)
-            if choice[j] < cumulated:
-                action = u
-                break
-        actions[j] = action
+            value = 0.0
+            for c in range(len(corners) or index.shape[1]):
+                value += degree[j, c] * probabilities[np.uint64(index[j, c]), u]
+            cumulated += value
+            action += choice[j] >= cumulated
+        explored = int(choice[j] * n_actions)
+        actions[j] = explored if coin[j] < epsilon else action
 
 
 @njit(cache=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
+import numpy as np
 from numba import njit, types
 from numba.extending import intrinsic, overload
 
@@ -21,9 +22,10 @@ def sine(x: float) -> float:
     The argument is reduced to [-pi/2, pi/2], where the Taylor series through r^19
     leaves 3e-16. Valid for |x| < 1e5; a test holds it to 1e-15 there for |x| < 100.
     """
-    turns = math.floor(x * (1.0 / math.pi) + 0.5)
+    # Numba's math.floor returns an integer, a conversion that is not vectorised.
+    turns = np.floor(x * (1.0 / math.pi) + 0.5)
     r = (x - turns * _PI_HIGH) - turns * _PI_LOW
-    sign = 1.0 - 2.0 * (turns - 2.0 * math.floor(0.5 * turns))
+    sign = 1.0 - 2.0 * (turns - 2.0 * np.floor(0.5 * turns))
     s = r * r
     series = -8.22063524662433e-18
     series = series * s + 2.8114572543455206e-15

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from acl_gym import validation
 from acl_gym.envs.control_env import ControlEnv, ControlVectorEnv
-from acl_gym.envs.navigation_kernels import Peak, Row, integrate, settle
+from acl_gym.envs.navigation_kernels import Peak, Row, advance
 from acl_gym.envs.system import BoolArray, ControlSystem, FloatArray, IntArray
 
 
@@ -122,6 +122,29 @@ class Navigation(ControlSystem):
         ) or ((0.0, 0.0, 0.0, 1.0, 1.0),)
 
     @cached_property
+    def _dynamics(self) -> tuple[Any, ...]:
+        """The parameters of `integrate`."""
+        return (
+            self._acceleration,
+            self.base_damping / self.mass,
+            self._kernel_peaks,
+            self.sampling_time / self.substeps,
+            int(self.substeps),
+        )
+
+    @cached_property
+    def _goal_and_cost(self) -> tuple[Any, ...]:
+        """The parameters of `settle`."""
+        return (
+            float(self.position_max),
+            float(self.velocity_max),
+            self._stage_weight,
+            self._action_cost,
+            self.goal_rule == "membership",
+            *map(float, self._goal),
+        )
+
+    @cached_property
     def _stage_weight(self) -> tuple[Any, ...]:
         """Q of the stage cost: that of time spent does not depend on the state."""
         if self.cost == "time":
@@ -222,34 +245,7 @@ class Navigation(ControlSystem):
         reached: BoolArray,
     ) -> None:
         """One sampling time of §4.5.1; see `ControlSystem.advance`."""
-        c1, v1, c2, v2 = states
-        integrate(
-            c1,
-            v1,
-            c2,
-            v2,
-            actions,
-            self._acceleration,
-            self.base_damping / self.mass,
-            self._kernel_peaks,
-            self.sampling_time / self.substeps,
-            self.substeps,
-        )
-        settle(
-            c1,
-            v1,
-            c2,
-            v2,
-            actions,
-            self.position_max,
-            self.velocity_max,
-            self._stage_weight,
-            self._action_cost,
-            self.goal_rule == "membership",
-            *self._goal,
-            rewards,
-            reached,
-        )
+        advance(states, actions, self._dynamics, self._goal_and_cost, rewards, reached)
 
     def evaluation_states(self) -> FloatArray:
         """The Halton points 1 to 100 in bases 2, 3, 5 and 7, stretched to X.

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from numba import njit
 
 from acl_gym.envs.fast_math import exponential
@@ -119,3 +121,18 @@ def settle(
             # Not `and`: a branch here would keep the loop from being vectorised.
             near = max(x1, x2) <= goal_position
             reached[i] = near & (max(s1, s2) <= goal_velocity)
+
+
+@njit(cache=True)
+def advance(
+    states: FloatArray,
+    actions: IntArray,
+    dynamics: tuple[Any, ...],
+    goal_and_cost: tuple[Any, ...],
+    rewards: FloatArray,
+    reached: BoolArray,
+) -> None:
+    """One sampling time of all slots, `states` of shape (4, n) changed in place."""
+    c1, v1, c2, v2 = states[0], states[1], states[2], states[3]
+    integrate(c1, v1, c2, v2, actions, *dynamics)
+    settle(c1, v1, c2, v2, actions, *goal_and_cost, rewards, reached)

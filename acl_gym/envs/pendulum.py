@@ -72,7 +72,7 @@ def _settle(
 ) -> None:
     """Bring the next states into X; reward (5.4) and goal test on them, in place."""
     for i in range(theta.size):
-        angle = theta[i] - TWO_PI * math.floor(theta[i] / TWO_PI)
+        angle = theta[i] - TWO_PI * np.floor(theta[i] / TWO_PI)
         # A tiny negative angle rounds to 2 pi itself, which is the state 0.
         angle = 0.0 if angle >= TWO_PI else angle
         speed = min(max(omega[i], -omega_max), omega_max)
@@ -84,7 +84,23 @@ def _settle(
             + cost_omega * speed * speed
             + cost_action[action[i]]
         )
-        reached[i] = abs(error) <= bound_theta and abs(speed) <= bound_omega
+        # Not `and`: a branch here would keep the loop from being vectorised.
+        near = abs(error) <= bound_theta
+        reached[i] = near & (abs(speed) <= bound_omega)
+
+
+@njit(cache=True)
+def _advance(
+    states: FloatArray,
+    actions: IntArray,
+    dynamics: tuple[Any, ...],
+    goal_and_cost: tuple[Any, ...],
+    rewards: FloatArray,
+    reached: BoolArray,
+) -> None:
+    theta, omega = states[0], states[1]
+    _integrate(theta, omega, actions, *dynamics)
+    _settle(theta, omega, actions, *goal_and_cost, rewards, reached)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -158,14 +174,28 @@ class Pendulum(ControlSystem):
         self._check_step()
 
     @cached_property
-    def _acceleration(self) -> FloatArray:
-        """K_m u / J of each action, rad / s^2."""
-        return self.motor_gain / self.inertia * np.array(self.torques)
+    def _dynamics(self) -> tuple[Any, ...]:
+        """The parameters of `_integrate`: accelerations K_m u / J in rad / s^2, ..."""
+        return (
+            self.motor_gain / self.inertia * np.array(self.torques),
+            self.mass * self.gravity * self.length / self.inertia,
+            self.damping / self.inertia,
+            self.sampling_time / self.substeps,
+            int(self.substeps),
+        )
 
     @cached_property
-    def _torque_cost(self) -> FloatArray:
-        """R u^2 of each action."""
-        return self.torque_weight * np.square(self.torques)
+    def _goal_and_cost(self) -> tuple[Any, ...]:
+        """The parameters of `_settle`: bounds, Q, R u^2 of each action, the goal."""
+        (cost_theta, cost_cross), (_, cost_omega) = self.state_weight
+        return (
+            float(self.omega_max),
+            float(cost_theta),
+            float(cost_cross),
+            float(cost_omega),
+            self.torque_weight * np.square(self.torques),
+            *map(float, self.goal_bounds),
+        )
 
     @property
     def observation_space(self) -> spaces.Box:
@@ -236,30 +266,8 @@ class Pendulum(ControlSystem):
         reached: BoolArray,
     ) -> None:
         """One sampling time of (5.1); see `ControlSystem.advance`."""
-        theta, omega = states
-        _integrate(
-            theta,
-            omega,
-            actions,
-            self._acceleration,
-            self.mass * self.gravity * self.length / self.inertia,
-            self.damping / self.inertia,
-            self.sampling_time / self.substeps,
-            self.substeps,
-        )
-        (cost_theta, cost_cross), (_, cost_omega) = self.state_weight
-        _settle(
-            theta,
-            omega,
-            actions,
-            self.omega_max,
-            cost_theta,
-            cost_cross,
-            cost_omega,
-            self._torque_cost,
-            *self.goal_bounds,
-            rewards,
-            reached,
+        _advance(
+            states, actions, self._dynamics, self._goal_and_cost, rewards, reached
         )
 
     def evaluation_states(self) -> FloatArray:

@@ -11,7 +11,7 @@ from gymnasium import spaces
 from numpy.typing import ArrayLike, NDArray
 
 from acl_gym import validation
-from acl_gym.membership import CellArray, FloatArray, IntArray, locate
+from acl_gym.membership import Axis, CellArray, FloatArray, IntArray, locate
 from acl_gym.partition.base import Partition
 
 
@@ -67,12 +67,13 @@ class Grid(Partition):
             for axis, period in zip(axes, lengths, strict=True)
         ]
         self._edges = np.concatenate(edges)
-        self._count = np.array([axis.size for axis in edges], dtype=np.int64)
-        self._first = np.cumsum(self._count) - self._count
-        self._period_lengths = np.array(
-            [period or 0.0 for period in lengths]
-        )  # 0: none
-        self._rates = np.array([_regular_rate(axis) for axis in edges])
+        starts = np.cumsum([0, *(axis.size for axis in edges)])
+        self._axes: tuple[Axis, ...] = tuple(
+            (int(start), axis.size, int(cells), period or 0.0, _regular_rate(axis))
+            for start, axis, cells, period in zip(
+                starts, edges, self._cells, lengths, strict=False
+            )
+        )
 
     @classmethod
     def from_box(
@@ -190,11 +191,7 @@ class Grid(Partition):
             states,
             slots,
             self._edges,
-            self._first,
-            self._count,
-            self._cells,
-            self._period_lengths,
-            self._rates,
+            self._axes,
             self.fuzzy,
             index,
             degree,

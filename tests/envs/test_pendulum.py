@@ -79,8 +79,8 @@ def test_kernels_run_the_same_without_the_compiler() -> None:
     compiled = [system.sample_states(rng, 40).copy()]
     plain = [compiled[0].copy()]
     actions = rng.integers(0, 3, 40)
-    drive = (system._acceleration, 19.62, 2.0, 0.05, 2)
-    price = (9.0, 1.0, 0.2, 0.1, system._torque_cost, 0.5, 2.0)
+    drive = (system._dynamics[0], 19.62, 2.0, 0.05, 2)
+    price = (9.0, 1.0, 0.2, 0.1, system._goal_and_cost[4], 0.5, 2.0)
     for states, integrate, settle in (
         (compiled, pendulum._integrate, pendulum._settle),
         (plain, pendulum._integrate.py_func, pendulum._settle.py_func),

@@ -272,15 +272,34 @@ def test_shortcut_of_regular_axes_is_the_search(
     gaps = np.diff(edges)
     rate = float(1.0 / gaps.mean()) if gaps.size else 0.0
     x = data.draw(reference.positions(edges))
-    for near in (x, np.nextafter(x, -np.inf), np.nextafter(x, np.inf)):
-        find = module.locate_on_axis
-        searched = find(near, edges, 0, edges.size, length, 0.0)
-        assert find(near, edges, 0, edges.size, length, rate) == searched
-        # Without the compiler it is the same.
-        assert find.py_func(near, edges, 0, edges.size, length, rate) == searched
-        # The other axes' centres stand in the same array.
-        padded = np.concatenate([[99.0, -99.0], edges, [-99.0]])
-        assert find(near, padded, 2, edges.size, length, rate) == searched
+    near = np.array([x, np.nextafter(x, -np.inf), np.nextafter(x, np.inf)])
+
+    def find(kernel: Any, rate: float) -> list[list[float]]:
+        low, fraction = np.empty(3, np.int32), np.empty(3)
+        kernel(near.copy(), edges, length, rate, low, fraction)
+        return [low.tolist(), fraction.tolist()]
+
+    searched = find(module.locate_on_axis, 0.0)
+    assert find(module.locate_on_axis, rate) == searched
+    # Without the compiler it is the same.
+    assert find(module.locate_on_axis.py_func, rate) == searched
+    assert find(module.locate_on_axis.py_func, 0.0) == searched
+
+
+@pytest.mark.parametrize("kind", [Crisp, Fuzzy])
+def test_many_states_are_located_as_one_by_one(kind: Any) -> None:
+    partition = kind(CENTRES, PERIODS)
+    states = some_states(3 * module.BLOCK + 5, 5)
+    index, degree = partition(states)
+    for row in (0, module.BLOCK - 1, module.BLOCK, 2 * module.BLOCK + 7, -1):
+        one_index, one_degree = partition(states[[row]])
+        np.testing.assert_array_equal(index[[row]], one_index)
+        np.testing.assert_array_equal(degree[[row]], one_degree)
+    for row in (3, module.BLOCK + 3, 3 * module.BLOCK + 4):
+        broken = states.copy()
+        broken[row, 1] = np.nan
+        with pytest.raises(ValueError, match=f"finite.* in row {row}"):
+            partition(broken)
 
 
 def test_nearly_regular_axes_are_searched_alike() -> None:
@@ -290,7 +309,7 @@ def test_nearly_regular_axes_are_searched_alike() -> None:
     states = np.linspace(-10.0, 10.0, 5003)[:, None]
     for kind in (Crisp, Fuzzy):
         ours, other = kind([regular]), kind([bent])
-        assert (ours._rates[0] > 0.0, other._rates[0] > 0.0) == (True, False)
+        assert (ours._axes[0][4] > 0.0, other._axes[0][4] > 0.0) == (True, False)
         beta, expected = (reference.dense(p, states) for p in (ours, other))
         same = np.abs(beta - expected).max(axis=1) < 1e-6
         # A crisp cell may change for the few states next to the moved border.
@@ -304,15 +323,7 @@ def test_kernel_runs_the_same_without_the_compiler(fuzzy: bool) -> None:
     states = some_states(12, 5)
     index = np.zeros((12, partition.cells_per_state), dtype=np.int32)
     degree = np.zeros(index.shape)
-    settings = (
-        partition._edges,
-        partition._first,
-        partition._count,
-        partition._cells,
-        partition._period_lengths,
-        partition._rates,
-        fuzzy,
-    )
+    settings = (partition._edges, partition._axes, fuzzy)
     bad = module.locate.py_func(states, np.arange(12), *settings, index, degree)
     assert bad == -1
     np.testing.assert_array_equal(index, partition(states)[0])

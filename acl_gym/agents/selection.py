@@ -5,6 +5,8 @@ All are written over `(index, degree)`: with one cell a state they are the crisp
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
@@ -172,7 +174,7 @@ def mark_greedy(
 def _repair(
     levels: FloatArray,
     alpha: float,
-    cell: int,
+    cell: Any,
     columns: tuple[int, ...],
     probabilities: FloatArray,
 ) -> None:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any, NamedTuple
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numba import njit
@@ -20,7 +21,8 @@ ROWS_PER_BLOCK = 8_192
 """State-action pairs that `Solutions.blocks` takes at a time, about half a megabyte."""
 
 
-class Block(NamedTuple):
+@dataclass(frozen=True, slots=True)
+class Block:
     """The solutions of some ants, one after the other, `r` pairs in all."""
 
     ants: slice

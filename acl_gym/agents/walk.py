@@ -157,28 +157,27 @@ class Walk:
         if self._stale is not None:
             self.env.reset(options={"reset_mask": self._stale})
             self._stale = None
-        self._actions[ants] = actions + self.first_action
+        _spread(ants, actions, self.first_action, self._actions)
         observation, reward, terminated, truncated, infos = self.env.step(self._actions)
         observation = np.asarray(observation)
         self._read_mask(infos)
         self.steps += 1
 
         m = ants.size
-        cost, reached, stopped = (
-            np.empty(m),
-            np.empty(m, np.bool_),
-            np.empty(m, np.bool_),
-        )
-        n_stopped, bad = _account(
+        cost, left = np.empty(m), np.empty(m, np.int64)
+        reached, stopped = np.empty(m, np.bool_), np.empty(m, np.bool_)
+        n_left, bad = _account(
             ants,
             np.asarray(reward, dtype=np.float64),
             np.asarray(terminated, dtype=np.bool_),
             np.asarray(truncated, dtype=np.bool_),
             self.cost,
             self.length,
+            self.success,
             cost,
             reached,
             stopped,
+            left,
         )
         if bad >= 0:
             raise ValueError(
@@ -189,8 +188,10 @@ class Walk:
             # Idle slots that finish once more are reset with the others.
             done = np.logical_or(terminated, truncated)
             self._stale = done if done.any() else None
-        if n_stopped:
-            observation = self._finish(ants, reached, stopped, observation, infos)
+        if n_left < m:
+            self.ants = left[:n_left]
+            if self._mode is AutoresetMode.SAME_STEP and not self._waits:
+                observation = self._last_seen(ants[stopped], observation, infos)
         if self.steps >= self.max_steps:
             self.ants = ants[:0]
             stopped = np.ones_like(stopped)
@@ -252,26 +253,17 @@ class Walk:
         if given is not None:
             self.action_mask |= ~np.asarray(given, dtype=np.bool_)[:, None]
 
-    def _finish(
-        self,
-        ants: IntArray,
-        reached: BoolArray,
-        stopped: BoolArray,
-        observation: NDArray[Any],
-        infos: dict[str, Any],
+    def _last_seen(
+        self, stopped: IntArray, observation: NDArray[Any], infos: dict[str, Any]
     ) -> NDArray[Any]:
-        """Take finished ants out; return observations with their last one in place."""
-        self.success[ants[reached]] = True
-        self.ants = ants[~stopped]
-        if self._mode is AutoresetMode.SAME_STEP and not self._waits:
-            observation = observation.copy()
-            for slot in ants[stopped]:
-                observation[slot] = infos["final_obs"][slot]
-            if self.action_mask is not None:
-                # The mask is that of the next episode already.
-                final = infos.get("final_info", {}).get("action_mask")
-                last = ants[stopped]
-                self.action_mask[last] = True if final is None else final[last] != 0
+        """Observations, where slots were reset at once, with their last ones."""
+        observation = observation.copy()
+        for slot in stopped:
+            observation[slot] = infos["final_obs"][slot]
+        if self.action_mask is not None:
+            # The mask is that of the next episode already.
+            final = infos.get("final_info", {}).get("action_mask")
+            self.action_mask[stopped] = True if final is None else final[stopped] != 0
         return observation
 
 
@@ -292,6 +284,15 @@ def require_vector_env(env: Any) -> None:
 
 
 @njit(cache=True)
+def _spread(
+    ants: IntArray, actions: IntArray, first_action: int, all_actions: IntArray
+) -> None:
+    """Write the actions of the walking ants into those of all slots."""
+    for j in range(ants.size):
+        all_actions[np.uint64(ants[j])] = actions[j] + first_action
+
+
+@njit(cache=True)
 def _account(
     ants: IntArray,
     reward: FloatArray,
@@ -299,9 +300,11 @@ def _account(
     truncated: BoolArray,
     total_cost: FloatArray,
     length: IntArray,
+    success: BoolArray,
     cost: FloatArray,
     reached: BoolArray,
     stopped: BoolArray,
+    left: IntArray,
 ) -> tuple[int, int]:
     """Add a step of the walking ants to their totals.
 
@@ -312,22 +315,26 @@ def _account(
         truncated: of all slots.
         total_cost: J so far of all slots, added to.
         length: steps so far of all slots, added to.
+        success: whether each slot has ended in a terminal state, added to.
         cost: receives the stage cost of each walking ant, `(m,)`.
         reached: receives whether it is in a terminal state, `(m,)`.
         stopped: receives whether its episode has ended in any way, `(m,)`.
+        left: receives the ants that walk on, `(m,)`.
 
     Returns:
-        How many ants stopped, and a slot whose reward is not finite, or -1.
+        How many ants walk on, and a slot whose reward is not finite, or -1.
     """
-    n_stopped = 0
+    n_left = 0
     for j in range(ants.size):
-        ant = ants[j]
+        ant = np.uint64(ants[j])
         if not np.isfinite(reward[ant]):
-            return n_stopped, int(ant)
+            return n_left, int(ants[j])
         cost[j] = -reward[ant]
         total_cost[ant] += cost[j]
         length[ant] += 1
+        success[ant] |= terminated[ant]
         reached[j] = terminated[ant]
-        stopped[j] = terminated[ant] or truncated[ant]
-        n_stopped += stopped[j]
-    return n_stopped, -1
+        stopped[j] = terminated[ant] | truncated[ant]
+        left[n_left] = ants[j]
+        n_left += not stopped[j]
+    return n_left, -1

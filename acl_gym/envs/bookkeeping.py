@@ -36,9 +36,10 @@ def gather_slots(
 ) -> None:
     """Copy the columns of `slots` side by side."""
     for j in range(slots.size):
-        part_actions[j] = actions[slots[j]]
+        slot = np.uint64(slots[j])  # unsigned: no check for indices from the end
+        part_actions[j] = actions[slot]
         for row in range(states.shape[0]):
-            part[row, j] = states[row, slots[j]]
+            part[row, j] = states[row, slot]
 
 
 @njit(cache=True)
@@ -53,16 +54,58 @@ def put_slots_back(
     rewards: FloatArray,
     terminated: BoolArray,
     truncated: BoolArray,
-) -> None:
-    """Undo `gather_slots` after a step, and count it; `limit` 0 means none."""
+) -> int:
+    """Undo `gather_slots` after a step, and count it; `limit` 0 means none.
+
+    Returns how many slots have finished.
+    """
+    n_finished = 0
     for j in range(slots.size):
-        slot = slots[j]
+        slot = np.uint64(slots[j])
         for row in range(states.shape[0]):
             states[row, slot] = part[row, j]
         steps[slot] += 1
         rewards[slot] = part_rewards[j]
         terminated[slot] = part_reached[j]
-        truncated[slot] = limit > 0 and steps[slot] >= limit
+        truncated[slot] = (limit > 0) & (steps[slot] >= limit)
+        n_finished += terminated[slot] | truncated[slot]
+    return n_finished
+
+
+@njit(cache=True)
+def count_step(
+    limit: int, steps: IntArray, terminated: BoolArray, truncated: BoolArray
+) -> int:
+    """Count a step of every slot; return how many have finished."""
+    n_finished = 0
+    for slot in range(steps.size):
+        steps[slot] += 1
+        truncated[slot] = (limit > 0) & (steps[slot] >= limit)
+        n_finished += terminated[slot] | truncated[slot]
+    return n_finished
+
+
+@njit(cache=True)
+def finish(
+    terminated: BoolArray, truncated: BoolArray, finished: BoolArray
+) -> IntArray:
+    """Note who has finished now in `finished`; return the slots that have not."""
+    walking = np.empty(finished.size, np.int64)
+    n_walking = 0
+    for slot in range(finished.size):
+        finished[slot] |= terminated[slot] | truncated[slot]
+        walking[n_walking] = slot
+        n_walking += not finished[slot]
+    return walking[:n_walking]
+
+
+@njit(cache=True)
+def first_beyond(actions: IntArray, n_actions: int) -> int:
+    """The first slot whose action is not in 0..n_actions - 1, or -1."""
+    for slot in range(actions.size):
+        if not 0 <= actions[slot] < n_actions:
+            return slot
+    return -1
 
 
 def draw_uniforms(
@@ -86,12 +129,13 @@ def checked_actions(actions: ArrayLike, count: int, n_actions: int) -> IntArray:
         raise ValueError(
             f"actions must have shape ({count},), one a slot, got {array.shape}."
         )
+    if array.dtype == np.uint64:  # beyond int64 they would come out as negative
+        array = np.minimum(array, np.uint64(n_actions))
     checked = array.astype(np.int64)
-    # As unsigned numbers, negative actions are huge: one pass checks both ends.
-    if checked.view(np.uint64).max() >= n_actions:
-        slot = int(checked.view(np.uint64).argmax())
+    slot = first_beyond(checked, n_actions)
+    if slot >= 0:
         raise ValueError(
-            f"actions must lie in 0..{n_actions - 1}, got {checked[slot]} "
+            f"actions must lie in 0..{n_actions - 1}, got {np.asarray(actions)[slot]} "
             f"in slot {slot}."
         )
     return checked

@@ -24,8 +24,10 @@ from acl_gym.envs.bookkeeping import (
     checked_options,
     checked_render_mode,
     checked_reset_mask,
+    count_step,
     draw_uniforms,
     final_infos,
+    finish,
     gather_slots,
     put_slots_back,
 )
@@ -315,30 +317,29 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
         rewards = np.zeros(self.num_envs)
         terminated = np.zeros(self.num_envs, dtype=np.bool_)
         truncated = np.zeros(self.num_envs, dtype=np.bool_)
+        n_finished = 0
         if self._walking is None:
             self._advance(self._state, checked, rewards, terminated)
-            self._steps += 1
-            if self.max_episode_steps is not None:
-                np.greater_equal(self._steps, self.max_episode_steps, out=truncated)
+            limit = self.max_episode_steps or 0
+            n_finished = count_step(limit, self._steps, terminated, truncated)
         elif self._walking.size:
-            self._advance_walking(
+            n_finished = self._advance_walking(
                 self._walking, checked, rewards, terminated, truncated
             )
         if restarting is not None:
             self._start(restarting, None)
 
         last: dict[str, Any] = {}
-        finished = terminated | truncated
-        if finished.any():
+        if n_finished:
             if (
                 self.autoreset_mode is AutoresetMode.SAME_STEP
                 and not self._wait_when_finished
             ):
+                finished = terminated | truncated
                 last = final_infos(self._observe(), finished, self._infos())
                 self._start(np.flatnonzero(finished), None)
             else:
-                self._finished |= finished
-                self._walking = np.flatnonzero(~self._finished)
+                self._walking = finish(terminated, truncated, self._finished)
         infos = {**last, **self._infos()}
         return self._observe(), rewards, terminated, truncated, infos
 
@@ -415,15 +416,18 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
         rewards: FloatArray,
         terminated: BoolArray,
         truncated: BoolArray,
-    ) -> None:
-        """Advance some slots only: gather them, run the kernel, put them back."""
+    ) -> int:
+        """Advance some slots only: gather them, run the kernel, put them back.
+
+        Returns how many have finished.
+        """
         m = walking.size
         states, part = self._states, np.empty((self._states.shape[0], m))
         part_actions = np.empty(m, dtype=np.int64)
         part_rewards, part_reached = np.empty(m), np.empty(m, dtype=np.bool_)
         gather_slots(walking, states, actions, part, part_actions)
         self._advance(part, part_actions, part_rewards, part_reached)
-        put_slots_back(
+        n_finished: int = put_slots_back(
             walking,
             part,
             part_rewards,
@@ -435,6 +439,7 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
             terminated,
             truncated,
         )
+        return n_finished
 
     def _start(self, slots: IntArray, states: FloatArray | None) -> None:
         """Put `slots` at the given `(state_size, n)` states, or at random ones."""

@@ -134,5 +134,22 @@ def advance(
 ) -> None:
     """One sampling time of all slots, `states` of shape (4, n) changed in place."""
     c1, v1, c2, v2 = states[0], states[1], states[2], states[3]
-    integrate(c1, v1, c2, v2, actions, *dynamics)
-    settle(c1, v1, c2, v2, actions, *goal_and_cost, rewards, reached)
+    push, base, peaks, step, substeps = dynamics
+    integrate(c1, v1, c2, v2, actions, push, base, peaks, step, substeps)
+    x_max, v_max, weight, price, product, goal_x, goal_v = goal_and_cost
+    settle(
+        c1,
+        v1,
+        c2,
+        v2,
+        actions,
+        x_max,
+        v_max,
+        weight,
+        price,
+        product,
+        goal_x,
+        goal_v,
+        rewards,
+        reached,
+    )

@@ -99,8 +99,23 @@ def _advance(
     reached: BoolArray,
 ) -> None:
     theta, omega = states[0], states[1]
-    _integrate(theta, omega, actions, *dynamics)
-    _settle(theta, omega, actions, *goal_and_cost, rewards, reached)
+    push, stiffness, friction, step, substeps = dynamics
+    _integrate(theta, omega, actions, push, stiffness, friction, step, substeps)
+    omega_max, q1, q12, q2, price, bound_1, bound_2 = goal_and_cost
+    _settle(
+        theta,
+        omega,
+        actions,
+        omega_max,
+        q1,
+        q12,
+        q2,
+        price,
+        bound_1,
+        bound_2,
+        rewards,
+        reached,
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -266,9 +281,7 @@ class Pendulum(ControlSystem):
         reached: BoolArray,
     ) -> None:
         """One sampling time of (5.1); see `ControlSystem.advance`."""
-        _advance(
-            states, actions, self._dynamics, self._goal_and_cost, rewards, reached
-        )
+        _advance(states, actions, self._dynamics, self._goal_and_cost, rewards, reached)
 
     def evaluation_states(self) -> FloatArray:
         """100 states: theta_i = 2 pi i / 10 + 0.01, omega_j over 10 values to the ends.

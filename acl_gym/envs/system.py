@@ -111,7 +111,10 @@ class ControlSystem(ABC):
 
     def observe(self, states: FloatArray) -> NDArray[Any]:
         """Return what is seen of `states` `(state_size, n)`: a new array `(n, ...)`."""
-        return states.T.copy()
+        seen = np.empty(states.shape[::-1])
+        for variable, row in enumerate(states):  # quicker than copying the transpose
+            seen[:, variable] = row
+        return seen
 
     def action_mask(self, states: FloatArray) -> BoolArray | None:
         """Return U_q of (3.4): which actions each of `states` offers.

@@ -11,8 +11,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from acl_gym.agents import pheromone as module
-from acl_gym.agents.pheromone import Pheromone, Solutions, _strike_tried
+from acl_gym.agents.pheromone import Pheromone
+from acl_gym.agents.solutions import Solutions, _strike_tried
+from acl_gym.membership import written_out
 from tests.agents import reference_colony as reference
+from tests.agents.listed import recorded
 
 Array = np.ndarray
 
@@ -49,16 +52,14 @@ class Trial:
 
     def packed(self, order: Array | None = None) -> Solutions:
         """Record the steps as the colony does, all walking ants at once."""
-        n, steps, k = self.index.shape
-        order = np.arange(n) if order is None else order
-        solutions = Solutions(n, steps, k)
-        for t in range(steps):
-            ants = np.flatnonzero(self.length[order] > t)
-            rows = order[ants]
-            solutions.append(
-                ants, self.index[rows, t], self.degree[rows, t], self.action[rows, t]
-            )
-        return solutions
+        order = np.arange(len(self.length)) if order is None else order
+        return recorded(
+            self.index[order],
+            self.degree[order],
+            self.action[order],
+            self.length[order],
+            self.tau.shape[1],
+        )
 
     def deposit(self, order: Array | None = None) -> None:
         order = np.arange(len(self.length)) if order is None else order
@@ -217,9 +218,8 @@ def test_levels_stay_above_tau0(trial: Trial, rounds: int, share: float) -> None
 def test_levels_fall_below_a_tau0_that_exceeds_every_deposit() -> None:
     """What the bound is for: with tau0 = 2 / J one deposit lowers the level."""
     pheromone = Pheromone(1, 1, tau0=2 / 10.0, alpha=1.0)
-    solutions = Solutions(1, 1, 1)
-    one = np.zeros((1, 1), dtype=np.int32)
-    solutions.append(np.array([0]), one, np.ones((1, 1)), np.array([0]))
+    one = np.zeros((1, 1, 1), dtype=np.int32)
+    solutions = recorded(one, np.ones((1, 1, 1)), np.array([[0]]))
     pheromone.global_update(solutions, np.array([0.1]), 0.5)
     assert pheromone.levels[0, 0] == pytest.approx(0.5 * 2 / 10 + 0.5 / 10)
     assert pheromone.levels[0, 0] < pheromone.tau0
@@ -236,11 +236,9 @@ def test_a_level_at_tau0_stays_exactly_there() -> None:
 def test_a_pair_counts_once_with_its_largest_degree() -> None:
     """(4.13): three visits with degrees 0.2, 0.9, 0.5 deposit 0.9 / J."""
     pheromone = Pheromone(2, 2, tau0=1.0, alpha=1.0)
-    solutions = Solutions(1, 3, 2)
-    index = np.array([[0, 1]], dtype=np.int32)
-    for weight in (0.2, 0.9, 0.5):
-        degree = np.array([[weight, 1 - weight]])
-        solutions.append(np.array([0]), index, degree, np.array([1]))
+    index = np.array([[[0, 1]] * 3])
+    degree = np.array([[[d, 1 - d] for d in (0.2, 0.9, 0.5)]])
+    solutions = recorded(index, degree, np.ones((1, 3), dtype=np.int64))
     pheromone.global_update(solutions, np.array([0.25]), 0.1)
     expected = np.ones((2, 2))
     expected[:, 1] = [(1 - 0.1 * d) + 0.1 * d / 4 for d in (0.9, 0.8)]
@@ -250,10 +248,9 @@ def test_a_pair_counts_once_with_its_largest_degree() -> None:
 def test_the_decay_of_a_deposit_weighs_with_the_largest_degree_of_all_ants() -> None:
     """(4.14), (4.15): deposits add up, the decay does not."""
     pheromone = Pheromone(2, 1, tau0=1.0, alpha=1.0)
-    solutions = Solutions(2, 1, 2)
-    index = np.array([[0, 1], [1, 0]], dtype=np.int32)
-    degree = np.array([[0.25, 0.75], [0.5, 0.5]])
-    solutions.append(np.array([0, 1]), index, degree, np.array([0, 0]))
+    index = np.array([[[0, 1]], [[1, 0]]])
+    degree = np.array([[[0.25, 0.75]], [[0.5, 0.5]]])
+    solutions = recorded(index, degree, np.zeros((2, 1), dtype=np.int64))
     pheromone.global_update(solutions, np.array([0.5, 0.2]), 0.2)
     expected = [
         (1 - 0.2 * 0.5) + 0.2 * (0.25 / 2 + 0.5 / 5),
@@ -282,9 +279,8 @@ def test_scratch_and_solutions_leave_nothing_behind(trial: Trial) -> None:
 @pytest.mark.parametrize("deposit", [0.0, -0.0, -3.5, np.nan, np.inf, -np.inf])
 def test_a_deposit_that_is_none_is_refused(deposit: float) -> None:
     pheromone = Pheromone(2, 2, tau0=0.5, alpha=1.0)
-    solutions = Solutions(3, 1, 1)
-    index = np.zeros((3, 1), dtype=np.int32)
-    solutions.append(np.arange(3), index, np.ones((3, 1)), np.zeros(3, dtype=np.int64))
+    ones = np.ones((3, 1, 1))
+    solutions = recorded(0 * ones, ones, np.zeros((3, 1), dtype=np.int64))
     with pytest.raises(ValueError, match=r"> 0 and their sum finite.*ant 1") as error:
         pheromone.global_update(solutions, np.array([1.0, deposit, 2.0]), 0.1)
     assert f"got {deposit} " in str(error.value)
@@ -293,15 +289,9 @@ def test_a_deposit_that_is_none_is_refused(deposit: float) -> None:
 
 def walked(pairs: list[tuple[int, int]]) -> Solutions:
     """The solution of one ant: cells and actions."""
-    solutions = Solutions(1, max(len(pairs), 1), 1)
-    for cell, action in pairs:
-        solutions.append(
-            np.array([0]),
-            np.array([[cell]], dtype=np.int32),
-            np.ones((1, 1)),
-            np.array([action]),
-        )
-    return solutions
+    cells, actions = np.array(pairs or [(0, 0)]).T
+    index = cells[None, :, None]
+    return recorded(index, np.ones(index.shape), actions[None], np.array([len(pairs)]))
 
 
 Pairs = st.lists(st.tuples(st.integers(0, 2), st.integers(0, 2)), max_size=20)
@@ -324,63 +314,61 @@ def test_the_tabu_list_is_that_of_a_list_per_state(
     np.testing.assert_array_equal(allowed[0], mask)  # untouched
     plain = allowed.copy()
     solutions = walked(pairs)
-    _strike_tried.py_func(
-        one,
-        np.array([[cell]]),
-        solutions.index,
-        solutions.action,
-        solutions.length,
-        allowed,
-        plain,
-    )
+    if pairs:
+        _strike_tried.py_func(
+            one,
+            np.array([[cell]]),
+            solutions._rows,
+            solutions.action,
+            solutions.length,
+            allowed,
+            plain,
+        )
     np.testing.assert_array_equal(plain, untried)
 
 
 @given(trials())
 @settings(max_examples=50)
 def test_kernels_agree_with_themselves_as_plain_python(trial: Trial) -> None:
-    rows = trial.index[:, 0], trial.degree[:, 0], trial.action[:, 0]
+    index, degree, action = trial.index[:, 0], trial.degree[:, 0], trial.action[:, 0]
     levels, again = trial.tau.copy(), trial.tau.copy()
     stale, stale_again = np.zeros((2, len(levels)), dtype=bool)
-    tau0 = trial.pheromone.tau0
-    module._decay(*rows, trial.gamma, tau0, levels, stale)
-    module._decay.py_func(*rows, trial.gamma, tau0, again, stale_again)
+    corners = written_out(index.shape[1])
+    rows = index, degree, corners, action, trial.gamma, trial.pheromone.tau0
+    module._decay(*rows, levels, stale)
+    module._decay.py_func(*rows, again, stale_again)
     np.testing.assert_allclose(levels, again, rtol=1e-15)
     np.testing.assert_array_equal(stale, stale_again)
 
-    solutions, plain = trial.packed(), Solutions(*trial.index.shape)
-    plain.index[:], plain.degree[:], plain.action[:] = 0, 0.0, 0
-    for t in range(trial.length.max()):
-        ants = np.flatnonzero(trial.length > t)
-        module._append.py_func(
-            ants,
-            trial.index[ants, t],
-            trial.degree[ants, t],
-            trial.action[ants, t],
-            plain.index,
-            plain.degree,
-            plain.action,
-            plain.length,
-        )
-    np.testing.assert_array_equal(solutions.length, plain.length)
-    for kernel, table, flags, record in (
-        (module._deposit, levels, stale, solutions),
-        (module._deposit.py_func, again, stale_again, plain),
+    (block,) = trial.packed().blocks()
+    n_touched = []
+    for name, table, flags in (
+        ("__call__", levels, stale),
+        ("py_func", again, stale_again),
     ):
-        scratch = np.zeros((3, table.size))
-        kernel(
-            record.index,
-            record.degree,
-            record.action,
-            record.length,
-            1.0 / trial.costs,
-            trial.rho,
-            table,
-            flags,
-            *scratch,
-            *np.empty((2, table.size), dtype=np.int64),
+        own, sums = np.zeros(table.size), np.zeros((table.size, 2))
+        touched, by_ant = np.empty((2, table.size + 1), dtype=np.int64)
+        n_touched.append(
+            getattr(module._sum_deposits, name)(
+                block.index,
+                block.degree,
+                corners,
+                block.action,
+                block.ends,
+                1.0 / trial.costs,
+                own,
+                sums,
+                touched,
+                0,
+                by_ant,
+                table.shape[1],
+            )
         )
-        assert not scratch.any()
+        reinforce = getattr(module._reinforce, name)
+        reinforce(touched[: n_touched[-1]], sums, trial.rho, table, flags)
+        assert not own.any()
+        assert not sums.any()
+    assert n_touched[0] == n_touched[1]
     np.testing.assert_allclose(levels, again, rtol=1e-14)
     np.testing.assert_array_equal(stale, stale_again)
 
@@ -395,8 +383,7 @@ def test_every_changed_cell_becomes_stale_and_no_other() -> None:
     pheromone.local_update(index, np.array([[1.0, 0.0]]), np.array([0]), 0.1)
     assert pheromone.stale.tolist() == [False, True, False, False]
     pheromone.stale[:] = False
-    solutions = Solutions(1, 1, 2)
-    solutions.append(np.array([0]), index, np.array([[0.0, 1.0]]), np.array([1]))
+    solutions = recorded(index[None], np.array([[[0.0, 1.0]]]), np.array([[1]]))
     pheromone.global_update(solutions, np.array([1.0]), 0.5)
     assert pheromone.stale.tolist() == [False, False, False, True]
     pheromone.stale[:] = False
@@ -411,7 +398,8 @@ def test_every_changed_cell_becomes_stale_and_no_other() -> None:
 
 def test_deposits_whose_sum_overflows_are_refused() -> None:
     pheromone = Pheromone(3, 2, 1.0, 3.0)
-    solutions = Solutions(50, 1, 1)
+    ones = np.ones((50, 1, 1))
+    solutions = recorded(0 * ones, ones, np.zeros((50, 1), dtype=np.int64))
     with pytest.raises(ValueError, match="their sum finite"):
         pheromone.global_update(solutions, np.full(50, 1e307), 0.5)
     assert (pheromone.levels == 1.0).all()

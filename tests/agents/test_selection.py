@@ -9,9 +9,11 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from acl_gym.agents import policy, selection
-from acl_gym.agents.pheromone import Pheromone, Solutions
+from acl_gym.agents.pheromone import Pheromone
 from acl_gym.agents.selection import RULES, choose_actions, greedy_actions
+from acl_gym.membership import written_out
 from tests.agents import reference_colony as reference
+from tests.agents.listed import recorded
 from tests.agents.test_pheromone import degrees
 
 Array = np.ndarray
@@ -145,6 +147,8 @@ def test_the_ends_of_the_unit_interval_choose_the_first_and_last(
             *numbers,
             0.5,
             selection.ALL,
+            written_out(n_actions),
+            written_out(1),
             actions[0],
         )
         selection._epsilon_greedy(
@@ -167,7 +171,7 @@ def test_remembered_probabilities_are_never_out_of_date(
 ) -> None:
     """Whatever happened in between, what is not stale is what (4.3) gives now."""
     pheromone, index, degree, rng = colony
-    ants, k = index.shape
+    ants = len(index)
     n_cells, n_actions = pheromone.levels.shape
     for operation in [*operations, "choose"]:
         some = slice(int(rng.integers(ants)), None)
@@ -175,9 +179,11 @@ def test_remembered_probabilities_are_never_out_of_date(
         if operation == "local":
             pheromone.local_update(index[some], degree[some], actions[some], 0.3)
         elif operation == "global":
-            solutions = Solutions(ants, 1, k)
-            solutions.append(
-                np.arange(ants)[some], index[some], degree[some], actions[some]
+            solutions = recorded(
+                index[:, None],
+                degree[:, None],
+                actions[:, None],
+                (np.arange(ants) >= some.start).astype(np.int64),
             )
             pheromone.global_update(solutions, rng.uniform(1, 9, size=ants), 0.4)
         elif operation == "alpha":
@@ -320,9 +326,17 @@ def test_kernels_agree_with_themselves_as_plain_python(
         actions = np.full((3, ants), -1, dtype=np.int64)
         states = index, degree
         exploring = *states, *numbers, 0.2, allowed
-        version(selection._repair)(levels, alpha, 0, row)
+        columns, corners = written_out(n_actions), written_out(index.shape[1])
+        version(selection._repair)(levels, alpha, 0, columns, row)
         version(selection._boltzmann)(
-            levels, alpha, probabilities, stale, *exploring, actions[0]
+            levels,
+            alpha,
+            probabilities,
+            stale,
+            *exploring,
+            columns,
+            corners,
+            actions[0],
         )
         version(selection._epsilon_greedy)(levels, *exploring, actions[1])
         version(selection._greedy)(levels, ranks, *states, allowed, actions[2])

@@ -233,10 +233,13 @@ def test_the_kernel_agrees_with_itself_as_plain_python(bad: int) -> None:
     results = []
     for kernel in (_account, _account.py_func):
         totals, length = np.zeros(8), np.zeros(8, dtype=np.int64)
+        success = np.zeros(8, dtype=np.bool_)
         cost, reached, stopped = np.zeros(4), *np.zeros((2, 4), dtype=np.bool_)
-        counts = kernel(ants, reward, *flags, totals, length, cost, reached, stopped)
+        left = np.zeros(4, dtype=np.int64)
+        arrays = totals, length, success, cost, reached, stopped, left
+        counts = kernel(ants, reward, *flags, *arrays)
         assert counts[1] == bad
-        results.append((counts, totals, length, cost, reached, stopped))
+        results.append((counts, *arrays))
     for compiled, plain in zip(*results, strict=True):
         np.testing.assert_array_equal(compiled, plain)
 

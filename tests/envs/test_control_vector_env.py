@@ -274,3 +274,47 @@ def test_kernels_run_the_same_without_the_compiler() -> None:
     assert np.flatnonzero(terminated).tolist() == [3, 5]
     assert np.flatnonzero(truncated).tolist() == [0, 3, 5]
     assert not results[0][-1].any()  # limit 0 is none
+
+
+def test_counting_kernels_run_the_same_without_the_compiler() -> None:
+    terminated = np.array([False, True, False, False])
+    results = []
+    for name in ("__call__", "py_func"):
+        count, finish = (
+            getattr(kernel, name)
+            for kernel in (bookkeeping.count_step, bookkeeping.finish)
+        )
+        steps, truncated = np.array([1, 2, 3, 4]), np.zeros(4, dtype=np.bool_)
+        assert count(0, steps, terminated, truncated) == 1
+        assert not truncated.any()
+        assert count(5, steps, terminated, truncated) == 3
+        finished = np.array([False, False, False, False])
+        walking = finish(terminated, truncated, finished)
+        results.append((steps, truncated, walking, finished))
+    for ours, plain in zip(*results, strict=True):
+        assert_same_bits(ours, plain)
+    assert [array.tolist() for array in results[0]] == [
+        [3, 4, 5, 6],
+        [False, False, True, True],
+        [0],
+        [False, True, True, True],
+    ]
+
+
+@pytest.mark.parametrize(
+    ("actions", "slot", "shown"),
+    [
+        ([0, 1, 3], 2, "3"),
+        ([0, -1, 9], 1, "-1"),
+        (np.array([2**64 - 1, 0, 0], np.uint64), 0, "18446744073709551615"),
+        (np.array([0, 200, 0], np.uint8), 1, "200"),
+    ],
+)
+def test_the_first_action_out_of_range_is_named(
+    actions: Any, slot: int, shown: str
+) -> None:
+    with pytest.raises(ValueError, match=rf"0\.\.2, got {shown} in slot {slot}\."):
+        bookkeeping.checked_actions(actions, 3, 3)
+    plain = bookkeeping.first_beyond.py_func
+    assert plain(np.array([0, 2, 5, 9]), 3) == 2
+    assert plain(np.array([0, 2]), 3) == -1

@@ -54,7 +54,7 @@ def choose_actions(
         return epsilon_greedy_actions(
             pheromone.levels, index, degree, epsilon, rng, allowed
         )
-    coin, choice = rng.random((2, index.shape[0]))
+    draws = rng.random((2, index.shape[0]))
     actions = np.empty(index.shape[0], dtype=np.int64)
     _boltzmann(
         pheromone.levels,
@@ -63,8 +63,7 @@ def choose_actions(
         pheromone.stale,
         index,
         degree,
-        coin,
-        choice,
+        draws,
         epsilon if rule == "max_boltzmann" else 0.0,
         ALL if allowed is None else allowed,
         written_out(pheromone.n_actions),
@@ -83,10 +82,10 @@ def epsilon_greedy_actions(
     allowed: BoolArray | None = None,
 ) -> IntArray:
     """Rule (3.5) on any table of values; see `choose_actions`."""
-    coin, choice = rng.random((2, index.shape[0]))
+    draws = rng.random((2, index.shape[0]))
     actions = np.empty(index.shape[0], dtype=np.int64)
     any_action = ALL if allowed is None else allowed
-    _epsilon_greedy(table, index, degree, coin, choice, epsilon, any_action, actions)
+    _epsilon_greedy(table, index, degree, draws, epsilon, any_action, actions)
     return actions
 
 
@@ -261,8 +260,7 @@ def _boltzmann(
     stale: BoolArray,
     index: CellArray,
     degree: FloatArray,
-    coin: FloatArray,
-    choice: FloatArray,
+    draws: FloatArray,
     epsilon: float,
     allowed: BoolArray,
     columns: tuple[int, ...],
@@ -270,6 +268,7 @@ def _boltzmann(
     actions: IntArray,
 ) -> None:
     n_actions = len(columns) or levels.shape[1]
+    coin, choice = draws[0], draws[1]
     if allowed.size > 0:
         for j in range(actions.size):
             if coin[j] < epsilon:
@@ -306,13 +305,13 @@ def _epsilon_greedy(
     levels: FloatArray,
     index: CellArray,
     degree: FloatArray,
-    coin: FloatArray,
-    choice: FloatArray,
+    draws: FloatArray,
     epsilon: float,
     allowed: BoolArray,
     actions: IntArray,
 ) -> None:
     n_actions = levels.shape[1]
+    coin, choice = draws[0], draws[1]
     values = np.empty(n_actions)
     for j in range(actions.size):
         # Stands also where no value is a number.

@@ -194,13 +194,13 @@ def _append(
 ) -> None:
     """Add a step; `seen` has a row for each slot if `by_slot`, else for each ant."""
     for j in range(ants.size):
-        ant = ants[j]
-        t = length[ant]
-        row = ant if by_slot else j
+        ant = np.uint64(ants[j])  # unsigned: no check for indices from the end
+        t = np.uint64(length[ant])
+        row = ant if by_slot else np.uint64(j)
         for i in range(seen.shape[1]):
             all_seen[t, ant, i] = seen[row, i]
         all_action[t, ant] = actions[j]
-        length[ant] = t + 1
+        length[ant] += 1
 
 
 @njit(cache=True)
@@ -214,15 +214,14 @@ def _copy_block(
     action: ActionArray,
 ) -> None:
     """Write the steps of ants first .. last - 1 one ant after the other."""
-    longest = length[first:last].max()
-    for t in range(longest):
-        row = t
+    for t in range(length[first:last].max()):
+        row = np.uint64(t)
         for ant in range(first, last):
             if t < length[ant]:
                 for i in range(rows.shape[1]):
                     rows[row, i] = all_rows[t, ant, i]
                 action[row] = all_action[t, ant]
-            row += length[ant]
+            row += np.uint64(length[ant])
 
 
 @njit(cache=True)

@@ -87,25 +87,24 @@ def count_step(
 
 @njit(cache=True)
 def finish(
-    terminated: BoolArray, truncated: BoolArray, finished: BoolArray
-) -> IntArray:
-    """Note who has finished now in `finished`; return the slots that have not."""
-    walking = np.empty(finished.size, np.int64)
+    terminated: BoolArray, truncated: BoolArray, finished: BoolArray, walking: IntArray
+) -> int:
+    """Note who has finished now; write who walks on into `walking`, return how many."""
     n_walking = 0
     for slot in range(finished.size):
         finished[slot] |= terminated[slot] | truncated[slot]
         walking[n_walking] = slot
         n_walking += not finished[slot]
-    return walking[:n_walking]
+    return n_walking
 
 
 @njit(cache=True)
-def first_beyond(actions: IntArray, n_actions: int) -> int:
-    """The first slot whose action is not in 0..n_actions - 1, or -1."""
+def all_below(actions: IntArray, n_actions: int) -> bool:
+    """Whether all actions are in 0..n_actions - 1; no early end, so vectorised."""
+    good = True
     for slot in range(actions.size):
-        if not 0 <= actions[slot] < n_actions:
-            return slot
-    return -1
+        good &= (actions[slot] >= 0) & (actions[slot] < n_actions)
+    return good
 
 
 def draw_uniforms(
@@ -132,8 +131,8 @@ def checked_actions(actions: ArrayLike, count: int, n_actions: int) -> IntArray:
     if array.dtype == np.uint64:  # beyond int64 they would come out as negative
         array = np.minimum(array, np.uint64(n_actions))
     checked = array.astype(np.int64)
-    slot = first_beyond(checked, n_actions)
-    if slot >= 0:
+    if not all_below(checked, n_actions):
+        slot = int(np.argmax((checked < 0) | (checked >= n_actions)))
         raise ValueError(
             f"actions must lie in 0..{n_actions - 1}, got {np.asarray(actions)[slot]} "
             f"in slot {slot}."

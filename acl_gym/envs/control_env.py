@@ -339,7 +339,9 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
                 last = final_infos(self._observe(), finished, self._infos())
                 self._start(np.flatnonzero(finished), None)
             else:
-                self._walking = finish(terminated, truncated, self._finished)
+                walking = np.empty(self.num_envs, dtype=np.int64)
+                n_left = finish(terminated, truncated, self._finished, walking)
+                self._walking = walking[:n_left]
         infos = {**last, **self._infos()}
         return self._observe(), rewards, terminated, truncated, infos
 

@@ -23,7 +23,7 @@ def sine(x: float) -> float:
     leaves 3e-16. Valid for |x| < 1e5; a test holds it to 1e-15 there for |x| < 100.
     """
     # Numba's math.floor returns an integer, a conversion that is not vectorised.
-    turns = np.floor(x * (1.0 / math.pi) + 0.5)
+    turns: float = np.floor(x * (1.0 / math.pi) + 0.5)
     r = (x - turns * _PI_HIGH) - turns * _PI_LOW
     sign = 1.0 - 2.0 * (turns - 2.0 * np.floor(0.5 * turns))
     s = r * r

@@ -71,6 +71,7 @@ def _settle(
     reached: BoolArray,
 ) -> None:
     """Bring the next states into X; reward (5.4) and goal test on them, in place."""
+    price = cost_action[action]  # a look-up in the loop would keep it scalar
     for i in range(theta.size):
         angle = theta[i] - TWO_PI * np.floor(theta[i] / TWO_PI)
         # A tiny negative angle rounds to 2 pi itself, which is the state 0.
@@ -82,14 +83,14 @@ def _settle(
         rewards[i] = -(
             (cost_theta * error + 2.0 * cost_cross * speed) * error
             + cost_omega * speed * speed
-            + cost_action[action[i]]
+            + price[i]
         )
         # Not `and`: a branch here would keep the loop from being vectorised.
         near = abs(error) <= bound_theta
         reached[i] = near & (abs(speed) <= bound_omega)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _advance(
     states: FloatArray,
     actions: IntArray,

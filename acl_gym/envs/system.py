@@ -7,6 +7,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 from gymnasium import spaces
+from numba import njit
 from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
@@ -112,8 +113,7 @@ class ControlSystem(ABC):
     def observe(self, states: FloatArray) -> NDArray[Any]:
         """Return what is seen of `states` `(state_size, n)`: a new array `(n, ...)`."""
         seen = np.empty(states.shape[::-1])
-        for variable, row in enumerate(states):  # quicker than copying the transpose
-            seen[:, variable] = row
+        _transpose(states, seen)
         return seen
 
     def action_mask(self, states: FloatArray) -> BoolArray | None:
@@ -151,3 +151,11 @@ class ControlSystem(ABC):
             ValueError: the system or the table does not allow it, see `check_table`.
         """
         self.check_table(table)
+
+
+@njit(cache=True)
+def _transpose(states: FloatArray, seen: FloatArray) -> None:
+    """Several times as fast as NumPy's copy of a transpose that has few columns."""
+    for row in range(states.shape[0]):
+        for slot in range(states.shape[1]):
+            seen[slot, row] = states[row, slot]

@@ -135,7 +135,7 @@ def test_the_ends_of_the_unit_interval_choose_the_first_and_last(
     index, degree = np.zeros((1, 1), dtype=np.int32), np.ones((1, 1))
     end = 0 if choice == 0.0 else n_actions - 1
     for coin in (0.0, 0.9):  # explores, exploits
-        numbers = np.array([coin]), np.array([choice])
+        draws = np.array([[coin], [choice]])
         actions = np.full((2, 1), -1, dtype=np.int64)
         selection._boltzmann(
             levels,
@@ -144,7 +144,7 @@ def test_the_ends_of_the_unit_interval_choose_the_first_and_last(
             np.ones(1, dtype=np.bool_),
             index,
             degree,
-            *numbers,
+            draws,
             0.5,
             selection.ALL,
             written_out(n_actions),
@@ -152,7 +152,7 @@ def test_the_ends_of_the_unit_interval_choose_the_first_and_last(
             actions[0],
         )
         selection._epsilon_greedy(
-            levels, index, degree, *numbers, 0.5, selection.ALL, actions[1]
+            levels, index, degree, draws, 0.5, selection.ALL, actions[1]
         )
         assert actions.tolist() == [[end], [end]]
 
@@ -313,7 +313,7 @@ def test_kernels_agree_with_themselves_as_plain_python(
     pheromone, index, degree, rng = colony
     levels, alpha = pheromone.levels, pheromone.alpha
     ants, (n_cells, n_actions) = len(index), levels.shape
-    numbers = rng.random((2, ants))
+    draws = rng.random((2, ants))
     ranks = policy.random_ranks(n_cells, n_actions, rng)
     allowed = selection.ALL
     if restricted:
@@ -325,7 +325,7 @@ def test_kernels_agree_with_themselves_as_plain_python(
         stale = np.ones(n_cells, dtype=bool)
         actions = np.full((3, ants), -1, dtype=np.int64)
         states = index, degree
-        exploring = *states, *numbers, 0.2, allowed
+        exploring = *states, draws, 0.2, allowed
         columns, corners = written_out(n_actions), written_out(index.shape[1])
         version(selection._repair)(levels, alpha, 0, columns, row)
         version(selection._boltzmann)(

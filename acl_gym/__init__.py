@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from acl_gym.evaluation import PolicyCost, evaluate_policy_cost
     from acl_gym.partition import Crisp, Discrete, Fuzzy, Partition
     from acl_gym.partition.automatic import automatic_partition
+    from acl_gym.threads import get_num_threads, set_num_threads
 
 __version__ = "0.1.0"
 
@@ -56,6 +57,8 @@ _PUBLIC = {
     "automatic_partition": "acl_gym.partition.automatic",
     "evaluate_policy_cost": "acl_gym.evaluation",
     "fuzzy_q_iteration": "acl_gym.agents.q_iteration",
+    "get_num_threads": "acl_gym.threads",
+    "set_num_threads": "acl_gym.threads",
     "value_iteration": "acl_gym.agents.value_iteration",
 }
 
@@ -81,6 +84,8 @@ __all__ = [
     "automatic_partition",
     "evaluate_policy_cost",
     "fuzzy_q_iteration",
+    "get_num_threads",
+    "set_num_threads",
     "value_iteration",
 ]
 

@@ -89,7 +89,7 @@ def locate_on_axis(
         fraction[i] = (x[i] - left) / (edges[interval + 1] - left)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def locate(
     states: FloatArray,
     slots: IntArray,
@@ -144,7 +144,7 @@ def locate(
     return -1
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def locate_discrete(
     states: NDArray[Any],
     slots: IntArray,

@@ -24,8 +24,8 @@ class Pheromone:
     Attributes:
         levels: tau, `(n_cells, n_actions)`. Change it through `set_levels`.
         probabilities: tau^alpha / sum of tau^alpha over the actions (4.3), row by
-            row; valid where `stale` is False. Selection repairs the rows it needs,
-            so that a cell is computed once a step, however many ants are there.
+            row; valid where `stale` is False. `repair` renews the rows that are
+            needed, so that a cell is computed once a step, however many ants are there.
         stale: whether a cell's levels have changed since, `(n_cells,)`.
     """
 
@@ -59,6 +59,18 @@ class Pheromone:
         """Replace all levels."""
         self.levels[:] = levels
         self.stale[:] = True
+
+    def repair(self, index: CellArray) -> None:
+        """Renew the probabilities of those of the cells `index` that are stale."""
+        _repair(
+            self.levels,
+            self._alpha,
+            index,
+            written_out(self.n_actions),
+            written_out(index.shape[1]),
+            self.probabilities,
+            self.stale,
+        )
 
     def local_update(
         self,
@@ -139,6 +151,44 @@ class Pheromone:
             self.levels,
             self.stale,
         )
+
+
+@njit(cache=True, error_model="numpy")
+def _repair(
+    levels: FloatArray,
+    alpha: float,
+    index: CellArray,
+    columns: tuple[int, ...],
+    corners: tuple[int, ...],
+    probabilities: FloatArray,
+    stale: BoolArray,
+) -> None:
+    """Compute rows of (4.3). Levels are scaled by the largest: no underflow."""
+    n_actions = len(columns) or levels.shape[1]
+    whole = int(alpha)
+    multiply = whole == alpha and whole <= 8  # cheaper than pow
+    for j in range(index.shape[0]):
+        for c in range(len(corners) or index.shape[1]):
+            cell = np.uint64(index[j, c])  # unsigned: no check for negative indices
+            if not stale[cell]:
+                continue
+            stale[cell] = False
+            largest = levels[cell, 0]
+            for u in range(1, n_actions):
+                largest = max(largest, levels[cell, u])
+            total = 0.0
+            for u in range(n_actions):
+                ratio = levels[cell, u] / largest
+                if multiply:
+                    weight = ratio
+                    for _ in range(1, whole):
+                        weight *= ratio
+                else:
+                    weight = ratio**alpha
+                probabilities[cell, u] = weight
+                total += weight
+            for u in range(n_actions):
+                probabilities[cell, u] /= total
 
 
 @njit(cache=True)

@@ -5,12 +5,11 @@ All are written over `(index, degree)`: with one cell a state they are the crisp
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from acl_gym import threads
 from acl_gym.agents.pheromone import BoolArray, Pheromone
 from acl_gym.membership import CellArray, FloatArray, IntArray, written_out
 
@@ -56,20 +55,29 @@ def choose_actions(
         )
     draws = rng.random((2, index.shape[0]))
     actions = np.empty(index.shape[0], dtype=np.int64)
-    _boltzmann(
-        pheromone.levels,
-        pheromone.alpha,
-        pheromone.probabilities,
-        pheromone.stale,
-        index,
-        degree,
-        draws,
-        epsilon if rule == "max_boltzmann" else 0.0,
-        ALL if allowed is None else allowed,
-        written_out(pheromone.n_actions),
-        written_out(index.shape[1]),
-        actions,
-    )
+    columns, corners = written_out(pheromone.n_actions), written_out(index.shape[1])
+    if rule != "max_boltzmann":
+        epsilon = 0.0
+
+    def draw(own: slice) -> None:
+        _boltzmann(
+            pheromone.levels,
+            pheromone.alpha,
+            pheromone.probabilities,
+            index[own],
+            degree[own],
+            draws,
+            own.start or 0,
+            epsilon,
+            ALL if allowed is None else allowed[own],
+            columns,
+            corners,
+            actions[own],
+        )
+
+    if allowed is None:
+        pheromone.repair(index)
+    threads.each(draw, len(index))
     return actions
 
 
@@ -169,36 +177,6 @@ def mark_greedy(
         greedy[j] = value >= best_value(table, index, degree, j, allowed)
 
 
-@njit(cache=True, error_model="numpy", inline="always")
-def _repair(
-    levels: FloatArray,
-    alpha: float,
-    cell: Any,
-    columns: tuple[int, ...],
-    probabilities: FloatArray,
-) -> None:
-    """Compute one row of (4.3). Levels are scaled by the largest: no underflow."""
-    n_actions = len(columns) or levels.shape[1]
-    largest = levels[cell, 0]
-    for u in range(1, n_actions):
-        largest = max(largest, levels[cell, u])
-    whole = int(alpha)
-    multiply = whole == alpha and whole <= 8  # cheaper than pow
-    total = 0.0
-    for u in range(n_actions):
-        ratio = levels[cell, u] / largest
-        if multiply:
-            weight = ratio
-            for _ in range(1, whole):
-                weight *= ratio
-        else:
-            weight = ratio**alpha
-        probabilities[cell, u] = weight
-        total += weight
-    for u in range(n_actions):
-        probabilities[cell, u] /= total
-
-
 @njit(cache=True)
 def _any_action(choice: float, j: int, n_actions: int, allowed: BoolArray) -> int:
     """One of the actions that ant j may take, each as likely; choice is in [0, 1)."""
@@ -252,23 +230,24 @@ def _boltzmann_allowed(
     return action
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def _boltzmann(
     levels: FloatArray,
     alpha: float,
     probabilities: FloatArray,
-    stale: BoolArray,
     index: CellArray,
     degree: FloatArray,
     draws: FloatArray,
+    first: int,
     epsilon: float,
     allowed: BoolArray,
     columns: tuple[int, ...],
     corners: tuple[int, ...],
     actions: IntArray,
 ) -> None:
+    """Choose for ants of which ant j has the draws `first` + j."""
     n_actions = len(columns) or levels.shape[1]
-    coin, choice = draws[0], draws[1]
+    coin, choice = draws[0, first:], draws[1, first:]
     if allowed.size > 0:
         for j in range(actions.size):
             if coin[j] < epsilon:
@@ -278,12 +257,6 @@ def _boltzmann(
                     levels, alpha, index[j], degree[j], allowed[j], choice[j]
                 )
         return
-    for j in range(actions.size):
-        for c in range(len(corners) or index.shape[1]):
-            cell = np.uint64(index[j, c])
-            if stale[cell]:
-                _repair(levels, alpha, cell, columns, probabilities)
-                stale[cell] = False
     for j in range(actions.size):
         # Invert the distribution (4.11). Rounding may leave its sum below 1, so the
         # last action takes what is left. Counting the sums that are passed needs no

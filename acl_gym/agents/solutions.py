@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import cycle, pairwise
 from typing import Any
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from acl_gym import threads
 from acl_gym.membership import CellArray, FloatArray, IntArray
 from acl_gym.partition import Partition
 from acl_gym.partition.base import check_cells
@@ -35,6 +37,17 @@ class Block:
     """Actions, `(r,)`."""
     ends: IntArray
     """Where the pairs of each ant end."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Room:
+    """Scratch for a block; `all` is 0, 1, 2, ..., as many as there are rows."""
+
+    seen: NDArray[Any]
+    action: ActionArray
+    index: CellArray
+    degree: FloatArray
+    all: IntArray
 
 
 class Solutions:
@@ -72,7 +85,7 @@ class Solutions:
         # Cells or observations, step by step: what is written together lies together.
         self._rows: NDArray[Any] | None = None
         self._state_shape: tuple[int, ...] = ()
-        self._kept_scratch: Any = None
+        self._rooms: list[_Room] = []
 
     @property
     def nbytes_per_step(self) -> int:
@@ -137,49 +150,65 @@ class Solutions:
     def blocks(self) -> Iterator[Block]:
         """All solutions, ant by ant, in parts that stay in the processor's cache.
 
-        The arrays of a block are valid until the next one is asked for.
+        The arrays of a block are valid until the next one is asked for. With several
+        threads (`acl_gym.set_num_threads`) the next ones are prepared meanwhile.
         """
         rows = self._rows
         if rows is None:
             return
         ends = np.cumsum(self.length)
-        first = done = 0
-        while first < self.n_ants:
+        cuts, done = [0], 0
+        while cuts[-1] < self.n_ants:
             last = int(np.searchsorted(ends, done + ROWS_PER_BLOCK, side="right"))
-            last = max(last, first + 1)
-            size = int(ends[last - 1]) - done
-            seen, action, index, degree = self._scratch(rows, size)
-            _copy_block(first, last, rows, self.action, self.length, seen, action)
-            if self._one_cell:
-                index[:] = seen
-            else:
-                states = seen.reshape(size, *self._state_shape)
-                self.partition.locate(states, self._all_rows[:size], index, degree)
-                if not self.partition.checked:
-                    check_cells(index, self.partition)
-            yield Block(
-                slice(first, last), index, degree, action, ends[first:last] - done
-            )
-            first, done = last, done + size
+            cuts.append(max(last, cuts[-1] + 1))
+            done = int(ends[cuts[-1] - 1])
+        ants = [slice(*pair) for pair in pairwise(cuts)]
+        # While one block is used, each thread may be at work on another one.
+        rooms = self._rooms_for(rows, min(len(ants), threads.get_num_threads() + 1))
+        work = zip(ants, cycle(rooms), strict=False)
 
-    def _scratch(
-        self, rows: NDArray[Any], size: int
-    ) -> tuple[NDArray[Any], ActionArray, CellArray, FloatArray]:
-        """Room for `size` states, actions, cells and degrees, the same every time."""
-        kept = self._kept_scratch
-        if kept is None or kept[0].dtype != rows.dtype or len(kept[0]) < size:
-            most = max(ROWS_PER_BLOCK, self.max_steps)
-            k = self.partition.cells_per_state
-            kept = (
+        def block(part: tuple[slice, _Room]) -> Block:
+            return self._block(rows, ends, *part)
+
+        yield from (
+            threads.ahead(block, work) if self.partition.checked else map(block, work)
+        )
+
+    def _block(
+        self, rows: NDArray[Any], ends: IntArray, ants: slice, room: _Room
+    ) -> Block:
+        """Bring the pairs of some ants together and locate what they saw."""
+        done = int(ends[ants.start - 1]) if ants.start else 0
+        ends = ends[ants] - done
+        size = int(ends[-1])
+        seen, action = room.seen[:size], room.action[:size]
+        index, degree = room.index[:size], room.degree[:size]
+        _copy_block(ants.start, ants.stop, rows, self.action, self.length, seen, action)
+        if self._one_cell:
+            index[:] = seen
+        else:
+            states = seen.reshape(size, *self._state_shape)
+            self.partition.locate(states, room.all[:size], index, degree)
+            if not self.partition.checked:
+                check_cells(index, self.partition)
+        return Block(ants, index, degree, action, ends)
+
+    def _rooms_for(self, rows: NDArray[Any], count: int) -> list[_Room]:
+        """Scratch for `count` blocks, the same in every trial."""
+        if self._rooms and self._rooms[0].seen.dtype != rows.dtype:
+            self._rooms = []
+        most = max(ROWS_PER_BLOCK, self.max_steps)
+        k = self.partition.cells_per_state
+        while len(self._rooms) < count:
+            room = _Room(
                 np.empty((most, rows.shape[2]), dtype=rows.dtype),
                 np.empty(most, dtype=self.action.dtype),
                 np.empty((most, k), dtype=np.int32),
                 np.ones((most, k)),
+                np.arange(most),
             )
-            self._kept_scratch = kept
-            self._all_rows = np.arange(most)
-        seen, action, index, degree = kept
-        return seen[:size], action[:size], index[:size], degree[:size]
+            self._rooms.append(room)
+        return self._rooms[:count]
 
 
 @njit(cache=True)
@@ -203,7 +232,7 @@ def _append(
         length[ant] += 1
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _copy_block(
     first: int,
     last: int,

@@ -26,7 +26,7 @@ def checked_options(
     return dict(options or {})
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def gather_slots(
     slots: IntArray,
     states: FloatArray,
@@ -42,7 +42,7 @@ def gather_slots(
             part[row, j] = states[row, slot]
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def put_slots_back(
     slots: IntArray,
     part: FloatArray,

@@ -17,7 +17,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import ArrayLike, NDArray
 
-from acl_gym import validation
+from acl_gym import threads, validation
 from acl_gym.envs.bookkeeping import (
     checked_actions,
     checked_autoreset_mode,
@@ -246,6 +246,7 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
         self._finished = np.zeros(self.num_envs, dtype=np.bool_)
         self._wait_when_finished = False
         self._walking: IntArray | None = None  # slots still walking; None means all
+        self._all_slots = np.arange(self.num_envs)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -318,14 +319,25 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
         terminated = np.zeros(self.num_envs, dtype=np.bool_)
         truncated = np.zeros(self.num_envs, dtype=np.bool_)
         n_finished = 0
-        if self._walking is None:
-            self._advance(self._state, checked, rewards, terminated)
+        slots = self._all_slots if self._walking is None else self._walking
+        uniforms = draw_uniforms(self.system, self.np_random, slots.size)
+        if slots is self._all_slots and threads.parts(slots.size) == 1:
+            self.system.advance(self._state, checked, uniforms, rewards, terminated)
             limit = self.max_episode_steps or 0
             n_finished = count_step(limit, self._steps, terminated, truncated)
-        elif self._walking.size:
-            n_finished = self._advance_walking(
-                self._walking, checked, rewards, terminated, truncated
-            )
+        elif slots.size:
+
+            def advance(own: slice) -> int:
+                return self._advance_some(
+                    slots[own],
+                    checked,
+                    None if uniforms is None else uniforms[:, own],
+                    rewards,
+                    terminated,
+                    truncated,
+                )
+
+            n_finished = sum(threads.each(advance, slots.size))
         if restarting is not None:
             self._start(restarting, None)
 
@@ -401,20 +413,11 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
             )
         return np.flatnonzero(self._finished)
 
-    def _advance(
+    def _advance_some(
         self,
-        states: FloatArray,
+        slots: IntArray,
         actions: IntArray,
-        rewards: FloatArray,
-        reached: BoolArray,
-    ) -> None:
-        uniforms = draw_uniforms(self.system, self.np_random, actions.size)
-        self.system.advance(states, actions, uniforms, rewards, reached)
-
-    def _advance_walking(
-        self,
-        walking: IntArray,
-        actions: IntArray,
+        uniforms: FloatArray | None,
         rewards: FloatArray,
         terminated: BoolArray,
         truncated: BoolArray,
@@ -423,14 +426,14 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
 
         Returns how many have finished.
         """
-        m = walking.size
+        m = slots.size
         states, part = self._states, np.empty((self._states.shape[0], m))
         part_actions = np.empty(m, dtype=np.int64)
         part_rewards, part_reached = np.empty(m), np.empty(m, dtype=np.bool_)
-        gather_slots(walking, states, actions, part, part_actions)
-        self._advance(part, part_actions, part_rewards, part_reached)
+        gather_slots(slots, states, actions, part, part_actions)
+        self.system.advance(part, part_actions, uniforms, part_rewards, part_reached)
         n_finished: int = put_slots_back(
-            walking,
+            slots,
             part,
             part_rewards,
             part_reached,

@@ -25,7 +25,7 @@ def sine(x: float) -> float:
     # Numba's math.floor returns an integer, a conversion that is not vectorised.
     turns: float = np.floor(x * (1.0 / math.pi) + 0.5)
     r = (x - turns * _PI_HIGH) - turns * _PI_LOW
-    sign = 1.0 - 2.0 * (turns - 2.0 * np.floor(0.5 * turns))
+    sign: float = 1.0 - 2.0 * (turns - 2.0 * np.floor(0.5 * turns))
     s = r * r
     series = -8.22063524662433e-18
     series = series * s + 2.8114572543455206e-15

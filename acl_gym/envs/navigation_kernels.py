@@ -123,7 +123,7 @@ def settle(
             reached[i] = near & (max(s1, s2) <= goal_velocity)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def advance(
     states: FloatArray,
     actions: IntArray,

@@ -90,7 +90,7 @@ def _settle(
         reached[i] = near & (abs(speed) <= bound_omega)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def _advance(
     states: FloatArray,
     actions: IntArray,

@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
+from acl_gym.agents import pheromone as pheromone_module
 from acl_gym.agents import policy, selection
 from acl_gym.agents.pheromone import Pheromone
 from acl_gym.agents.selection import RULES, choose_actions, greedy_actions
@@ -140,11 +141,11 @@ def test_the_ends_of_the_unit_interval_choose_the_first_and_last(
         selection._boltzmann(
             levels,
             3.0,
-            np.empty_like(levels),
-            np.ones(1, dtype=np.bool_),
+            np.full(levels.shape, 1 / n_actions),
             index,
             degree,
             draws,
+            0,
             0.5,
             selection.ALL,
             written_out(n_actions),
@@ -321,25 +322,31 @@ def test_kernels_agree_with_themselves_as_plain_python(
         allowed[:, 0] = True
     results = []
     for version in (lambda kernel: kernel, lambda kernel: kernel.py_func):
-        probabilities, row = np.empty_like(levels), np.empty_like(levels)
+        probabilities = np.empty_like(levels)
         stale = np.ones(n_cells, dtype=bool)
         actions = np.full((3, ants), -1, dtype=np.int64)
         states = index, degree
-        exploring = *states, draws, 0.2, allowed
         columns, corners = written_out(n_actions), written_out(index.shape[1])
-        version(selection._repair)(levels, alpha, 0, columns, row)
+        version(pheromone_module._repair)(
+            levels, alpha, index, columns, corners, probabilities, stale
+        )
         version(selection._boltzmann)(
             levels,
             alpha,
             probabilities,
-            stale,
-            *exploring,
+            *states,
+            draws,
+            0,
+            0.2,
+            allowed,
             columns,
             corners,
             actions[0],
         )
-        version(selection._epsilon_greedy)(levels, *exploring, actions[1])
+        version(selection._epsilon_greedy)(
+            levels, *states, draws, 0.2, allowed, actions[1]
+        )
         version(selection._greedy)(levels, ranks, *states, allowed, actions[2])
-        results.append((row[0], probabilities[~stale], actions))
+        results.append((probabilities[~stale], actions))
     for compiled, plain in zip(*results, strict=True):
         np.testing.assert_allclose(compiled, plain, rtol=1e-13, atol=1e-300)

@@ -16,11 +16,16 @@ CellArray = NDArray[np.int32]
 BLOCK = 256
 """States that `locate` takes at a time: their scratch stays in the nearest cache."""
 
-Axis = tuple[int, int, int, float, float]
-"""What `locate` knows of an axis: where its centres begin in `edges` and how many
+Axes = tuple[
+    tuple[int, ...],
+    tuple[int, ...],
+    tuple[int, ...],
+    tuple[float, ...],
+    tuple[float, ...],
+]
+"""What `locate` knows of each axis: where its centres begin in `edges` and how many
 there are (a circular axis repeats its first centre at the end, one period on), its
 number of cells, its period (0: none), and 1 / spacing (0: irregular)."""
-
 
 MOST_WRITTEN_OUT = 16
 
@@ -89,62 +94,80 @@ def locate_on_axis(
         fraction[i] = (x[i] - left) / (edges[interval + 1] - left)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, error_model="numpy")
+def locate_block(
+    states: FloatArray,
+    slots: IntArray,
+    edges: FloatArray,
+    axes: Axes,
+    fuzzy: bool,
+    index: CellArray,
+    degree: FloatArray,
+    block: int,
+) -> int:
+    """Do what `locate` does for the `BLOCK` slots from `block` * `BLOCK` on."""
+    start = block * BLOCK
+    size = min(BLOCK, slots.size - start)
+    first, count, cells, period, rate = axes
+    x = np.empty(size)
+    low = np.empty((len(cells), size), np.int32)
+    fraction = np.empty((len(cells), size))
+    for a in range(len(cells)):
+        finite = True
+        for i in range(size):
+            x[i] = states[slots[start + i], a]
+            finite &= np.isfinite(x[i])
+        if not finite:
+            return int(slots[start + np.argmin(np.isfinite(x))])
+        own_edges = edges[first[a] : first[a] + count[a]]
+        locate_on_axis(x, own_edges, period[a], rate[a], low[a], fraction[a])
+    for i in range(size):
+        j = start + i
+        index[j, 0] = 0
+        degree[j, 0] = 1.0
+        corners = 1
+        for a in range(len(cells)):
+            below, share = low[a, i], fraction[a, i]
+            # A circular axis ends where it begins; one cell alone is its own end.
+            above = below + 1 if below + 1 < cells[a] else 0
+            if not fuzzy:
+                nearest = above if share >= 0.5 else below
+                index[j, 0] = index[j, 0] * cells[a] + nearest
+                continue
+            # Each corner splits in two along this axis: the product (4.8).
+            for c in range(corners - 1, -1, -1):
+                cell, weight = index[j, c] * cells[a], degree[j, c]
+                index[j, 2 * c] = cell + below
+                degree[j, 2 * c] = weight * (1.0 - share)
+                index[j, 2 * c + 1] = cell + above
+                degree[j, 2 * c + 1] = weight * share
+            corners *= 2
+    return -1
+
+
+@njit(cache=True, error_model="numpy")
 def locate(
     states: FloatArray,
     slots: IntArray,
     edges: FloatArray,
-    axes: tuple[Axis, ...],
+    axes: Axes,
     fuzzy: bool,
     index: CellArray,
     degree: FloatArray,
 ) -> int:
     """Fill rows of `index` and `degree`; return a slot that is not finite, or -1.
 
-    `axes` is a tuple, so that their number is known when the kernel is compiled and
-    the loops over the corners of a cell are written out.
+    `axes` holds tuples, so that the number of axes is known when the kernel is compiled
+    and the loops over the corners of a cell are written out.
     """
-    x = np.empty(BLOCK)
-    low = np.empty((len(axes), BLOCK), np.int32)
-    fraction = np.empty((len(axes), BLOCK))
-    for start in range(0, slots.size, BLOCK):
-        size = min(BLOCK, slots.size - start)
-        for a in range(len(axes)):
-            first, count, _, period, rate = axes[a]
-            finite = True
-            for i in range(size):
-                x[i] = states[slots[start + i], a]
-                finite &= np.isfinite(x[i])
-            if not finite:
-                return int(slots[start + np.argmin(np.isfinite(x[:size]))])
-            own_edges = edges[first : first + count]
-            locate_on_axis(x[:size], own_edges, period, rate, low[a], fraction[a])
-        for i in range(size):
-            j = start + i
-            index[j, 0] = 0
-            degree[j, 0] = 1.0
-            corners = 1
-            for a in range(len(axes)):
-                cells = axes[a][2]
-                below, share = low[a, i], fraction[a, i]
-                # A circular axis ends where it begins; one cell alone is its own end.
-                above = below + 1 if below + 1 < cells else 0
-                if not fuzzy:
-                    nearest = above if share >= 0.5 else below
-                    index[j, 0] = index[j, 0] * cells + nearest
-                    continue
-                # Each corner splits in two along this axis: the product (4.8).
-                for c in range(corners - 1, -1, -1):
-                    cell, weight = index[j, c] * cells, degree[j, c]
-                    index[j, 2 * c] = cell + below
-                    degree[j, 2 * c] = weight * (1.0 - share)
-                    index[j, 2 * c + 1] = cell + above
-                    degree[j, 2 * c + 1] = weight * share
-                corners *= 2
+    for block in range((slots.size + BLOCK - 1) // BLOCK):
+        bad = locate_block(states, slots, edges, axes, fuzzy, index, degree, block)
+        if bad >= 0:
+            return bad
     return -1
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True)
 def locate_discrete(
     states: NDArray[Any],
     slots: IntArray,

@@ -59,25 +59,26 @@ def choose_actions(
     if rule != "max_boltzmann":
         epsilon = 0.0
 
-    def draw(own: slice) -> None:
-        _boltzmann(
-            pheromone.levels,
-            pheromone.alpha,
-            pheromone.probabilities,
-            index[own],
-            degree[own],
-            draws,
-            own.start or 0,
-            epsilon,
-            ALL if allowed is None else allowed[own],
-            columns,
-            corners,
-            actions[own],
-        )
-
     if allowed is None:
         pheromone.repair(index)
-    threads.each(draw, len(index))
+    draw = _boltzmann
+    if threads.worth_it(len(index)):
+        from acl_gym import in_threads
+
+        draw = in_threads.boltzmann
+    draw(
+        pheromone.levels,
+        pheromone.alpha,
+        pheromone.probabilities,
+        index,
+        degree,
+        draws,
+        epsilon,
+        ALL if allowed is None else allowed,
+        columns,
+        corners,
+        actions,
+    )
     return actions
 
 
@@ -230,7 +231,45 @@ def _boltzmann_allowed(
     return action
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", inline="always")
+def draw_action(
+    levels: FloatArray,
+    alpha: float,
+    probabilities: FloatArray,
+    index: CellArray,
+    degree: FloatArray,
+    draws: FloatArray,
+    epsilon: float,
+    allowed: BoolArray,
+    columns: tuple[int, ...],
+    corners: tuple[int, ...],
+    j: int,
+) -> int:
+    """The action of ant j, for kernels; see `_boltzmann`."""
+    n_actions = len(columns) or levels.shape[1]
+    coin, choice = draws[0, j], draws[1, j]
+    if allowed.size > 0:
+        if coin < epsilon:
+            return _any_action(choice, j, n_actions, allowed)
+        return _boltzmann_allowed(
+            levels, alpha, index[j], degree[j], allowed[j], choice
+        )
+    # Invert the distribution (4.11). Rounding may leave its sum below 1, so the last
+    # action takes what is left. Counting the sums that are passed needs no branch,
+    # where the processor would guess wrong every other time.
+    cumulated = 0.0
+    action = 0
+    for u in range(n_actions - 1):
+        value = 0.0
+        for c in range(len(corners) or index.shape[1]):
+            value += degree[j, c] * probabilities[np.uint64(index[j, c]), u]
+        cumulated += value
+        action += choice >= cumulated
+    explored = int(choice * n_actions)
+    return explored if coin < epsilon else action
+
+
+@njit(cache=True, error_model="numpy")
 def _boltzmann(
     levels: FloatArray,
     alpha: float,
@@ -238,39 +277,26 @@ def _boltzmann(
     index: CellArray,
     degree: FloatArray,
     draws: FloatArray,
-    first: int,
     epsilon: float,
     allowed: BoolArray,
     columns: tuple[int, ...],
     corners: tuple[int, ...],
     actions: IntArray,
 ) -> None:
-    """Choose for ants of which ant j has the draws `first` + j."""
-    n_actions = len(columns) or levels.shape[1]
-    coin, choice = draws[0, first:], draws[1, first:]
-    if allowed.size > 0:
-        for j in range(actions.size):
-            if coin[j] < epsilon:
-                actions[j] = _any_action(choice[j], j, n_actions, allowed)
-            else:
-                actions[j] = _boltzmann_allowed(
-                    levels, alpha, index[j], degree[j], allowed[j], choice[j]
-                )
-        return
     for j in range(actions.size):
-        # Invert the distribution (4.11). Rounding may leave its sum below 1, so the
-        # last action takes what is left. Counting the sums that are passed needs no
-        # branch, where the processor would guess wrong every other time.
-        cumulated = 0.0
-        action = 0
-        for u in range(n_actions - 1):
-            value = 0.0
-            for c in range(len(corners) or index.shape[1]):
-                value += degree[j, c] * probabilities[np.uint64(index[j, c]), u]
-            cumulated += value
-            action += choice[j] >= cumulated
-        explored = int(choice[j] * n_actions)
-        actions[j] = explored if coin[j] < epsilon else action
+        actions[j] = draw_action(
+            levels,
+            alpha,
+            probabilities,
+            index,
+            degree,
+            draws,
+            epsilon,
+            allowed,
+            columns,
+            corners,
+            j,
+        )
 
 
 @njit(cache=True)

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import cycle, pairwise
 from typing import Any
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from acl_gym import threads
 from acl_gym.membership import CellArray, FloatArray, IntArray
 from acl_gym.partition import Partition
 from acl_gym.partition.base import check_cells
@@ -21,6 +19,8 @@ BoolArray = NDArray[np.bool_]
 
 ROWS_PER_BLOCK = 8_192
 """State-action pairs that `Solutions.blocks` takes at a time, about half a megabyte."""
+
+STEPS_AT_A_TIME = 32
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,7 +85,7 @@ class Solutions:
         # Cells or observations, step by step: what is written together lies together.
         self._rows: NDArray[Any] | None = None
         self._state_shape: tuple[int, ...] = ()
-        self._rooms: list[_Room] = []
+        self._room: _Room | None = None
 
     @property
     def nbytes_per_step(self) -> int:
@@ -150,56 +150,38 @@ class Solutions:
     def blocks(self) -> Iterator[Block]:
         """All solutions, ant by ant, in parts that stay in the processor's cache.
 
-        The arrays of a block are valid until the next one is asked for. With several
-        threads (`acl_gym.set_num_threads`) the next ones are prepared meanwhile.
+        The arrays of a block are valid until the next one is asked for.
         """
         rows = self._rows
         if rows is None:
             return
+        room = self._room_for(rows)
         ends = np.cumsum(self.length)
-        cuts, done = [0], 0
-        while cuts[-1] < self.n_ants:
+        first = done = 0
+        while first < self.n_ants:
             last = int(np.searchsorted(ends, done + ROWS_PER_BLOCK, side="right"))
-            cuts.append(max(last, cuts[-1] + 1))
-            done = int(ends[cuts[-1] - 1])
-        ants = [slice(*pair) for pair in pairwise(cuts)]
-        # While one block is used, each thread may be at work on another one.
-        rooms = self._rooms_for(rows, min(len(ants), threads.get_num_threads() + 1))
-        work = zip(ants, cycle(rooms), strict=False)
+            last = max(last, first + 1)
+            size = int(ends[last - 1]) - done
+            seen, action = room.seen[:size], room.action[:size]
+            index, degree = room.index[:size], room.degree[:size]
+            _copy_block(first, last, rows, self.action, self.length, seen, action)
+            if self._one_cell:
+                index[:] = seen
+            else:
+                states = seen.reshape(size, *self._state_shape)
+                self.partition.locate(states, room.all[:size], index, degree)
+                if not self.partition.checked:
+                    check_cells(index, self.partition)
+            ants = slice(first, last)
+            yield Block(ants, index, degree, action, ends[ants] - done)
+            first, done = last, done + size
 
-        def block(part: tuple[slice, _Room]) -> Block:
-            return self._block(rows, ends, *part)
-
-        yield from (
-            threads.ahead(block, work) if self.partition.checked else map(block, work)
-        )
-
-    def _block(
-        self, rows: NDArray[Any], ends: IntArray, ants: slice, room: _Room
-    ) -> Block:
-        """Bring the pairs of some ants together and locate what they saw."""
-        done = int(ends[ants.start - 1]) if ants.start else 0
-        ends = ends[ants] - done
-        size = int(ends[-1])
-        seen, action = room.seen[:size], room.action[:size]
-        index, degree = room.index[:size], room.degree[:size]
-        _copy_block(ants.start, ants.stop, rows, self.action, self.length, seen, action)
-        if self._one_cell:
-            index[:] = seen
-        else:
-            states = seen.reshape(size, *self._state_shape)
-            self.partition.locate(states, room.all[:size], index, degree)
-            if not self.partition.checked:
-                check_cells(index, self.partition)
-        return Block(ants, index, degree, action, ends)
-
-    def _rooms_for(self, rows: NDArray[Any], count: int) -> list[_Room]:
-        """Scratch for `count` blocks, the same in every trial."""
-        if self._rooms and self._rooms[0].seen.dtype != rows.dtype:
-            self._rooms = []
-        most = max(ROWS_PER_BLOCK, self.max_steps)
-        k = self.partition.cells_per_state
-        while len(self._rooms) < count:
+    def _room_for(self, rows: NDArray[Any]) -> _Room:
+        """Scratch for a block, the same in every trial."""
+        room = self._room
+        if room is None or room.seen.dtype != rows.dtype:
+            most = max(ROWS_PER_BLOCK, self.max_steps)
+            k = self.partition.cells_per_state
             room = _Room(
                 np.empty((most, rows.shape[2]), dtype=rows.dtype),
                 np.empty(most, dtype=self.action.dtype),
@@ -207,8 +189,8 @@ class Solutions:
                 np.ones((most, k)),
                 np.arange(most),
             )
-            self._rooms.append(room)
-        return self._rooms[:count]
+            self._room = room
+        return room
 
 
 @njit(cache=True)
@@ -232,7 +214,7 @@ def _append(
         length[ant] += 1
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True)
 def _copy_block(
     first: int,
     last: int,
@@ -242,14 +224,20 @@ def _copy_block(
     rows: NDArray[Any],
     action: ActionArray,
 ) -> None:
-    """Write the steps of ants first .. last - 1 one ant after the other."""
-    for t in range(length[first:last].max()):
-        row = np.uint64(t)
+    """Write the steps of ants first .. last - 1 one ant after the other.
+
+    A few steps at a time, for ants that follow each other share what memory brings.
+    """
+    longest = length[first:last].max()
+    for start in range(0, longest, STEPS_AT_A_TIME):
+        row = np.uint64(start)
         for ant in range(first, last):
-            if t < length[ant]:
+            end = min(start + STEPS_AT_A_TIME, length[ant])
+            for t in range(start, end):
+                place = row + np.uint64(t - start)
                 for i in range(rows.shape[1]):
-                    rows[row, i] = all_rows[t, ant, i]
-                action[row] = all_action[t, ant]
+                    rows[place, i] = all_rows[t, ant, i]
+                action[place] = all_action[t, ant]
             row += np.uint64(length[ant])
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from gymnasium.vector import VectorEnv
 from numpy.typing import ArrayLike, NDArray
 
-from acl_gym import storage, threads, validation
+from acl_gym import storage, validation
 from acl_gym.agents.pheromone import BoolArray
 from acl_gym.agents.policy import (
     PartitionPolicy,
@@ -247,17 +247,10 @@ class TabularAgent(PartitionPolicy):
         self, observation: NDArray[Any], ants: IntArray
     ) -> tuple[CellArray, FloatArray]:
         """`(index, degree)` of the walking ants, valid until the next call."""
-        partition = self.partition
         index, degree = self._index[: ants.size], self._degree[: ants.size]
-        if not partition.checked:
-            partition.locate(observation, ants, index, degree)
-            check_cells(index, partition)
-            return index, degree
-
-        def locate(own: slice) -> None:
-            partition.locate(observation, ants[own], index[own], degree[own])
-
-        threads.each(locate, ants.size)
+        self.partition.locate(observation, ants, index, degree)
+        if not self.partition.checked:
+            check_cells(index, self.partition)
         return index, degree
 
     def _next_seed(self) -> int:

@@ -1,4 +1,4 @@
-"""Small parts of `control_env`: checks of what callers pass, and two kernels."""
+"""Small parts of `control_env`: checks of what callers pass, and short kernels."""
 
 from __future__ import annotations
 
@@ -24,52 +24,6 @@ def checked_options(
             "check the spelling."
         )
     return dict(options or {})
-
-
-@njit(cache=True, nogil=True)
-def gather_slots(
-    slots: IntArray,
-    states: FloatArray,
-    actions: IntArray,
-    part: FloatArray,
-    part_actions: IntArray,
-) -> None:
-    """Copy the columns of `slots` side by side."""
-    for j in range(slots.size):
-        slot = np.uint64(slots[j])  # unsigned: no check for indices from the end
-        part_actions[j] = actions[slot]
-        for row in range(states.shape[0]):
-            part[row, j] = states[row, slot]
-
-
-@njit(cache=True, nogil=True)
-def put_slots_back(
-    slots: IntArray,
-    part: FloatArray,
-    part_rewards: FloatArray,
-    part_reached: BoolArray,
-    limit: int,
-    states: FloatArray,
-    steps: IntArray,
-    rewards: FloatArray,
-    terminated: BoolArray,
-    truncated: BoolArray,
-) -> int:
-    """Undo `gather_slots` after a step, and count it; `limit` 0 means none.
-
-    Returns how many slots have finished.
-    """
-    n_finished = 0
-    for j in range(slots.size):
-        slot = np.uint64(slots[j])
-        for row in range(states.shape[0]):
-            states[row, slot] = part[row, j]
-        steps[slot] += 1
-        rewards[slot] = part_rewards[j]
-        terminated[slot] = part_reached[j]
-        truncated[slot] = (limit > 0) & (steps[slot] >= limit)
-        n_finished += terminated[slot] | truncated[slot]
-    return n_finished
 
 
 @njit(cache=True)

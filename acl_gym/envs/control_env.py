@@ -17,7 +17,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import ArrayLike, NDArray
 
-from acl_gym import threads, validation
+from acl_gym import validation
 from acl_gym.envs.bookkeeping import (
     checked_actions,
     checked_autoreset_mode,
@@ -28,9 +28,8 @@ from acl_gym.envs.bookkeeping import (
     draw_uniforms,
     final_infos,
     finish,
-    gather_slots,
-    put_slots_back,
 )
+from acl_gym.envs.partial_step import PartialStep
 from acl_gym.envs.rendering import Frame, Renderer
 from acl_gym.envs.system import BoolArray, ControlSystem, FloatArray, IntArray
 
@@ -247,6 +246,8 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
         self._wait_when_finished = False
         self._walking: IntArray | None = None  # slots still walking; None means all
         self._all_slots = np.arange(self.num_envs)
+        limit = self.max_episode_steps or 0
+        self._step_some = PartialStep(self.system, self.num_envs, limit)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -321,23 +322,21 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
         n_finished = 0
         slots = self._all_slots if self._walking is None else self._walking
         uniforms = draw_uniforms(self.system, self.np_random, slots.size)
-        if slots is self._all_slots and threads.parts(slots.size) == 1:
+        if slots is self._all_slots:
             self.system.advance(self._state, checked, uniforms, rewards, terminated)
             limit = self.max_episode_steps or 0
             n_finished = count_step(limit, self._steps, terminated, truncated)
         elif slots.size:
-
-            def advance(own: slice) -> int:
-                return self._advance_some(
-                    slots[own],
-                    checked,
-                    None if uniforms is None else uniforms[:, own],
-                    rewards,
-                    terminated,
-                    truncated,
-                )
-
-            n_finished = sum(threads.each(advance, slots.size))
+            n_finished = self._step_some(
+                slots,
+                self._state,
+                self._steps,
+                checked,
+                uniforms,
+                rewards,
+                terminated,
+                truncated,
+            )
         if restarting is not None:
             self._start(restarting, None)
 
@@ -412,39 +411,6 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
                 'call reset(options={"reset_mask": finished}) before the next step.'
             )
         return np.flatnonzero(self._finished)
-
-    def _advance_some(
-        self,
-        slots: IntArray,
-        actions: IntArray,
-        uniforms: FloatArray | None,
-        rewards: FloatArray,
-        terminated: BoolArray,
-        truncated: BoolArray,
-    ) -> int:
-        """Advance some slots only: gather them, run the kernel, put them back.
-
-        Returns how many have finished.
-        """
-        m = slots.size
-        states, part = self._states, np.empty((self._states.shape[0], m))
-        part_actions = np.empty(m, dtype=np.int64)
-        part_rewards, part_reached = np.empty(m), np.empty(m, dtype=np.bool_)
-        gather_slots(slots, states, actions, part, part_actions)
-        self.system.advance(part, part_actions, uniforms, part_rewards, part_reached)
-        n_finished: int = put_slots_back(
-            slots,
-            part,
-            part_rewards,
-            part_reached,
-            self.max_episode_steps or 0,
-            states,
-            self._steps,
-            rewards,
-            terminated,
-            truncated,
-        )
-        return n_finished
 
     def _start(self, slots: IntArray, states: FloatArray | None) -> None:
         """Put `slots` at the given `(state_size, n)` states, or at random ones."""

@@ -20,7 +20,7 @@ from acl_gym.envs.system import BoolArray, ControlSystem, FloatArray, IntArray
 NORTH, SOUTH, EAST, WEST = (-1, 0), (1, 0), (0, 1), (0, -1)  # row, column
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, error_model="numpy")
 def _move(
     states: FloatArray,
     actions: IntArray,
@@ -37,7 +37,7 @@ def _move(
         reached[i] = goal[cell]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, error_model="numpy")
 def _move_or_fail(
     states: FloatArray,
     actions: IntArray,

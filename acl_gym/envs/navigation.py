@@ -12,7 +12,7 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import ArrayLike
 
-from acl_gym import validation
+from acl_gym import threads, validation
 from acl_gym.envs.control_env import ControlEnv, ControlVectorEnv
 from acl_gym.envs.navigation_kernels import Peak, Row, advance
 from acl_gym.envs.system import BoolArray, ControlSystem, FloatArray, IntArray
@@ -114,12 +114,14 @@ class Navigation(ControlSystem):
         return np.ascontiguousarray(np.array(self.forces).T / self.mass)
 
     @cached_property
-    def _kernel_peaks(self) -> tuple[Peak, ...]:
-        """The peaks for the kernel: one of height 0 stands for none."""
-        return tuple(
+    def _kernel_peaks(self) -> tuple[float, ...]:
+        """The peaks for the kernel in a row: one of height 0 stands for none."""
+        peaks = self.peaks or ((0.0, 0.0, 0.0, 1.0, 1.0),)
+        scaled = (
             (height / self.mass, mean_1, mean_2, 1.0 / sigma_1, 1.0 / sigma_2)
-            for height, mean_1, mean_2, sigma_1, sigma_2 in self.peaks
-        ) or ((0.0, 0.0, 0.0, 1.0, 1.0),)
+            for height, mean_1, mean_2, sigma_1, sigma_2 in peaks
+        )
+        return tuple(map(float, itertools.chain(*scaled)))
 
     @cached_property
     def _dynamics(self) -> tuple[Any, ...]:
@@ -138,7 +140,7 @@ class Navigation(ControlSystem):
         return (
             float(self.position_max),
             float(self.velocity_max),
-            self._stage_weight,
+            tuple(map(float, np.ravel(self._stage_weight))),
             self._action_cost,
             self.goal_rule == "membership",
             *map(float, self._goal),
@@ -245,7 +247,12 @@ class Navigation(ControlSystem):
         reached: BoolArray,
     ) -> None:
         """One sampling time of §4.5.1; see `ControlSystem.advance`."""
-        advance(states, actions, self._dynamics, self._goal_and_cost, rewards, reached)
+        move = advance
+        if threads.worth_it(actions.size):
+            from acl_gym import in_threads
+
+            move = in_threads.advance_navigation
+        move(states, actions, self._dynamics, self._goal_and_cost, rewards, reached)
 
     def evaluation_states(self) -> FloatArray:
         """The Halton points 1 to 100 in bases 2, 3, 5 and 7, stretched to X.

@@ -7,25 +7,24 @@ from typing import Any
 from numba import njit
 
 from acl_gym.envs.fast_math import exponential
-from acl_gym.envs.system import BoolArray, FloatArray, IntArray
+from acl_gym.envs.system import BLOCK, BoolArray, FloatArray, IntArray
 
 Peak = tuple[float, float, float, float, float]
 Row = tuple[float, float, float, float]
 
 
 @njit(cache=True, error_model="numpy", inline="always")
-def damping_at(c1: float, c2: float, base: float, peaks: tuple[Peak, ...]) -> float:
-    """The damping at one position; each peak is (height, m1, m2, 1/sigma1, 1/sigma2).
+def damping_at(c1: float, c2: float, base: float, peaks: tuple[float, ...]) -> float:
+    """The damping at one position; a peak is height, m1, m2, 1 / sigma1, 1 / sigma2.
 
-    The peaks are a tuple, so that their number is known when the kernel is compiled
+    The peaks, one after the other, are a tuple, so that their number is known when the kernel is compiled
     and the loop over the slots is the innermost one that is left.
     """
     total = base
-    for k in range(len(peaks)):
-        height, mean_1, mean_2, rate_1, rate_2 = peaks[k]
-        distance_1 = (c1 - mean_1) * rate_1
-        distance_2 = (c2 - mean_2) * rate_2
-        total += height * exponential(
+    for k in range(len(peaks) // 5):
+        distance_1 = (c1 - peaks[5 * k + 1]) * peaks[5 * k + 3]
+        distance_2 = (c2 - peaks[5 * k + 2]) * peaks[5 * k + 4]
+        total += peaks[5 * k] * exponential(
             -(distance_1 * distance_1 + distance_2 * distance_2)
         )
     return total
@@ -40,7 +39,7 @@ def integrate(
     action: IntArray,
     acceleration: FloatArray,
     base: float,
-    peaks: tuple[Peak, ...],
+    peaks: tuple[float, ...],
     step: float,
     substeps: int,
 ) -> None:
@@ -83,7 +82,7 @@ def settle(
     action: IntArray,
     position_max: float,
     velocity_max: float,
-    weight: tuple[Row, Row, Row, Row],
+    weight: tuple[float, ...],
     cost_action: FloatArray,
     product: bool,
     goal_position: float,
@@ -93,9 +92,10 @@ def settle(
 ) -> None:
     """Clip the next states to X; reward (3.2) and goal test on them, in place.
 
-    The goal is a product of triangles > 0.5 if `product`, else a box.
+    The goal is a product of triangles > 0.5 if `product`, else a box. `weight` is the
+    symmetric Q, row by row.
     """
-    (w11, w12, w13, w14), (_, w22, w23, w24), (_, _, w33, w34), (_, _, _, w44) = weight
+    w11, w12, w13, w14, _, w22, w23, w24, _, _, w33, w34, _, _, _, w44 = weight
     price = cost_action[action]
     for i in range(c1.size):
         x1 = min(max(c1[i], -position_max), position_max)
@@ -123,7 +123,43 @@ def settle(
             reached[i] = near & (max(s1, s2) <= goal_velocity)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, error_model="numpy")
+def advance_block(
+    states: FloatArray,
+    actions: IntArray,
+    dynamics: tuple[Any, ...],
+    goal_and_cost: tuple[Any, ...],
+    rewards: FloatArray,
+    reached: BoolArray,
+    block: int,
+) -> None:
+    """Do what `advance` does for the `BLOCK` slots from `block` * `BLOCK` on."""
+    push, base, peaks, step, substeps = dynamics
+    x_max, v_max, weight, price, product, goal_x, goal_v = goal_and_cost
+    part = slice(block * BLOCK, min((block + 1) * BLOCK, actions.size))
+    c1, v1 = states[0, part], states[1, part]
+    c2, v2 = states[2, part], states[3, part]
+    action = actions[part]
+    integrate(c1, v1, c2, v2, action, push, base, peaks, step, substeps)
+    settle(
+        c1,
+        v1,
+        c2,
+        v2,
+        action,
+        x_max,
+        v_max,
+        weight,
+        price,
+        product,
+        goal_x,
+        goal_v,
+        rewards[part],
+        reached[part],
+    )
+
+
+@njit(cache=True)
 def advance(
     states: FloatArray,
     actions: IntArray,
@@ -133,23 +169,5 @@ def advance(
     reached: BoolArray,
 ) -> None:
     """One sampling time of all slots, `states` of shape (4, n) changed in place."""
-    c1, v1, c2, v2 = states[0], states[1], states[2], states[3]
-    push, base, peaks, step, substeps = dynamics
-    integrate(c1, v1, c2, v2, actions, push, base, peaks, step, substeps)
-    x_max, v_max, weight, price, product, goal_x, goal_v = goal_and_cost
-    settle(
-        c1,
-        v1,
-        c2,
-        v2,
-        actions,
-        x_max,
-        v_max,
-        weight,
-        price,
-        product,
-        goal_x,
-        goal_v,
-        rewards,
-        reached,
-    )
+    for block in range((actions.size + BLOCK - 1) // BLOCK):
+        advance_block(states, actions, dynamics, goal_and_cost, rewards, reached, block)

@@ -11,10 +11,16 @@ import numpy as np
 from gymnasium import spaces
 from numba import njit
 
-from acl_gym import validation
+from acl_gym import threads, validation
 from acl_gym.envs.control_env import ControlEnv, ControlVectorEnv
 from acl_gym.envs.fast_math import sine
-from acl_gym.envs.system import BoolArray, ControlSystem, FloatArray, IntArray
+from acl_gym.envs.system import (
+    BLOCK,
+    BoolArray,
+    ControlSystem,
+    FloatArray,
+    IntArray,
+)
 
 TWO_PI = 2.0 * math.pi
 
@@ -90,23 +96,26 @@ def _settle(
         reached[i] = near & (abs(speed) <= bound_omega)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def _advance(
+@njit(cache=True, error_model="numpy")
+def advance_block(
     states: FloatArray,
     actions: IntArray,
     dynamics: tuple[Any, ...],
     goal_and_cost: tuple[Any, ...],
     rewards: FloatArray,
     reached: BoolArray,
+    block: int,
 ) -> None:
-    theta, omega = states[0], states[1]
+    """Do what `advance` does for the `BLOCK` slots from `block` * `BLOCK` on."""
     push, stiffness, friction, step, substeps = dynamics
-    _integrate(theta, omega, actions, push, stiffness, friction, step, substeps)
     omega_max, q1, q12, q2, price, bound_1, bound_2 = goal_and_cost
+    part = slice(block * BLOCK, min((block + 1) * BLOCK, actions.size))
+    theta, omega, action = states[0, part], states[1, part], actions[part]
+    _integrate(theta, omega, action, push, stiffness, friction, step, substeps)
     _settle(
         theta,
         omega,
-        actions,
+        action,
         omega_max,
         q1,
         q12,
@@ -114,9 +123,23 @@ def _advance(
         price,
         bound_1,
         bound_2,
-        rewards,
-        reached,
+        rewards[part],
+        reached[part],
     )
+
+
+@njit(cache=True)
+def advance(
+    states: FloatArray,
+    actions: IntArray,
+    dynamics: tuple[Any, ...],
+    goal_and_cost: tuple[Any, ...],
+    rewards: FloatArray,
+    reached: BoolArray,
+) -> None:
+    """One sampling time of all slots, `states` of shape (2, n) changed in place."""
+    for block in range((actions.size + BLOCK - 1) // BLOCK):
+        advance_block(states, actions, dynamics, goal_and_cost, rewards, reached, block)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -282,7 +305,12 @@ class Pendulum(ControlSystem):
         reached: BoolArray,
     ) -> None:
         """One sampling time of (5.1); see `ControlSystem.advance`."""
-        _advance(states, actions, self._dynamics, self._goal_and_cost, rewards, reached)
+        move = advance
+        if threads.worth_it(actions.size):
+            from acl_gym import in_threads
+
+            move = in_threads.advance_pendulum
+        move(states, actions, self._dynamics, self._goal_and_cost, rewards, reached)
 
     def evaluation_states(self) -> FloatArray:
         """100 states: theta_i = 2 pi i / 10 + 0.01, omega_j over 10 values to the ends.

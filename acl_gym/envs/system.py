@@ -15,6 +15,10 @@ IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
 
 
+BLOCK = 512
+"""Slots that a kernel advances at a time: what it needs stays in the nearest cache."""
+
+
 class ControlSystem(ABC):
     """A discrete-time system x(t+1) = f(x(t), u(t)) (4.1) with a goal and a cost.
 

@@ -10,8 +10,8 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import ArrayLike, NDArray
 
-from acl_gym import validation
-from acl_gym.membership import Axis, CellArray, FloatArray, IntArray, locate
+from acl_gym import threads, validation
+from acl_gym.membership import Axes, CellArray, FloatArray, IntArray, locate
 from acl_gym.partition.base import Partition
 
 
@@ -67,12 +67,15 @@ class Grid(Partition):
             for axis, period in zip(axes, lengths, strict=True)
         ]
         self._edges = np.concatenate(edges)
-        starts = np.cumsum([0, *(axis.size for axis in edges)])
-        self._axes: tuple[Axis, ...] = tuple(
-            (int(start), axis.size, int(cells), period or 0.0, _regular_rate(axis))
-            for start, axis, cells, period in zip(
-                starts, edges, self._cells, lengths, strict=False
-            )
+        counts = [axis.size for axis in edges]
+        self._axes: Axes = (
+            tuple(
+                int(end) - n for end, n in zip(np.cumsum(counts), counts, strict=True)
+            ),
+            tuple(counts),
+            tuple(axis.size for axis in axes),
+            tuple(period or 0.0 for period in lengths),
+            tuple(_regular_rate(axis) for axis in edges),
         )
 
     @classmethod
@@ -187,7 +190,12 @@ class Grid(Partition):
             )
         if states.dtype != np.float64:
             states = _as_float64(states)
-        bad = locate(
+        find = locate
+        if threads.worth_it(slots.size):
+            from acl_gym import in_threads
+
+            find = in_threads.locate
+        bad = find(
             states,
             slots,
             self._edges,

@@ -13,7 +13,7 @@ from gymnasium.error import ResetNeeded
 from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 
-from acl_gym.envs import bookkeeping
+from acl_gym.envs import bookkeeping, partial_step
 from acl_gym.envs.pendulum import PendulumVectorEnv
 from tests.envs.systems import SystemCase
 from tests.envs.vector_helpers import (
@@ -252,13 +252,13 @@ def test_kernels_run_the_same_without_the_compiler() -> None:
     results = []
     for name in ("__call__", "py_func"):
         part, part_actions = np.zeros((2, 3)), np.zeros(3, dtype=np.int64)
-        gather = getattr(bookkeeping.gather_slots, name)
+        gather = getattr(partial_step.gather_slots, name)
         gather(slots, rows[0].copy(), actions, part, part_actions)
         for limit in (0, 7):
             outputs = [rows[1].copy(), np.full(6, 6), np.zeros(6)]
             outputs += [np.zeros(6, dtype=np.bool_) for _ in range(2)]
             flags = np.array([True, False, True])
-            put_back = getattr(bookkeeping.put_slots_back, name)
+            put_back = getattr(partial_step.put_slots_back, name)
             put_back(slots, part, part[0], flags, limit, *outputs)
             results.append([part, part_actions, *outputs])
     for ours, plain in zip(results[:2], results[2:], strict=True):

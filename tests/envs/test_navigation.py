@@ -94,7 +94,8 @@ def test_kernels_run_the_same_without_the_compiler() -> None:
     plain = [compiled[0].copy()]
     actions = rng.integers(0, 9, 40)
     drive = (system._acceleration, 0.5, system._kernel_peaks, 0.1, 2)
-    price = (5.0, 2.0, system.state_weight, np.arange(9.0), True, 8.0, 9.0)
+    weight = tuple(np.ravel(system.state_weight))
+    price = (5.0, 2.0, weight, np.arange(9.0), True, 8.0, 9.0)
     for states, integrate, settle in (
         (compiled, kernels.integrate, kernels.settle),
         (plain, kernels.integrate.py_func, kernels.settle.py_func),

@@ -1,0 +1,121 @@
+"""A step of some slots of a vector environment, those that walk."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from acl_gym.envs.system import BoolArray, ControlSystem, FloatArray, IntArray
+
+
+class PartialStep:
+    """Gathers some slots side by side, advances them, and puts them back.
+
+    Idle slots cost nothing, and nothing is allocated.
+
+    Args:
+        system: what moves.
+        num_envs: number of slots.
+        limit: steps after which a slot is truncated; 0 means none.
+    """
+
+    def __init__(self, system: ControlSystem, num_envs: int, limit: int) -> None:
+        self._system, self._limit = system, limit
+        self._states: FloatArray = np.empty(0)
+        self._actions: IntArray = np.empty(num_envs, dtype=np.int64)
+        self._rewards: FloatArray = np.empty(num_envs)
+        self._reached: BoolArray = np.empty(num_envs, dtype=np.bool_)
+
+    def __call__(
+        self,
+        slots: IntArray,
+        states: FloatArray,
+        steps: IntArray,
+        actions: IntArray,
+        uniforms: FloatArray | None,
+        rewards: FloatArray,
+        terminated: BoolArray,
+        truncated: BoolArray,
+    ) -> int:
+        """Step `slots`, `(m,)`; entries of other slots are not touched.
+
+        Args:
+            slots: who steps.
+            states: of all slots, `(state_size, num_envs)`, replaced by the next ones.
+            steps: of all slots so far, counted up.
+            actions: of all slots.
+            uniforms: `(draws_per_step, m)`, None if the system needs none.
+            rewards: of all slots, receives those of `slots`.
+            terminated: of all slots, receives whether `slots` are at the goal.
+            truncated: of all slots, receives whether the limit is reached.
+
+        Returns:
+            How many have finished.
+        """
+        size, m = len(states), slots.size
+        if self._states.size != states.size:
+            self._states = np.empty(states.size)
+        part = self._states[: size * m].reshape(size, m)
+        part_actions = self._actions[:m]
+        part_rewards, part_reached = self._rewards[:m], self._reached[:m]
+        gather_slots(slots, states, actions, part, part_actions)
+        self._system.advance(part, part_actions, uniforms, part_rewards, part_reached)
+        n_finished: int = put_slots_back(
+            slots,
+            part,
+            part_rewards,
+            part_reached,
+            self._limit,
+            states,
+            steps,
+            rewards,
+            terminated,
+            truncated,
+        )
+        return n_finished
+
+
+@njit(cache=True)
+def gather_slots(
+    slots: IntArray,
+    states: FloatArray,
+    actions: IntArray,
+    part: FloatArray,
+    part_actions: IntArray,
+) -> None:
+    """Copy the columns of `slots` side by side."""
+    for j in range(slots.size):
+        slot = np.uint64(slots[j])  # unsigned: no check for indices from the end
+        part_actions[j] = actions[slot]
+        for row in range(states.shape[0]):
+            part[row, j] = states[row, slot]
+
+
+@njit(cache=True)
+def put_slots_back(
+    slots: IntArray,
+    part: FloatArray,
+    part_rewards: FloatArray,
+    part_reached: BoolArray,
+    limit: int,
+    states: FloatArray,
+    steps: IntArray,
+    rewards: FloatArray,
+    terminated: BoolArray,
+    truncated: BoolArray,
+) -> int:
+    """Undo `gather_slots` after a step, and count it; `limit` 0 means none.
+
+    Returns how many slots have finished.
+    """
+    n_finished = 0
+    for j in range(slots.size):
+        slot = np.uint64(slots[j])
+        for row in range(states.shape[0]):
+            states[row, slot] = part[row, j]
+        steps[slot] += 1
+        rewards[slot] = part_rewards[j]
+        terminated[slot] = part_reached[j]
+        truncated[slot] = (limit > 0) & (steps[slot] >= limit)
+        n_finished += terminated[slot] | truncated[slot]
+    return n_finished

@@ -94,6 +94,14 @@ def locate_on_axis(
         fraction[i] = (x[i] - left) / (edges[interval + 1] - left)
 
 
+@njit(cache=True)
+def _first_not_finite(states: FloatArray, slots: IntArray) -> int:
+    for slot in slots:
+        if not np.isfinite(states[slot]).all():
+            return int(slot)
+    return -1
+
+
 @njit(cache=True, error_model="numpy")
 def locate_block(
     states: FloatArray,
@@ -118,7 +126,7 @@ def locate_block(
             x[i] = states[slots[start + i], a]
             finite &= np.isfinite(x[i])
         if not finite:
-            return int(slots[start + np.argmin(np.isfinite(x))])
+            return _first_not_finite(states, slots[start : start + size])
         own_edges = edges[first[a] : first[a] + count[a]]
         locate_on_axis(x, own_edges, period[a], rate[a], low[a], fraction[a])
     for i in range(size):

@@ -189,11 +189,13 @@ def test_with_a_tabu_list_no_pair_is_chosen_twice_before_all_were() -> None:
     agent.learn(trials=1)
     solutions = agent._solutions
     assert solutions is not None
-    for ant in range(8):
+    (block,) = solutions.blocks()
+    rows = np.split(np.arange(block.ends[-1]), block.ends[:-1])
+    assert len(rows) == 8
+    for own in rows:
         taken: dict[int, list[int]] = {}
-        for t in range(solutions.length[ant]):
-            cell = int(solutions.index[ant, t, 0])
-            taken.setdefault(cell, []).append(int(solutions.action[ant, t]))
+        for cell, action in zip(block.index[own, 0], block.action[own], strict=True):
+            taken.setdefault(int(cell), []).append(int(action))
         for actions in taken.values():
             for first, second in zip(actions[::2], actions[1::2], strict=False):
                 assert {first, second} == {0, 1}

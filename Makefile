@@ -3,12 +3,14 @@
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help install compare bench test lint format build check-wheel clean distclean
+.PHONY: help install compare bench bench-peers test lint format build check-wheel clean distclean
 
 VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 WHEEL_VENV := build/wheel-venv
+PEERS_VENV := .venv-peers
+PEERS_STAMP := $(PEERS_VENV)/.installed
 
 # The first interpreter that works, is recent enough and can make an environment.
 PYTHON ?= $(shell for python in python3.11 python3; do \
@@ -49,8 +51,18 @@ compare: $(STAMP) ## Train ants, Q-learning and DQN on one task and compare them
 	$(BIN)/python benchmarks/compare_acl_rl.py --env $(ENV_ID) --preset $(PRESET) \
 		$(if $(OUT),--out $(OUT)) $(ARGS)
 
-bench: $(STAMP) ## Measure the throughput of environments and kernels
+bench: $(STAMP) ## Measure how fast ants walk and learn, beside others
 	$(BIN)/python benchmarks/throughput.py $(ARGS)
+
+bench-peers: $(STAMP) $(PEERS_STAMP) ## The same beside EnvPool's and gymnax's pendulums
+	$(BIN)/python benchmarks/throughput.py $(ARGS)
+
+$(PEERS_STAMP): benchmarks/peers-requirements.txt
+	@rm -rf $(PEERS_VENV)
+	@$(BIN)/python -m venv $(PEERS_VENV)
+	@echo "Installing EnvPool and gymnax into $(PEERS_VENV): a few minutes, once"
+	@$(PEERS_VENV)/bin/python $(PIP_INSTALL) -r benchmarks/peers-requirements.txt
+	@touch $@
 
 test: $(STAMP) ## Run every test
 	$(BIN)/python -m pytest -n $(WORKERS) --dist worksteal $(ARGS)
@@ -79,8 +91,8 @@ check-wheel: build ## Install the wheel into an empty environment and try it the
 
 clean: ## Remove what builds and tests have left, compiled kernels too
 	rm -rf build dist .hypothesis .mypy_cache .numba_cache .pytest_cache .ruff_cache
-	find . -name $(VENV) -prune -o -name __pycache__ -type d -prune \
+	find . -name '$(VENV)*' -prune -o -name __pycache__ -type d -prune \
 		-exec rm -rf {} +
 
 distclean: clean ## Remove .venv as well
-	rm -rf $(VENV)
+	rm -rf $(VENV) $(PEERS_VENV)

@@ -1,31 +1,41 @@
 """How fast the colony walks and learns, beside others in the same run.
 
-Every figure is a median of several repetitions after a warm-up, on one thread. Only
-the ratios mean something on another day or another machine.
+Every figure is a median of several repetitions, on one thread unless its name says
+otherwise. A repetition goes through all cases before the next one begins, so that a
+slow moment of the machine hits them alike. Only the ratios mean something on another
+day or another machine.
 """
 
 from __future__ import annotations
 
 import argparse
+import importlib.metadata
 import json
+import os
+import platform
+import re
+import resource
 import statistics
+import subprocess
+import sys
+import tempfile
 import time
-from collections.abc import Callable
+from collections import defaultdict
 from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
 
-import gymnasium as gym
-import numpy as np
 from rich.console import Console
 from rich.table import Table
+from speed_cases import SYSTEMS, WHOLE_RUN, Plan, learn, plan
+from speed_criteria import criteria, whole_run_row
 from tqdm.auto import tqdm
 
 import acl_gym
-from acl_gym.agents.acl import ACL
-from acl_gym.partition import Crisp, Fuzzy
 
-PENDULUM = "acl_gym/Pendulum-v0"
-CELLS = (40, 41)
-DQN_STEPS = 5_000
+SIZES = (1, 16, 250, 2_000, 20_000)
+PEERS_PYTHON = Path(__file__).resolve().parents[1] / ".venv-peers" / "bin" / "python"
+PEER_SLOTS = 2_048
 
 
 @dataclass(frozen=True)
@@ -34,17 +44,21 @@ class Case:
 
     Attributes:
         name: what was measured.
+        system: whose row it is.
         n_ants: slots of the environment.
         steps_per_second: slot-steps a second, median.
         slowest: steps a second in the slowest repetition.
         fastest: steps a second in the fastest repetition.
         seconds: of one repetition, median.
-        reference: the name of the case that the ratio is to.
-        ratio_to_reference: how many times the reference's steps a second; for the
-            whole learning run, how many times it fits into DQN's training.
+        reference: the name of the case that the ratio is to; its own if none.
+        ratio_to_reference: how many times the reference's steps a second; of a whole
+            run, how many times it fits into the time of the reference.
+        load: tasks that wanted to run on the machine while it was measured, its own
+            included: the mean of what `os.getloadavg` said.
     """
 
     name: str
+    system: str
     n_ants: int
     steps_per_second: float
     slowest: float
@@ -52,194 +66,260 @@ class Case:
     seconds: float
     reference: str
     ratio_to_reference: float
+    load: float
 
 
-Work = Callable[[], int]
-"""Does some steps and says how many."""
+def measure(
+    plans: list[Plan], repetitions: int, progress: bool
+) -> dict[str, list[tuple[int, float, float]]]:
+    """Steps, seconds and load of each repetition of each case."""
+    found: dict[str, list[tuple[int, float, float]]] = defaultdict(list)
+    works = {}
+    with tqdm(total=len(plans) * (repetitions + 1), disable=not progress) as bar:
+        for one in plans:  # warm up: compile, fill caches
+            works[one.name] = one.make()
+            works[one.name]()
+            bar.update()
+        for repetition in range(repetitions):
+            for one in plans:
+                bar.update()
+                if one.repetitions and repetition >= one.repetitions:
+                    continue
+                start = time.perf_counter()
+                steps = works[one.name]()
+                seconds = time.perf_counter() - start
+                found[one.name].append((steps, seconds, os.getloadavg()[0]))
+    return found
 
 
-def measure(work: Work, repetitions: int) -> list[tuple[int, float]]:
-    """Steps and seconds of each repetition, after one that is not counted."""
-    work()
-    results = []
-    for _ in range(repetitions):
-        start = time.perf_counter()
-        steps = work()
-        results.append((steps, time.perf_counter() - start))
-    return results
-
-
-def step_environment(env_id: str, n_ants: int, steps: int) -> Work:
-    """Step a native vector environment with random actions."""
-    env = gym.make_vec(env_id, num_envs=n_ants)
-    env.reset(seed=0)
-    actions = np.random.default_rng(0).integers(
-        0, env.single_action_space.n, (steps, n_ants)
+def measure_peers(repetitions: int) -> list[dict[str, Any]]:
+    """What peers.py says, where `make bench-peers` has made its environment."""
+    if not PEERS_PYTHON.exists():
+        return []
+    script = Path(__file__).with_name("peers.py")
+    done = subprocess.run(
+        [PEERS_PYTHON, script, str(PEER_SLOTS), str(repetitions)],
+        capture_output=True,
+        text=True,
+        check=False,
     )
-
-    def work() -> int:
-        for row in actions:
-            env.step(row)
-        return steps * n_ants
-
-    return work
-
-
-def step_synchronous(n_ants: int, steps: int) -> Work:
-    """Step Gymnasium's synchronous vector of our single environment."""
-    env = gym.make_vec(PENDULUM, num_envs=n_ants, vectorization_mode="sync")
-    env.reset(seed=0)
-    actions = np.random.default_rng(0).integers(0, 3, (steps, n_ants))
-
-    def work() -> int:
-        for row in actions:
-            env.step(row)
-        return steps * n_ants
-
-    return work
+    sys.stderr.write("".join(re.findall(r".* is left out: .*\n", done.stderr)))
+    if done.returncode != 0:
+        print(f"peers.py failed:\n{done.stderr[-800:]}", file=sys.stderr)
+        return []
+    cases: list[dict[str, Any]] = json.loads(done.stdout)
+    return cases
 
 
-def learn(kind: type[Crisp] | type[Fuzzy], n_ants: int, trials: int) -> Work:
-    """Make trials of a colony: selection, steps, decay and deposit."""
-
-    def work() -> int:
-        env = gym.make_vec(PENDULUM, num_envs=n_ants)
-        grid = kind.from_box(env.single_observation_space, CELLS, circular=[0])
-        return ACL(env, grid, seed=0).learn(trials=trials).num_timesteps
-
-    return work
-
-
-def train_dqn(steps: int) -> Work:
-    """Train Stable-Baselines3's DQN with the comparison's settings."""
-    import torch
-
-    from acl_gym.agents.dqn import make_dqn
-
-    torch.set_num_threads(1)
-
-    def work() -> int:
-        model = make_dqn(PENDULUM, seed=0)
-        model.learn(total_timesteps=steps)
-        return int(model.num_timesteps)
-
-    return work
-
-
-def run(quick: bool, progress: bool) -> list[Case]:
-    """Measure every case.
-
-    Args:
-        quick: fewer repetitions and sizes, to see that it works.
-        progress: show a bar.
-    """
-    repetitions = 2 if quick else 5
-    sizes = (16, 250) if quick else (1, 16, 250, 2_000, 20_000)
-    dqn_steps = 2_000 if quick else DQN_STEPS  # it begins to learn after 1,000
-    plan: list[tuple[str, int, Work, int, str]] = []
-    for n in sizes:
-        steps = max(20, min(2_000, 400_000 // n))
-        cart_pole = f"CartPole-v1, {n} slots"
-        plan += [
-            (cart_pole, n, step_environment("CartPole-v1", n, steps), repetitions, ""),
-            (
-                f"pendulum alone, {n} slots",
-                n,
-                step_environment(PENDULUM, n, steps),
-                repetitions,
-                cart_pole,
-            ),
-        ]
-        plan += [
-            (
-                f"{kind.__name__.lower()} colony learning, {n} ants",
-                n,
-                learn(kind, n, trials=1 if n > 2_000 else 4),
-                repetitions,
-                cart_pole,
-            )
-            for kind in (Fuzzy, Crisp)
-        ]
-    plan += [
-        (
-            "synchronous vector of single pendulums, 16 slots",
-            16,
-            step_synchronous(16, 200),
-            repetitions,
-            "CartPole-v1, 16 slots",
-        ),
-        (f"DQN, {dqn_steps:,} steps", 8, train_dqn(dqn_steps), 1 if quick else 2, ""),
-        (
-            "fuzzy colony, whole run of 100 trials",
-            250,
-            learn(Fuzzy, 250, trials=100),
-            repetitions,
-            f"DQN, {dqn_steps:,} steps",
-        ),
-    ]
-    measured: dict[str, tuple[float, float]] = {}  # name: median rate, seconds
+def as_cases(
+    plans: list[Plan],
+    found: dict[str, list[tuple[int, float, float]]],
+    peers: list[dict[str, Any]],
+) -> list[Case]:
+    """Medians, spread and ratios."""
+    rates = {
+        name: [steps / seconds for steps, seconds, _ in results]
+        for name, results in found.items()
+    }
+    seconds = {
+        name: statistics.median(result[1] for result in results)
+        for name, results in found.items()
+    }
+    middle = {name: statistics.median(values) for name, values in rates.items()}
     cases = []
-    for name, n_ants, work, count, reference in tqdm(plan, disable=not progress):
-        results = measure(work, count)
-        rates = [steps / seconds for steps, seconds in results]
-        rate = statistics.median(rates)
-        seconds = statistics.median(seconds for _, seconds in results)
-        measured[name] = rate, seconds
-        ratio = 1.0
-        if reference:
-            whole_run = reference.startswith("DQN")
-            ratio = (
-                measured[reference][1] / seconds
-                if whole_run
-                else rate / measured[reference][0]
-            )
+    for one in plans:
+        name, reference = one.name, one.reference or one.name
+        if reference not in middle:
+            reference = name
+        ratio = middle[name] / middle[reference]
+        if one.by_seconds:
+            ratio = seconds[reference] / seconds[name]
+        load = statistics.fmean(result[2] for result in found[name])
         cases.append(
             Case(
                 name,
-                n_ants,
-                rate,
-                min(rates),
-                max(rates),
-                seconds,
-                reference or name,
+                one.system,
+                one.n_ants,
+                middle[name],
+                min(rates[name]),
+                max(rates[name]),
+                seconds[name],
+                reference,
                 ratio,
+                load,
+            )
+        )
+    ours = next((c for c in cases if c.name.startswith("pendulum alone, 2,048")), None)
+    for peer in peers:
+        rate = statistics.median(peer["rates"])
+        cases.append(
+            Case(
+                peer["name"],
+                "peers",
+                peer["n_ants"],
+                rate,
+                min(peer["rates"]),
+                max(peer["rates"]),
+                peer["n_ants"] / rate,
+                ours.name if ours else peer["name"],
+                rate / ours.steps_per_second if ours else 1.0,
+                os.getloadavg()[0],
             )
         )
     return cases
 
 
-def as_table(cases: list[Case]) -> Table:
-    """The cases for the terminal."""
-    table = Table(title=f"acl-gym {acl_gym.__version__}: steps a second, one thread")
-    table.add_column("case")
-    table.add_column("steps/s", justify="right")
-    table.add_column("seconds", justify="right")
-    table.add_column("ratio", justify="right")
-    table.add_column("to")
-    for case in cases:
-        table.add_row(
-            case.name,
-            f"{case.steps_per_second:,.0f}",
-            f"{case.seconds:.3f}",
-            f"{case.ratio_to_reference:.2f}",
-            "" if case.reference == case.name else case.reference,
+def startup_seconds(repetitions: int) -> dict[str, float]:
+    """Seconds of `import acl_gym`, and of a first trial without and with a cache."""
+    trial = (
+        "import gymnasium as gym, time; from acl_gym import ACL; "
+        "from acl_gym.partition import named; start = time.perf_counter(); "
+        "env = gym.make_vec('acl_gym/Pendulum-v0', num_envs=2); "
+        "ACL(env, named.pendulum(), seed=0, max_steps=2).learn(trials=1); "
+        "print(time.perf_counter() - start)"
+    )
+    imported = (
+        "import time; start = time.perf_counter(); import acl_gym; "
+        "print(time.perf_counter() - start)"
+    )
+
+    def seconds(code: str, cache: str) -> float:
+        done = subprocess.run(
+            [sys.executable, "-c", code],
+            capture_output=True,
+            text=True,
+            check=True,
+            env={**os.environ, "NUMBA_CACHE_DIR": cache},
         )
+        return float(done.stdout)
+
+    with tempfile.TemporaryDirectory() as cache:
+        first = seconds(trial, cache)
+        again = [seconds(trial, cache) for _ in range(repetitions)]
+        imports = [seconds(imported, cache) for _ in range(repetitions)]
+    return {
+        "import acl_gym": statistics.median(imports),
+        "first trial of a machine, kernels compiled": first,
+        "first trial of a process, kernels from the cache": statistics.median(again),
+    }
+
+
+def measure_memory(n_ants: int) -> dict[str, float]:
+    """Peak memory of one trial of the fuzzy navigation, 300 steps; in this process."""
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    learn("navigation", "fuzzy", 100, trials=1)()
+    compiled = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    steps = learn("navigation", "fuzzy", n_ants, trials=1)()
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return {
+        "n_ants": n_ants,
+        "ant_steps": steps,
+        "gib_before": before / 2**20,
+        "gib_peak": peak / 2**20,
+        "bytes_per_ant_step": (peak - compiled) * 1024 / (n_ants * 300),
+    }
+
+
+def as_table(cases: list[Case]) -> Table:
+    """The cases for the terminal, one section a system."""
+    table = Table(title=f"acl-gym {acl_gym.__version__}: slot-steps a second, medians")
+    table.add_column("case", no_wrap=True)
+    for heading in ("steps/s", "ns/step", "spread", "ratio"):
+        table.add_column(heading, justify="right", no_wrap=True)
+    table.add_column("to", no_wrap=True)
+    for system in (*SYSTEMS, "peers"):
+        for case in (case for case in cases if case.system == system):
+            own = case.reference == case.name
+            spread = (case.fastest - case.slowest) / case.steps_per_second
+            table.add_row(
+                case.name,
+                f"{case.steps_per_second:,.0f}",
+                f"{1e9 / case.steps_per_second:,.0f}",
+                f"{spread:.0%}",
+                "" if own else f"{case.ratio_to_reference:.2f}",
+                "" if own else case.reference,
+            )
+        table.add_section()
     return table
+
+
+def machine() -> dict[str, Any]:
+    """What the figures were measured on."""
+    names = ("numpy", "numba", "gymnasium", "stable-baselines3", "torch")
+    cpu = platform.processor() or platform.machine()
+    info = Path("/proc/cpuinfo")
+    if info.exists():
+        found = re.search(r"model name\s*: (.*)", info.read_text())
+        cpu = found.group(1) if found else cpu
+    return {
+        "processor": cpu,
+        "cores": os.cpu_count(),
+        "python": platform.python_version(),
+        **{name: importlib.metadata.version(name) for name in names},
+    }
+
+
+def parse(arguments: list[str] | None) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description=__doc__)
+    add = parser.add_argument
+    add("--json", action="store_true", help="print JSON, no table")
+    add("--figure", metavar="FILE", help="draw steps a second over ants (.png, .svg)")
+    add("--quick", action="store_true", help="few repetitions and sizes, to see it go")
+    add("--systems", nargs="+", choices=SYSTEMS, default=list(SYSTEMS))
+    add("--ants", nargs="+", type=int, metavar="N", default=None)
+    add("--repetitions", type=int, metavar="N", default=None, help="default: 5")
+    add("--only", metavar="PATTERN", help="cases whose name matches, and references")
+    add("--no-peers", action="store_true", help="leave .venv-peers alone")
+    add("--memory", type=int, metavar="ANTS", help="only one trial of navigation: RAM")
+    options = parser.parse_args(arguments)
+    if options.ants is not None and min(options.ants) < 1:
+        parser.error("--ants must be 1 or more")
+    if options.repetitions is not None and options.repetitions < 1:
+        parser.error("--repetitions must be 1 or more")
+    return options
 
 
 def main(arguments: list[str] | None = None) -> int:
     """Measure and print; returns the exit code."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--json", action="store_true", help="print JSON, no table")
-    parser.add_argument(
-        "--quick", action="store_true", help="fewer repetitions and sizes"
-    )
-    options = parser.parse_args(arguments)
-    cases = run(options.quick, progress=not options.json)
+    options = parse(arguments)
+    if options.memory:
+        print(json.dumps(measure_memory(options.memory), indent=1))
+        return 0
+    repetitions = options.repetitions or (1 if options.quick else 5)
+    sizes = options.ants or ((250,) if options.quick else SIZES)
+    plans = list(plan(options.systems, sizes, 2_000 if options.quick else 5_000))
+    if options.only:
+        wanted = {p.name for p in plans if re.search(options.only, p.name)}
+        wanted |= {p.reference for p in plans if p.name in wanted}
+        plans = [p for p in plans if p.name in wanted]
+    found = measure(plans, repetitions, progress=not options.json)
+    peers = [] if options.no_peers or options.quick else measure_peers(repetitions)
+    cases = as_cases(plans, found, peers)
+    rows = criteria({case.name: case.steps_per_second for case in cases})
+    rows += [whole_run_row(case.seconds) for case in cases if case.name == WHOLE_RUN]
+    result = {
+        "cases": [asdict(case) for case in cases],
+        "criteria": rows,
+        "startup": {} if options.only else startup_seconds(min(repetitions, 5)),
+        "machine": machine(),
+    }
     if options.json:
-        print(json.dumps({"cases": [asdict(case) for case in cases]}, indent=1))
+        print(json.dumps(result, indent=1))
     else:
-        Console().print(as_table(cases))
+        console = Console(width=150) if not sys.stdout.isatty() else Console()
+        console.print(as_table(cases))
+        for each in result["criteria"]:
+            mark = "met" if each["met"] else "NOT met"
+            console.print(
+                f"{each['what']}: {each['measured']:.2f} "
+                f"({each['asked']} {each['bound']:g}: {mark})"
+            )
+        for name, seconds in result["startup"].items():
+            console.print(f"{name}: {seconds:.2f} s")
+    if options.figure:
+        from speed_figure import draw
+
+        draw(result["cases"], options.figure)
     return 0
 
 

@@ -7,17 +7,29 @@ import subprocess
 import sys
 from pathlib import Path
 
-SCRIPT = Path(__file__).resolve().parents[1] / "benchmarks" / "throughput.py"
+import gymnasium as gym
+import numpy as np
+import pytest
+
+from acl_gym import ACL
+from acl_gym.partition import named
+
+FOLDER = Path(__file__).resolve().parents[1] / "benchmarks"
 
 
-def test_quick_run_prints_json() -> None:
-    done = subprocess.run(
-        [sys.executable, str(SCRIPT), "--quick", "--json"],
-        capture_output=True,
-        text=True,
-        check=True,
+def run(*arguments: str) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, str(FOLDER / "throughput.py"), *arguments]
+    return subprocess.run(command, capture_output=True, text=True, check=False)
+
+
+def test_quick_run_prints_json_and_draws(tmp_path: Path) -> None:
+    figure = tmp_path / "speed.png"
+    done = run(
+        "--quick", "--json", "--systems", "pendulum", "grid-1d", "--figure", str(figure)
     )
-    cases = json.loads(done.stdout)["cases"]
+    assert done.returncode == 0, done.stderr
+    result = json.loads(done.stdout)
+    cases = result["cases"]
     names = [case["name"] for case in cases]
     assert len(set(names)) == len(names)
     for case in cases:
@@ -25,6 +37,48 @@ def test_quick_run_prints_json() -> None:
         assert case["steps_per_second"] > 0
         assert case["slowest"] <= case["steps_per_second"] <= case["fastest"]
         assert case["ratio_to_reference"] > 0
+        assert case["load"] >= 0
         assert case["reference"] in names
-    assert any("DQN" in name for name in names)
-    assert any("whole run" in name for name in names)
+    for words in ("DQN", "whole run", "in NumPy", "synchronous", "CartPole", "crisp"):
+        assert any(words in name for name in names), words
+    for criterion in result["criteria"]:
+        measured, bound = criterion["measured"], criterion["bound"]
+        above = measured >= bound
+        assert criterion["met"] == (
+            above if criterion["asked"] == "at least" else measured <= bound
+        )
+    assert len(result["criteria"]) >= 2
+    assert all(seconds > 0 for seconds in result["startup"].values())
+    assert figure.stat().st_size > 10_000
+
+
+def test_memory_of_a_trial_is_told() -> None:
+    done = run("--memory", "500")
+    result = json.loads(done.stdout)
+    assert result["n_ants"] == 500
+    assert 0 < result["ant_steps"] <= 500 * 300
+    assert result["gib_peak"] >= result["gib_before"] > 0
+
+
+@pytest.mark.parametrize(
+    "arguments", [("--ants", "0"), ("--repetitions", "0"), ("--systems", "car")]
+)
+def test_bad_arguments_are_refused_in_a_line(arguments: tuple[str, ...]) -> None:
+    done = run(*arguments)
+    assert done.returncode == 2
+    assert "Traceback" not in done.stderr
+    assert arguments[0] in done.stderr.splitlines()[-1]
+
+
+def test_the_numpy_colony_is_the_colony(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Same draws, same pheromone: the denominator of the ratio does the same work."""
+    monkeypatch.syspath_prepend(str(FOLDER))
+    from numpy_colony import NumpyColony
+
+    env = gym.make_vec("acl_gym/Pendulum-v0", num_envs=30)
+    colony = ACL(env, named.pendulum(), seed=4, max_steps=60).learn(trials=4)
+    plain = NumpyColony(30, max_steps=60, seed=4)
+    for _ in range(4):
+        plain.trial()
+    assert plain.steps == colony.num_timesteps
+    np.testing.assert_allclose(plain.levels, colony.table, rtol=1e-9)

@@ -1,0 +1,247 @@
+"""What throughput.py measures: each case is some work that says how many steps it did."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+from numpy_colony import NumpyColony
+
+from acl_gym.agents.acl import ACL
+from acl_gym.partition import Crisp, Discrete, Fuzzy, Partition, named
+
+Work = Callable[[], int]
+"""Does some steps of all slots together and returns their number."""
+
+PENDULUM = "acl_gym/Pendulum-v0"
+SYSTEMS = {
+    "pendulum": PENDULUM,
+    "navigation": "acl_gym/Navigation-v0",
+    "grid-1d": "acl_gym/GridSearch1D-v0",
+    "grid-2d": "acl_gym/GridSearch2D-v0",
+}
+TAU0 = {"pendulum": 1e-4}  # Table 5.2; 0.001 elsewhere, Table 4.1
+TRIALS_OF_A_RUN = 100
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A case before it is measured.
+
+    Attributes:
+        name: what is measured.
+        system: one of `SYSTEMS`, or "peers".
+        n_ants: slots of the environment.
+        make: builds the work; building is not measured.
+        reference: the name of the case that the ratio is to; "" for none.
+        repetitions: at most so many; 0: as many as asked for.
+        by_seconds: the ratio is that of the seconds of one repetition, not of steps.
+    """
+
+    name: str
+    system: str
+    n_ants: int
+    make: Callable[[], Work]
+    reference: str = ""
+    repetitions: int = 0
+    by_seconds: bool = False
+
+
+def make_env(system: str, n_ants: int) -> gym.vector.VectorEnv[Any, Any, Any]:
+    """The native vector environment of a system."""
+    return gym.make_vec(SYSTEMS[system], num_envs=n_ants)
+
+
+def partition_of(system: str, kind: str, env: Any) -> Partition:
+    """The thesis's cells: 40 x 41 of §5.3, 729 of §4.5.2, a cell a state."""
+    cell_kind = Crisp if kind == "crisp" else Fuzzy
+    if system == "pendulum":
+        return named.pendulum(kind=cell_kind)
+    if system == "navigation":
+        return named.navigation("regular", kind=cell_kind)
+    return Discrete.from_space(env.single_observation_space)
+
+
+def kinds_of(system: str) -> tuple[str, ...]:
+    """The kinds of cells that make sense for a system."""
+    return ("discrete",) if system.startswith("grid") else ("fuzzy", "crisp")
+
+
+def steps_for(n_ants: int) -> int:
+    """Vector steps that take about a tenth of a second."""
+    return max(5, min(2_000, 1_000_000 // n_ants))
+
+
+def step_alone(env: gym.vector.VectorEnv[Any, Any, Any], steps: int) -> Work:
+    """Step a vector environment with actions drawn beforehand."""
+    env.reset(seed=0)
+    rng = np.random.default_rng(0)
+    n_actions = int(env.single_action_space.n)  # type: ignore[attr-defined]
+    actions = rng.integers(0, n_actions, (steps, env.num_envs))
+
+    def work() -> int:
+        for row in actions:
+            env.step(row)
+        return actions.size
+
+    return work
+
+
+def step_selecting(system: str, kind: str, n_ants: int) -> Work:
+    """Step with actions that a colony selects, without learning."""
+    env, steps = make_env(system, n_ants), steps_for(n_ants)
+    agent = ACL(env, partition_of(system, kind, env), seed=0)
+    observation, _ = env.reset(seed=0)
+
+    def work() -> int:
+        nonlocal observation
+        for _ in range(steps):
+            actions, _ = agent.predict(observation, deterministic=False)
+            observation = env.step(actions)[0]
+        return steps * n_ants
+
+    return work
+
+
+def learn(system: str, kind: str, n_ants: int, trials: int) -> Work:
+    """Make trials of a new colony: all of Algorithm 4.2, deposit included."""
+    env = make_env(system, n_ants)
+    partition = partition_of(system, kind, env)
+
+    def work() -> int:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # tau0 is the thesis's, bound or no bound
+            tau0 = TAU0.get(system, 1e-3)
+            agent = ACL(env, partition, tau0=tau0, seed=0, max_steps=300)
+        return agent.learn(trials=trials).num_timesteps
+
+    return work
+
+
+def learn_in_numpy(n_ants: int, trials: int) -> Work:
+    """The same trials of the fuzzy pendulum in vectorised NumPy."""
+
+    def work() -> int:
+        colony = NumpyColony(n_ants)
+        for _ in range(trials):
+            colony.trial()
+        return colony.steps
+
+    return work
+
+
+def train_dqn(steps: int) -> Work:
+    """Train Stable-Baselines3's DQN with the comparison's settings, on one thread."""
+    import torch
+
+    from acl_gym.agents.dqn import make_dqn
+
+    torch.set_num_threads(1)
+
+    def work() -> int:
+        model = make_dqn(PENDULUM, seed=0)
+        model.learn(total_timesteps=steps)
+        return int(model.num_timesteps)
+
+    return work
+
+
+def cart_pole(n: int) -> str:
+    """The name of the case that environments are held against."""
+    return f"CartPole-v1 of Gymnasium, {n:,} slots"
+
+
+def alone(system: str, n: int) -> str:
+    """The name of the case of an environment alone."""
+    return f"{system} alone, {n:,} slots"
+
+
+def loop(system: str, kind: str, n: int) -> str:
+    """The name of the case of a whole learning loop."""
+    return f"{kind} {system} learning, {n:,} ants"
+
+
+def in_numpy(n: int) -> str:
+    """The name of the case of the NumPy colony."""
+    return f"fuzzy pendulum learning in NumPy, {n:,} ants"
+
+
+WHOLE_RUN = f"fuzzy pendulum, whole run of {TRIALS_OF_A_RUN} trials, 250 ants"
+
+
+def trials_for(n_ants: int) -> int:
+    """Trials of a learning case: the first ones are the longest."""
+    return 1 if n_ants > 2_000 else 4
+
+
+def plan(systems: list[str], sizes: list[int], dqn_steps: int) -> Iterator[Plan]:
+    """Every case, references before what is held against them."""
+    alone_sizes = sorted({*sizes, 2_048})
+    for n in alone_sizes:
+        yield Plan(
+            cart_pole(n),
+            "peers",
+            n,
+            lambda n=n: step_alone(
+                gym.make_vec("CartPole-v1", n, vectorization_mode="vector_entry_point"),
+                steps_for(n),
+            ),
+        )
+    for system in systems:
+        for n in alone_sizes if system == "pendulum" else sizes:
+            yield Plan(
+                alone(system, n),
+                system,
+                n,
+                lambda s=system, n=n: step_alone(make_env(s, n), steps_for(n)),
+                cart_pole(n),
+            )
+        for kind in kinds_of(system):
+            for n in sizes:
+                yield Plan(
+                    f"{kind} {system} selecting, {n:,} ants",
+                    system,
+                    n,
+                    lambda s=system, k=kind, n=n: step_selecting(s, k, n),
+                    alone(system, n),
+                )
+                yield Plan(
+                    loop(system, kind, n),
+                    system,
+                    n,
+                    lambda s=system, k=kind, n=n: learn(s, k, n, trials_for(n)),
+                    alone(system, n),
+                )
+    if "pendulum" not in systems:
+        return
+    for n in (n for n in sizes if n <= 2_000):  # its memory grows by the table an ant
+        yield Plan(
+            in_numpy(n),
+            "pendulum",
+            n,
+            lambda n=n: learn_in_numpy(n, trials_for(n)),
+            loop("pendulum", "fuzzy", n),
+        )
+    yield Plan(
+        "synchronous vector of single pendulums, 16 slots",
+        "pendulum",
+        16,
+        lambda: step_alone(
+            gym.make_vec(PENDULUM, 16, vectorization_mode="sync"), steps=200
+        ),
+        alone("pendulum", 16) if 16 in sizes else "",
+    )
+    dqn = f"DQN of Stable-Baselines3, {dqn_steps:,} steps"
+    yield Plan(dqn, "peers", 8, lambda: train_dqn(dqn_steps), repetitions=2)
+    yield Plan(
+        WHOLE_RUN,
+        "pendulum",
+        250,
+        lambda: learn("pendulum", "fuzzy", 250, TRIALS_OF_A_RUN),
+        dqn,
+        by_seconds=True,
+    )

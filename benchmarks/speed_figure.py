@@ -1,0 +1,109 @@
+"""The figure of throughput.py: steps a second over the number of ants."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from matplotlib.lines import Line2D
+
+from acl_gym.experiments import drawing
+
+PANELS = ("pendulum", "navigation", "grid-1d", "grid-2d")
+# What the name of a case contains: label, colour, dashes.
+CURVES = {
+    " alone": ("environment alone", "#333333", (0, (1, 1))),
+    "fuzzy {system} selecting": ("and selection, fuzzy", "#56B4E9", (0, (4, 1.2))),
+    "fuzzy {system} learning,": ("learning, fuzzy", "#D55E00", "-"),
+    "crisp {system} learning,": ("learning, crisp", "#E69F00", (0, (4, 1.2))),
+    "discrete {system} learning,": ("learning, a cell a state", "#CC79A7", "-"),
+    "learning in NumPy": ("learning, fuzzy, NumPy", "#009E73", (0, (6, 1, 1, 1))),
+}
+
+
+def draw(cases: list[dict[str, Any]], path: str) -> None:
+    """Write the figure; its suffix says the kind of file."""
+    systems = [name for name in PANELS if any(case["system"] == name for case in cases)]
+    if not systems:
+        raise SystemExit("no case of a system was measured, so there is no figure.")
+    rows = (len(systems) + 1) // 2
+    columns = min(2, len(systems))
+    figure = drawing.new_figure(0.5 + 2.4 * rows, 3.6 * columns)
+    axes = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True)
+    used: dict[str, Line2D] = {}
+    for ax, system in zip(axes.flat, systems, strict=False):
+        drawing.prepare(ax)
+        ax.set_xscale("log")
+        ax.set_yscale("log")
+        ax.set_title(system, fontsize=drawing.SMALL, loc="left")
+        own = [case for case in cases if case["system"] == system]
+        for pattern, (label, color, dashes) in CURVES.items():
+            part = pattern.format(system=system)
+            points = sorted(
+                (case["n_ants"], case["steps_per_second"], case["slowest"],
+                 case["fastest"])
+                for case in own
+                if part in case["name"] and "single" not in case["name"]
+            )  # fmt: skip
+            if not points:
+                continue
+            ants, middle, slowest, fastest = zip(*points, strict=True)
+            (line,) = ax.plot(ants, middle, color=color, linestyle=dashes, marker=".",
+                              linewidth=1.3, markersize=4)  # fmt: skip
+            ax.fill_between(ants, slowest, fastest, color=color, alpha=0.15, lw=0)
+            used[label] = line
+        _peers(ax, cases, used, own_panel=system == "pendulum")
+    for ax in axes[:, 0]:
+        ax.set_ylabel("slot-steps a second", fontsize=drawing.SMALL)
+    for ax in axes[-1]:
+        ax.set_xlabel("ants", fontsize=drawing.SMALL)
+    for ax in axes.flat[len(systems) :]:
+        ax.set_visible(False)
+    handles = [
+        Line2D([], [], color=line.get_color(), linestyle=line.get_linestyle(),
+               marker=line.get_marker(), markersize=4, label=label)
+        for label, line in used.items()
+    ]  # fmt: skip
+    figure.legend(
+        handles=handles,
+        loc="outside lower center",
+        ncols=4,
+        frameon=False,
+        fontsize=drawing.TINY,
+        handlelength=2.6,
+    )
+    figure.savefig(path, dpi=200)
+
+
+def _peers(
+    ax: Any, cases: list[dict[str, Any]], used: dict[str, Line2D], *, own_panel: bool
+) -> None:
+    """Gymnasium's CartPole in every panel, the others' pendulums with ours."""
+    points = sorted(
+        (case["n_ants"], case["steps_per_second"])
+        for case in cases
+        if case["name"].startswith("CartPole")
+    )
+    if points:
+        ants, rates = zip(*points, strict=True)
+        (line,) = ax.plot(ants, rates, color="0.6", linewidth=1.0)
+        used["Gymnasium's CartPole alone"] = line
+    others = {"gymnax": "^", "envpool": "s", "DQN": "v", "synchronous": "d"}
+    for word, marker in others.items():
+        if not own_panel:
+            return
+        for case in (case for case in cases if word in case["name"]):
+            (line,) = ax.plot(
+                case["n_ants"],
+                case["steps_per_second"],
+                color="#0072B2",
+                marker=marker,
+                markersize=5,
+                linestyle="",
+            )
+            label = {
+                "gymnax": "gymnax's pendulum (all cores)",
+                "envpool": "EnvPool's pendulum",
+                "DQN": "DQN learning",
+                "synchronous": "our single pendulums in a row",
+            }[word]
+            used[label] = line

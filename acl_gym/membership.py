@@ -8,6 +8,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from acl_gym import compiling as _compiling  # noqa: F401 - it says what the wait is for
+
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 CellArray = NDArray[np.int32]

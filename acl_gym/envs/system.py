@@ -10,6 +10,8 @@ from gymnasium import spaces
 from numba import njit
 from numpy.typing import NDArray
 
+from acl_gym import compiling as _compiling  # noqa: F401 - it says what the wait is for
+
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]

@@ -1,0 +1,338 @@
+"""How near each kernel is to what the processor can do, and how cost grows.
+
+Operations and bytes of an ant-step are counted on paper, from the equations; the
+roofs, arithmetic and cache bandwidth of one core, are measured in the same run, and
+so are the kernels. Writes two figures and prints the table of docs/speed.md.
+
+    python benchmarks/roofline.py --out docs/figures
+"""
+
+from __future__ import annotations
+
+import argparse
+import statistics
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numba import njit
+from rich.console import Console
+from rich.table import Table
+
+from acl_gym.agents import selection
+from acl_gym.agents.pheromone import Pheromone
+from acl_gym.agents.solutions import Solutions
+from acl_gym.envs import navigation, pendulum
+from acl_gym.experiments import drawing
+from acl_gym.membership import written_out
+from acl_gym.partition import Fuzzy
+
+ANTS = 2_000
+
+
+@dataclass(frozen=True)
+class Kernel:
+    """A kernel with what an ant-step of it needs.
+
+    Attributes:
+        name: of the kernel.
+        operations: additions, multiplications, divisions, roundings, comparisons.
+        nbytes: read and written, each array counted once.
+        run: one call for `ants` ant-steps.
+        ants: see `run`.
+    """
+
+    name: str
+    operations: float
+    nbytes: float
+    run: Callable[[], Any]
+    ants: int = ANTS
+
+
+@njit(cache=True)
+def _multiply_add(x: Any, rounds: int) -> None:
+    for i in range(x.size):
+        a, b, c, d = x[i], x[i] + 1.0, x[i] + 2.0, x[i] + 3.0
+        for _ in range(rounds):
+            a = a * 0.999 + 0.1
+            b = b * 0.999 + 0.1
+            c = c * 0.999 + 0.1
+            d = d * 0.999 + 0.1
+        x[i] = (a + b) + (c + d)
+
+
+@njit(cache=True)
+def _copy(x: Any, y: Any) -> None:
+    for i in range(x.size):
+        y[i] = x[i] * 1.5
+
+
+def seconds(run: Callable[[], Any], rounds: int = 15) -> float:
+    """Median seconds of one call, in batches of about two milliseconds."""
+    run()
+    start = time.perf_counter()
+    run()
+    batch = max(1, int(2e-3 / max(time.perf_counter() - start, 1e-7)))
+    results = []
+    for _ in range(rounds):
+        start = time.perf_counter()
+        for _ in range(batch):
+            run()
+        results.append((time.perf_counter() - start) / batch)
+    return statistics.median(results)
+
+
+def roofs() -> tuple[float, float]:
+    """Operations and bytes a second of one core: arithmetic, and a copy in cache."""
+    x = np.random.default_rng(0).random(1_024)
+    arithmetic = 8 * 100 * x.size / seconds(lambda: _multiply_add(x, 100))
+    a, b = np.ones((2, 12_000))  # 192 kB together: within the second cache
+    return arithmetic, 16 * a.size / seconds(lambda: _copy(a, b))
+
+
+class Ants:
+    """Ants all over a grid of `d` dimensions, and a table of pheromone for them."""
+
+    def __init__(
+        self, dimensions: int, n_actions: int, ants: int = ANTS, cells: int = 0
+    ) -> None:
+        rng = np.random.default_rng(0)
+        per_axis = cells or {1: 1_600, 2: 40, 3: 12, 4: 6}[dimensions]
+        centres = [np.linspace(-1.0, 1.0, per_axis)] * dimensions
+        self.grid = Fuzzy(centres)
+        self.states = rng.uniform(-1.0, 1.0, (ants, dimensions))
+        self.all = np.arange(ants)
+        self.index, self.degree = self.grid(self.states)
+        self.table = Pheromone(self.grid.n_cells, n_actions, 1e-4, 3.0)
+        self.table.set_levels(1e-4 + rng.random(self.table.levels.shape))
+        self.draws = rng.random((2, ants))
+        self.actions = rng.integers(0, n_actions, ants)
+        self.columns, self.corners = (
+            written_out(n_actions),
+            written_out(self.index.shape[1]),
+        )
+
+    def locate(self) -> None:
+        self.grid.locate(self.states, self.all, self.index, self.degree)
+
+    def repair(self) -> None:
+        self.table.stale[:] = True
+        self.table.repair(self.index)
+
+    def draw(self) -> None:
+        selection._boltzmann(
+            self.table.levels,
+            3.0,
+            self.table.probabilities,
+            self.index,
+            self.degree,
+            self.draws,
+            0.1,
+            selection.ALL,
+            self.columns,
+            self.corners,
+            self.actions,
+        )
+
+    def select(self) -> None:
+        self.repair()
+        self.draw()
+
+    def decay(self) -> None:
+        self.table.local_update(self.index, self.degree, self.actions, 0.01)
+
+
+class Trial:
+    """A trial of random walks over a grid, ready to be deposited."""
+
+    def __init__(self, cells: int, ants: int = 200, steps: int = 100) -> None:
+        rng = np.random.default_rng(1)
+        grid = Fuzzy([np.linspace(-1, 1, cells)] * 2)
+        self.solutions = Solutions(ants, steps, 3, grid)
+        everyone, states = np.arange(ants), rng.uniform(-1, 1, (ants, 2))
+        for _ in range(steps):
+            states = np.clip(states + rng.normal(scale=0.05, size=states.shape), -1, 1)
+            actions = rng.integers(0, 3, ants)
+            self.solutions.append(everyone, states, grid(states)[0], actions)
+        self.table = Pheromone(grid.n_cells, 3, 1e-4, 3.0)
+        self.deposits = np.full(ants, 1e-3)
+        self.n_steps = ants * steps
+
+    def deposit(self) -> None:
+        self.table.global_update(self.solutions, self.deposits, 0.1)
+
+
+def kernels() -> list[Kernel]:
+    """The kernels of a fuzzy learning step, with what the equations ask of them."""
+    two, four = Ants(2, 3), Ants(4, 9)
+    moving = pendulum.Pendulum()
+    rng = np.random.default_rng(2)
+    swings = moving.sample_states(rng, ANTS)
+    vehicle = navigation.Navigation()
+    drives = vehicle.sample_states(rng, ANTS)
+    few, many = rng.integers(0, 3, ANTS), rng.integers(0, 9, ANTS)
+    rewards, reached = np.empty(ANTS), np.empty(ANTS, dtype=np.bool_)
+    trial = Trial(40)
+    # A sine: 13 to reduce, 17 of the series, 4 to end. An exponential: 9, 28, 3.
+    sine, exponential = 34, 40
+    swing = 4 * (sine + 4) + 24 + 24
+    drive = 2 * (4 * (2 * (exponential + 8) + 4) + 60) + 45
+    return [
+        Kernel("pendulum: move", swing, 8 * 6 + 1,
+               lambda: moving.advance(swings, few, None, rewards, reached)),
+        Kernel("navigation: move, 2 substeps", drive, 8 * 10 + 1,
+               lambda: vehicle.advance(drives, many, None, rewards, reached)),
+        Kernel("locate, 4 cells a state", 2 * 10 + 8, 8 * 3 + 12 * 4, two.locate),
+        Kernel("locate, 16 cells a state", 4 * 10 + 34, 8 * 5 + 12 * 16, four.locate),
+        Kernel("probabilities, 3 actions", 15, 12 * 4 + 2 * 24, two.repair),
+        Kernel("draw, 4 cells x 3 actions", 2 * (2 * 4 + 2) + 3,
+               12 * 4 + 4 * 16 + 24, two.draw),
+        Kernel("draw, 16 cells x 9 actions", 8 * (2 * 16 + 2) + 3,
+               12 * 16 + 16 * 64 + 24, four.draw),
+        Kernel("decay, 4 cells", 4 * 5, 4 * (12 + 17) + 8, two.decay),
+        Kernel("decay, 16 cells", 16 * 5, 16 * (12 + 17) + 8, four.decay),
+        Kernel("deposit, 4 cells", 28 + 4 * 6, 17 * 3 + 4 * (12 + 3 * 16),
+               trial.deposit, trial.n_steps),
+        Kernel("random numbers, 2 an ant", 2 * 8, 16, lambda: rng.random((2, ANTS))),
+    ]  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Result:
+    """A measured kernel: nanoseconds an ant-step, and the bound on them."""
+
+    kernel: Kernel
+    ns: float
+    bound_ns: float
+
+
+def measure(arithmetic: float, bandwidth: float) -> list[Result]:
+    """Every kernel with its bound: what its operations or its bytes must take."""
+    results = []
+    for kernel in kernels():
+        ns = seconds(kernel.run) / kernel.ants * 1e9
+        bound = max(kernel.operations / arithmetic, kernel.nbytes / bandwidth) * 1e9
+        results.append(Result(kernel, ns, bound))
+    return results
+
+
+def draw_roofline(
+    results: list[Result], arithmetic: float, bandwidth: float, path: Path
+) -> None:
+    """Operations a second over operations a byte, under the two roofs."""
+    figure = drawing.new_figure(3.6, 6.4)
+    ax = figure.subplots()
+    drawing.prepare(ax)
+    x = np.geomspace(0.05, 20, 200)
+    ax.loglog(x, np.minimum(arithmetic, x * bandwidth) / 1e9, color="0.2", linewidth=1)
+    ax.annotate(
+        f"arithmetic: {arithmetic / 1e9:.0f} billion operations a second",
+        (19, arithmetic / 1e9 * 1.12), ha="right", fontsize=drawing.TINY,
+    )  # fmt: skip
+    ax.annotate(
+        f"cache: {bandwidth / 1e9:.0f} GB/s", (0.055, 0.055 * bandwidth / 1e9 * 1.35),
+        rotation=32, fontsize=drawing.TINY,
+    )  # fmt: skip
+    colors = ("#D55E00", "#0072B2", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
+    for number, result in enumerate(results):
+        kernel = result.kernel
+        intensity = kernel.operations / kernel.nbytes
+        rate = kernel.operations / result.ns
+        color = colors[number % len(colors)]
+        ax.plot(intensity, rate, marker="o", markersize=5, color=color)
+        ax.annotate(
+            str(number + 1), (intensity, rate), xytext=(5, -3),
+            textcoords="offset points", fontsize=drawing.SMALL, color=color,
+        )  # fmt: skip
+    names = [f"{n + 1}  {r.kernel.name}" for n, r in enumerate(results)]
+    figure.text(1.01, 0.5, "\n".join(names), fontsize=drawing.TINY, va="center",
+                linespacing=1.7)  # fmt: skip
+    ax.set_xlabel("operations a byte", fontsize=drawing.SMALL)
+    ax.set_ylabel("billion operations a second", fontsize=drawing.SMALL)
+    figure.savefig(path, dpi=200, bbox_inches="tight")
+
+
+def draw_scaling(path: Path) -> None:
+    """Cost over ants, actions, cells a state, and cells of the table."""
+    figure = drawing.new_figure(4.6)
+    axes = figure.subplots(2, 2)
+    parts = {
+        "locate": (Ants.locate, "#0072B2"),
+        "select": (Ants.select, "#D55E00"),
+        "decay": (Ants.decay, "#009E73"),
+    }
+
+    def panel(ax: Any, title: str, label: str, xs: Any, make: Any, scale: Any) -> None:
+        drawing.prepare(ax)
+        made = [make(x) for x in xs]
+        for name, (method, color) in parts.items():
+            ys = [
+                seconds(lambda m=method, c=colony: m(c)) * scale(colony)
+                for colony in made
+            ]
+            ax.plot(xs, ys, marker=".", color=color, linewidth=1.2, label=name)
+        ax.set_title(title, fontsize=drawing.SMALL, loc="left")
+        ax.set_xlabel(label, fontsize=drawing.SMALL)
+        ax.set_ylim(bottom=0)
+        ax.set_xlim(left=0)
+
+    sizes = [250, 1_000, 2_000, 4_000, 8_000]
+    panel(axes[0, 0], "microseconds a step of all ants", "ants", sizes,
+          lambda n: Ants(2, 3, n), lambda c: 1e6)  # fmt: skip
+    panel(axes[0, 1], "nanoseconds an ant-step", "actions", [2, 4, 6, 8, 12, 16],
+          lambda u: Ants(2, u), lambda c: 1e9 / ANTS)  # fmt: skip
+    panel(axes[1, 0], "nanoseconds an ant-step", "cells a state, 2$^d$",
+          [2, 4, 8, 16], lambda k: Ants(k.bit_length() - 1, 3),
+          lambda c: 1e9 / ANTS)  # fmt: skip
+    ax = axes[1, 1]
+    drawing.prepare(ax)
+    cells = [20, 40, 100, 200, 400, 800]
+    trials = [Trial(n) for n in cells]
+    ys = [seconds(t.deposit, rounds=7) / t.n_steps * 1e9 for t in trials]
+    ax.semilogx([n * n for n in cells], ys, marker=".", color="#882255", linewidth=1.2)
+    ax.set_ylim(bottom=0)
+    ax.set_title("deposit: nanoseconds an ant-step", fontsize=drawing.SMALL, loc="left")
+    ax.set_xlabel("cells of the table", fontsize=drawing.SMALL)
+    handles, labels = axes[0, 0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper center", ncols=3, frameon=False,
+                  fontsize=drawing.TINY)  # fmt: skip
+    figure.savefig(path, dpi=200)
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Measure, draw and print; returns the exit code."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--out", default=".", help="folder of the figures")
+    options = parser.parse_args(arguments)
+    out = Path(options.out)
+    out.mkdir(parents=True, exist_ok=True)
+    arithmetic, bandwidth = roofs()
+    results = measure(arithmetic, bandwidth)
+    table = Table(
+        title=f"{arithmetic / 1e9:.1f} billion operations/s, {bandwidth / 1e9:.0f} GB/s"
+    )
+    for heading in ("kernel", "operations", "bytes", "ns", "bound, ns", "of bound"):
+        table.add_column(heading, justify="left" if heading == "kernel" else "right")
+    for number, result in enumerate(results, start=1):
+        kernel = result.kernel
+        table.add_row(
+            f"{number} {kernel.name}",
+            f"{kernel.operations:.0f}",
+            f"{kernel.nbytes:.0f}",
+            f"{result.ns:.1f}",
+            f"{result.bound_ns:.1f}",
+            f"{result.bound_ns / result.ns:.0%}",
+        )
+    Console(width=100).print(table)
+    draw_roofline(results, arithmetic, bandwidth, out / "speed-roofline.png")
+    draw_scaling(out / "speed-scaling.png")
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

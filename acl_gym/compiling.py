@@ -59,4 +59,4 @@ def _is_ours(event: Any) -> bool:
 
 
 announcer = Announcer()
-register("numba:compile", announcer)
+register("numba:compile", announcer)  # type: ignore[no-untyped-call]

@@ -114,6 +114,12 @@ def train(
     seed: Annotated[
         int, typer.Option(min=0, metavar="N", help="The run is a function of it.")
     ] = 0,
+    threads: Annotated[
+        int,
+        typer.Option(
+            min=1, metavar="N", help="For many thousand ants; changes no result."
+        ),
+    ] = 1,
     out: Annotated[
         Path | None,
         typer.Option(
@@ -145,9 +151,10 @@ def train(
     debug: DebugOption = False,
 ) -> None:
     """Learn; see `HELP`."""
-    from acl_gym import storage
+    from acl_gym import set_num_threads, storage
 
     with bad_arguments():
+        set_num_threads(threads)
         out = storage.checked_target(
             _free_name(env_id) if out is None else storage.with_suffix(out)
         )

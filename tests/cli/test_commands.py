@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import os
 import subprocess
 import sys
 import tomllib
@@ -14,6 +15,7 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
+import acl_gym
 from acl_gym import ACL, Crisp, Fuzzy, PolicyEvaluation, QLearning, evaluate_policy_cost
 from acl_gym.cli.common import AGENTS, parse_settings
 from acl_gym.cli.envs import describe, parameters
@@ -184,6 +186,16 @@ def test_partitions_and_cells() -> None:
     assert whole["partition"] == "Fuzzy(40 x 41 cells, circular=[0])"
     one = figures(*SMALL, "--cells", "5", "--trials", "1")
     assert one["partition"] == "Fuzzy(5 x 5 cells, circular=[0])"
+
+
+def test_threads_are_set_and_change_nothing() -> None:
+    results = []
+    for threads in range(min(2, os.cpu_count() or 1), 0, -1):
+        found = figures(*SMALL, "--threads", str(threads))
+        assert acl_gym.get_num_threads() == threads
+        results.append((found["policy_cost"], found["env_steps"]))
+    assert len(set(results)) == 1
+    assert "at most" in refused(2, *SMALL, "--threads", "9999")
 
 
 @pytest.mark.parametrize(

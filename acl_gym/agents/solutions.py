@@ -113,12 +113,15 @@ class Solutions:
             index: the cells of what `ants` saw, `(m, k)`.
             actions: what they chose, `(m,)`.
         """
-        seen = index if self._one_cell else observation.reshape(self.n_ants, -1)
+        seen = index
+        if not self._one_cell:
+            flat = observation.ndim == 2
+            seen = observation if flat else observation.reshape(self.n_ants, -1)
         rows = self._rows
         if rows is None or rows.dtype != seen.dtype or rows.shape[2] != seen.shape[1]:
             shape = (self.max_steps, self.n_ants, seen.shape[1])
             self._rows = rows = np.empty(shape, dtype=seen.dtype)
-        self._state_shape = observation.shape[1:]
+            self._state_shape = observation.shape[1:]
         by_slot = not self._one_cell
         _append(ants, seen, by_slot, actions, rows, self.action, self.length)
 

@@ -236,7 +236,7 @@ class Walk:
         return allowed
 
     def _read_mask(self, infos: dict[str, Any]) -> None:
-        mask = infos.get("action_mask")
+        mask = infos.get("action_mask") if infos else None
         if mask is None:
             self.action_mask = None
             return

@@ -70,27 +70,34 @@ def _copy(x: Any, y: Any) -> None:
         y[i] = x[i] * 1.5
 
 
-def seconds(run: Callable[[], Any], rounds: int = 15) -> float:
-    """Median seconds of one call, in batches of about two milliseconds."""
-    run()
-    start = time.perf_counter()
-    run()
-    batch = max(1, int(2e-3 / max(time.perf_counter() - start, 1e-7)))
-    results = []
-    for _ in range(rounds):
+def seconds(*runs: Callable[[], Any], rounds: int = 15) -> list[float]:
+    """Median seconds of one call of each, in batches of about two milliseconds.
+
+    Each round goes through all of them, so that a slow moment of the machine hits them
+    alike.
+    """
+    batches = []
+    for run in runs:
+        run()
         start = time.perf_counter()
-        for _ in range(batch):
-            run()
-        results.append((time.perf_counter() - start) / batch)
-    return statistics.median(results)
+        run()
+        batches.append(max(1, int(2e-3 / max(time.perf_counter() - start, 1e-7))))
+    results: list[list[float]] = [[] for _ in runs]
+    for _ in range(rounds):
+        for run, batch, times in zip(runs, batches, results, strict=True):
+            start = time.perf_counter()
+            for _ in range(batch):
+                run()
+            times.append((time.perf_counter() - start) / batch)
+    return [statistics.median(times) for times in results]
 
 
 def roofs() -> tuple[float, float]:
     """Operations and bytes a second of one core: arithmetic, and a copy in cache."""
     x = np.random.default_rng(0).random(2_048)
-    arithmetic = 12 * x.size / seconds(lambda: _multiply_add(x))
     a, b = np.ones((2, 12_000))  # 192 kB together: within the second cache
-    return arithmetic, 16 * a.size / seconds(lambda: _copy(a, b))
+    arithmetic, copying = seconds(lambda: _multiply_add(x), lambda: _copy(a, b))
+    return 12 * x.size / arithmetic, 16 * a.size / copying
 
 
 class Ants:
@@ -146,15 +153,26 @@ class Ants:
 
 
 class Trial:
-    """A trial of random walks over a grid, ready to be deposited."""
+    """A trial of random walks over a grid, ready to be deposited.
 
-    def __init__(self, cells: int, ants: int = 200, steps: int = 100) -> None:
+    Args:
+        cells: centres of each of the two axes.
+        walked: over how many of them, from the first, the ants walk; all if 0.
+        ants: M.
+        steps: T.
+    """
+
+    def __init__(
+        self, cells: int, walked: int = 0, ants: int = 200, steps: int = 100
+    ) -> None:
         rng = np.random.default_rng(1)
-        grid = Fuzzy([np.linspace(-1, 1, cells)] * 2)
+        last = (walked or cells) - 1  # the distance between centres is 1
+        grid = Fuzzy([np.arange(float(cells))] * 2)
         self.solutions = Solutions(ants, steps, 3, grid)
-        everyone, states = np.arange(ants), rng.uniform(-1, 1, (ants, 2))
+        everyone, states = np.arange(ants), rng.uniform(0, last, (ants, 2))
         for _ in range(steps):
-            states = np.clip(states + rng.normal(scale=0.05, size=states.shape), -1, 1)
+            moves = rng.normal(scale=0.025 * last, size=states.shape)
+            states = np.clip(states + moves, 0, last)
             actions = rng.integers(0, 3, ants)
             self.solutions.append(everyone, states, grid(states)[0], actions)
         self.table = Pheromone(grid.n_cells, 3, 1e-4, 3.0)
@@ -211,9 +229,10 @@ class Result:
 
 def measure(arithmetic: float, bandwidth: float) -> list[Result]:
     """Every kernel with its bound: what its operations or its bytes must take."""
-    results = []
-    for kernel in kernels():
-        ns = seconds(kernel.run) / kernel.ants * 1e9
+    results, all_kernels = [], kernels()
+    times = seconds(*(kernel.run for kernel in all_kernels))
+    for kernel, time_of_call in zip(all_kernels, times, strict=True):
+        ns = time_of_call / kernel.ants * 1e9
         bound = max(kernel.operations / arithmetic, kernel.nbytes / bandwidth) * 1e9
         results.append(Result(kernel, ns, bound))
     return results
@@ -243,9 +262,11 @@ def draw_roofline(
         rate = kernel.operations / result.ns
         color = colors[number % len(colors)]
         ax.plot(intensity, rate, marker="o", markersize=5, color=color)
-        ax.annotate(
-            str(number + 1), (intensity, rate), xytext=(5, -3),
-            textcoords="offset points", fontsize=drawing.SMALL, color=color,
+        left = kernel.name in ("locate, 16 cells a state", "decay, 4 cells")
+        ax.annotate(  # beside its neighbour, not over it
+            str(number + 1), (intensity, rate), xytext=(-5 if left else 5, -3),
+            ha="right" if left else "left", textcoords="offset points",
+            fontsize=drawing.SMALL, color=color,
         )  # fmt: skip
     names = [f"{n + 1}  {r.kernel.name}" for n, r in enumerate(results)]
     figure.text(1.01, 0.5, "\n".join(names), fontsize=drawing.TINY, va="center",
@@ -259,40 +280,43 @@ def draw_scaling(path: Path) -> None:
     """Cost over ants, actions, cells a state, and cells of the table."""
     figure = drawing.new_figure(4.6)
     axes = figure.subplots(2, 2)
-    parts = {
-        "locate": (Ants.locate, "#0072B2"),
-        "select": (Ants.select, "#D55E00"),
-        "decay": (Ants.decay, "#009E73"),
-    }
+    colors = {"locate": "#0072B2", "select": "#D55E00", "decay": "#009E73"}
 
-    def panel(ax: Any, title: str, label: str, xs: Any, make: Any, scale: Any) -> None:
+    def panel(
+        ax: Any, title: str, label: str, xs: Any, make: Any, scale: float
+    ) -> None:
         drawing.prepare(ax)
         made = [make(x) for x in xs]
-        for name, (method, color) in parts.items():
-            ys = [
-                seconds(lambda m=method, c=colony: m(c)) * scale(colony)
-                for colony in made
-            ]
+        runs = [getattr(ants, name) for name in colors for ants in made]
+        times = np.reshape(seconds(*runs), (len(colors), len(xs))) * scale
+        for (name, color), ys in zip(colors.items(), times, strict=True):
             ax.plot(xs, ys, marker=".", color=color, linewidth=1.2, label=name)
         ax.set_title(title, fontsize=drawing.SMALL, loc="left")
         ax.set_xlabel(label, fontsize=drawing.SMALL)
         ax.set_ylim(bottom=0)
         ax.set_xlim(left=0)
 
-    sizes = [250, 1_000, 2_000, 4_000, 8_000]
-    panel(axes[0, 0], "microseconds a step of all ants", "ants", sizes,
-          lambda n: Ants(2, 3, n), lambda c: 1e6)  # fmt: skip
-    panel(axes[0, 1], "nanoseconds an ant-step", "actions", [2, 4, 6, 8, 12, 16],
-          lambda u: Ants(2, u), lambda c: 1e9 / ANTS)  # fmt: skip
-    panel(axes[1, 0], "nanoseconds an ant-step", "cells a state, 2$^d$",
-          [2, 4, 8, 16], lambda k: Ants(k.bit_length() - 1, 3),
-          lambda c: 1e9 / ANTS)  # fmt: skip
+    panel(axes[0, 0], "microseconds a step of all ants", "ants",
+          [250, 1_000, 2_000, 4_000, 8_000], lambda n: Ants(2, 3, n), 1e6)  # fmt: skip
+    panel(axes[0, 1], "nanoseconds an ant-step", "actions",
+          [2, 4, 6, 8, 12, 16], lambda u: Ants(2, u), 1e9 / ANTS)  # fmt: skip
+    panel(axes[1, 0], "nanoseconds an ant-step", "cells a state, 2$^d$", [2, 4, 8, 16],
+          lambda k: Ants(k.bit_length() - 1, 3), 1e9 / ANTS)  # fmt: skip
     ax = axes[1, 1]
     drawing.prepare(ax)
     cells = [20, 40, 100, 200, 400, 800]
-    trials = [Trial(n) for n in cells]
-    ys = [seconds(t.deposit, rounds=7) / t.n_steps * 1e9 for t in trials]
-    ax.semilogx([n * n for n in cells], ys, marker=".", color="#882255", linewidth=1.2)
+    trials = [Trial(n, walked=20) for n in cells] + [Trial(n) for n in cells]
+    times = seconds(*(trial.deposit for trial in trials))
+    for ys, label, style in (
+        (times[: len(cells)], "over the same 400 cells", "-"),
+        (times[len(cells) :], "over all cells", ":"),
+    ):
+        ax.semilogx(
+            [n * n for n in cells], np.array(ys) / trials[0].n_steps * 1e9, style,
+            marker=".", color="#882255", linewidth=1.2, label=label,
+        )  # fmt: skip
+    ax.legend(title="ants walk", fontsize=drawing.TINY, title_fontsize=drawing.TINY,
+              frameon=False)  # fmt: skip
     ax.set_ylim(bottom=0)
     ax.set_title("deposit: nanoseconds an ant-step", fontsize=drawing.SMALL, loc="left")
     ax.set_xlabel("cells of the table", fontsize=drawing.SMALL)

@@ -53,10 +53,11 @@ def finish(
 
 
 @njit(cache=True)
-def all_below(actions: IntArray, n_actions: int) -> bool:
-    """Whether all actions are in 0..n_actions - 1; no early end, so vectorised."""
+def copy_if_below(actions: IntArray, n_actions: int, copied: IntArray) -> bool:
+    """Copy actions; return whether all are in 0..n_actions - 1, vectorised."""
     good = True
     for slot in range(actions.size):
+        copied[slot] = actions[slot]
         good &= (actions[slot] >= 0) & (actions[slot] < n_actions)
     return good
 
@@ -73,6 +74,10 @@ def draw_uniforms(
 def checked_actions(actions: ArrayLike, count: int, n_actions: int) -> IntArray:
     """Return actions as a new int64 array `(count,)` within 0..n_actions - 1."""
     array = np.asarray(actions)
+    checked = np.empty(count, dtype=np.int64)
+    ready = array.dtype == np.int64 and array.shape == checked.shape
+    if ready and copy_if_below(array, n_actions, checked):
+        return checked
     if array.dtype.kind not in "iu":
         raise TypeError(
             f"actions must be integers, got dtype {array.dtype}; "
@@ -84,8 +89,7 @@ def checked_actions(actions: ArrayLike, count: int, n_actions: int) -> IntArray:
         )
     if array.dtype == np.uint64:  # beyond int64 they would come out as negative
         array = np.minimum(array, np.uint64(n_actions))
-    checked = array.astype(np.int64)
-    if not all_below(checked, n_actions):
+    if not copy_if_below(array.astype(np.int64), n_actions, checked):
         slot = int(np.argmax((checked < 0) | (checked >= n_actions)))
         raise ValueError(
             f"actions must lie in 0..{n_actions - 1}, got {np.asarray(actions)[slot]} "

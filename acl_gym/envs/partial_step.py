@@ -25,6 +25,7 @@ class PartialStep:
         self._actions: IntArray = np.empty(num_envs, dtype=np.int64)
         self._rewards: FloatArray = np.empty(num_envs)
         self._reached: BoolArray = np.empty(num_envs, dtype=np.bool_)
+        self._room: tuple[FloatArray, IntArray, FloatArray, BoolArray] | None = None
 
     def __call__(
         self,
@@ -52,12 +53,7 @@ class PartialStep:
         Returns:
             How many have finished.
         """
-        size, m = len(states), slots.size
-        if self._states.size != states.size:
-            self._states = np.empty(states.size)
-        part = self._states[: size * m].reshape(size, m)
-        part_actions = self._actions[:m]
-        part_rewards, part_reached = self._rewards[:m], self._reached[:m]
+        part, part_actions, part_rewards, part_reached = self._room_for(slots, states)
         gather_slots(slots, states, actions, part, part_actions)
         self._system.advance(part, part_actions, uniforms, part_rewards, part_reached)
         n_finished: int = put_slots_back(
@@ -73,6 +69,20 @@ class PartialStep:
             truncated,
         )
         return n_finished
+
+    def _room_for(
+        self, slots: IntArray, states: FloatArray
+    ) -> tuple[FloatArray, IntArray, FloatArray, BoolArray]:
+        """Scratch side by side, that of the last step if as many slots walk."""
+        size, m = len(states), slots.size
+        room = self._room
+        if room is None or room[0].shape != (size, m):
+            if self._states.size != states.size:
+                self._states = np.empty(states.size)
+            part = self._states[: size * m].reshape(size, m)
+            room = part, self._actions[:m], self._rewards[:m], self._reached[:m]
+            self._room = room
+        return room
 
 
 @njit(cache=True)

@@ -316,6 +316,7 @@ def test_the_first_action_out_of_range_is_named(
 ) -> None:
     with pytest.raises(ValueError, match=rf"0\.\.2, got {shown} in slot {slot}\."):
         bookkeeping.checked_actions(actions, 3, 3)
-    plain = bookkeeping.all_below.py_func
-    assert not plain(np.array([0, 2, 5, 9]), 3)
-    assert plain(np.array([0, 2]), 3)
+    plain, copied = bookkeeping.copy_if_below.py_func, np.full(2, -7)
+    assert not plain(np.array([5, 2]), 3, copied)
+    assert plain(np.array([0, 2]), 3, copied)
+    assert copied.tolist() == [0, 2]

@@ -13,7 +13,7 @@ from numba import njit, prange
 
 from acl_gym.agents.pheromone import BoolArray
 from acl_gym.agents.selection import draw_action
-from acl_gym.envs import navigation_kernels, pendulum
+from acl_gym.envs import navigation_kernels, pendulum_kernels
 from acl_gym.envs.system import BLOCK as SLOTS
 from acl_gym.membership import (
     BLOCK as STATES,
@@ -93,13 +93,15 @@ def advance_pendulum(
     rewards: FloatArray,
     reached: BoolArray,
 ) -> None:
-    """See `pendulum.advance`."""
+    """See `pendulum_kernels.advance`."""
     push, stiffness, friction, step, substeps = dynamics
     omega_max, q1, q12, q2, price, bound_1, bound_2 = goal_and_cost
     for block in prange((actions.size + SLOTS - 1) // SLOTS):
         move = push, stiffness, friction, step, substeps
         settle = omega_max, q1, q12, q2, price, bound_1, bound_2
-        pendulum.advance_block(states, actions, move, settle, rewards, reached, block)
+        pendulum_kernels.advance_block(
+            states, actions, move, settle, rewards, reached, block
+        )
 
 
 @njit(cache=True, parallel=True, error_model="numpy")

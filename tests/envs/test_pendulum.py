@@ -7,7 +7,8 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 from scipy.stats import chisquare
 
-from acl_gym.envs import pendulum
+from acl_gym.envs import pendulum_kernels as kernels
+from acl_gym.envs.fast_math import sine
 from acl_gym.envs.pendulum import TWO_PI, Pendulum
 from tests.envs import reference_pendulum as reference
 
@@ -82,8 +83,8 @@ def test_kernels_run_the_same_without_the_compiler() -> None:
     drive = (system._dynamics[0], 19.62, 2.0, 0.05, 2)
     price = (9.0, 1.0, 0.2, 0.1, system._goal_and_cost[4], 0.5, 2.0)
     for states, integrate, settle in (
-        (compiled, pendulum._integrate, pendulum._settle),
-        (plain, pendulum._integrate.py_func, pendulum._settle.py_func),
+        (compiled, kernels.integrate, kernels.settle),
+        (plain, kernels.integrate.py_func, kernels.settle.py_func),
     ):
         rewards, reached = np.empty(40), np.empty(40, dtype=np.bool_)
         integrate(*states[0], actions, *drive)
@@ -99,9 +100,9 @@ def test_sine_is_that_of_numpy() -> None:
     x = np.random.default_rng(2).uniform(-100.0, 100.0, 50_000)
     x[:400] = np.pi / 4 * np.arange(-200, 200) / 2
     x = x[np.abs(x) < 100.0]
-    ours = np.array([pendulum.sine(value) for value in x])
+    ours = np.array([sine(value) for value in x])
     assert np.abs(ours - np.sin(x)).max() < 1e-15
-    plain = np.array([pendulum.sine.py_func(value) for value in x[:1000]])
+    plain = np.array([sine.py_func(value) for value in x[:1000]])
     assert np.abs(plain - np.sin(x[:1000])).max() < 1e-15
 
 

@@ -10,8 +10,10 @@ import sys
 import time
 from pathlib import Path
 
+import gymnasium as gym
 import pytest
 
+from acl_gym import ACL, Fuzzy
 from acl_gym.experiments import runner
 from acl_gym.experiments.runner import Task, TaskFailedError, run_tasks
 
@@ -22,6 +24,14 @@ def square(number: int, calls: str, report) -> dict:
         file.write(f"{number}\n")
     report(0.5)
     return {"square": number * number}
+
+
+def levels(seed: int, report) -> dict:
+    """What a small colony has laid, to the last bit."""
+    env = gym.make_vec("acl_gym/Pendulum-v0", num_envs=30)
+    grid = Fuzzy.from_box(env.single_observation_space, (8, 9), circular=[0])
+    colony = ACL(env, grid, seed=seed, max_steps=60).learn(trials=4)
+    return {"levels": colony.pheromone.levels.tobytes().hex()}
 
 
 def refuse(report) -> dict:
@@ -57,6 +67,18 @@ def test_results_come_in_order_and_are_made_once(tmp_path: Path) -> None:
     assert calls_in(calls) == ["0", "1", "2", "3"]
     assert told.count(("square-2", 1.0)) == 2
     assert not list((tmp_path / "runs").glob(".*")), "no temporary file may stay"
+
+
+def test_seeds_in_processes_give_the_bits_of_seeds_in_series(tmp_path: Path) -> None:
+    seeds = range(4)
+    made = run_tasks(
+        [Task(f"seed-{n}", levels, (n,), {"seed": n}) for n in seeds],
+        tmp_path / "runs",
+        workers=2,
+    )
+    in_series = [levels(n, lambda fraction: None)["levels"] for n in seeds]
+    assert [result["levels"] for result in made] == in_series
+    assert len(set(in_series)) == len(in_series), "seeds differ"
 
 
 def test_other_settings_or_other_code_run_again(

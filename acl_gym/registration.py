@@ -23,6 +23,10 @@ ENVIRONMENTS = {
         "acl_gym.envs.navigation:NavigationEnv",
         "acl_gym.envs.navigation:NavigationVectorEnv",
     ),
+    "acl_gym/TwoState-v0": (
+        "acl_gym.envs.two_state:TwoStateEnv",
+        "acl_gym.envs.two_state:TwoStateVectorEnv",
+    ),
 }
 
 

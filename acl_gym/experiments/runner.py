@@ -1,8 +1,8 @@
 """Runs in processes, each result kept as soon as it is there.
 
-A result is one JSON file, written to a temporary name and renamed. A run that is there
+A result is one file, written to a temporary name and renamed. A run that is there
 already, made by the same code with the same settings, is not made again: a comparison
-that was killed goes on where it stopped.
+that was killed goes on where it stopped. One runner at a time works on a folder.
 """
 
 from __future__ import annotations
@@ -15,15 +15,19 @@ import os
 import platform
 import queue
 import signal
+import subprocess
 import threading
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Generator, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
+
+from filelock import FileLock, Timeout
 
 import acl_gym
 from acl_gym.storage import write_atomically
@@ -60,7 +64,29 @@ class Task:
 
 
 class TaskFailedError(RuntimeError):
-    """A task raised an exception, or its process died."""
+    """A task raised an exception, its process died, or its result was not written."""
+
+
+class FolderInUseError(RuntimeError):
+    """Another runner works on the folder."""
+
+
+class Store(Protocol):
+    """Where results are kept, one a task."""
+
+    directory: Path
+
+    def read(self, task: Task) -> Result | None:
+        """The kept result of a task; None if there is none that may be used."""
+
+    def write(self, task: Task, result: Result) -> None:
+        """Keep a result: afterwards all of it is there, or nothing."""
+
+
+Finished = Generator[tuple[Task, Result], None, None]
+
+Executor = Callable[[list[Task], Progress], Finished]
+"""Runs tasks and yields each with its result, in any order."""
 
 
 def run_tasks(
@@ -69,6 +95,8 @@ def run_tasks(
     *,
     workers: int,
     progress: Progress | None = None,
+    store: Store | None = None,
+    executor: Executor | None = None,
 ) -> list[Result]:
     """Return the result of every task, in order, running those that are not there.
 
@@ -80,32 +108,70 @@ def run_tasks(
         directory: where results are kept.
         workers: processes, >= 1.
         progress: told how far each task is; 1.0 at once for one that was there.
+        store: how they are kept; None takes JSON files in `directory`.
+        executor: who runs them; None takes `workers` processes here.
 
     Raises:
-        TaskFailedError: a task failed. The results of the others are kept.
+        TaskFailedError: a task failed, or its result could not be written. The results
+            of the others are kept.
+        FolderInUseError: another runner works on `directory`.
     """
     tasks = list(tasks)
     directory.mkdir(parents=True, exist_ok=True)
+    kept = JsonStore(directory) if store is None else store
+    execute = executor or partial(in_processes, workers=workers)
     tell = progress or (lambda name, fraction: None)
     results: dict[str, Result] = {}
-    for task in tasks:
-        kept = _read(task, directory)
-        if kept is not None:
-            results[task.name] = kept
-            tell(task.name, 1.0)
-    missing = [task for task in tasks if task.name not in results]
-    if missing:
-        results |= _run_in_processes(missing, directory, workers, tell)
+    with _alone_in(directory):
+        for task in tasks:
+            found = kept.read(task)
+            if found is not None:
+                results[task.name] = found
+                tell(task.name, 1.0)
+        missing = [task for task in tasks if task.name not in results]
+        if missing:
+            with closing(execute(missing, tell)) as finished:
+                for task, result in finished:
+                    made = {**result, "made": circumstances(workers)}
+                    _keep(kept, task, made)
+                    results[task.name] = made
+                    tell(task.name, 1.0)
     return [results[task.name] for task in tasks]
 
 
-def _run_in_processes(
-    tasks: list[Task], directory: Path, workers: int, tell: Progress
-) -> dict[str, Result]:
+@contextmanager
+def _alone_in(directory: Path) -> Iterator[None]:
+    """Hold a lock that the system takes back when this process ends, however it does."""
+    lock = FileLock(directory / "running.lock")
+    try:
+        lock.acquire(timeout=0)
+    except Timeout as error:
+        raise FolderInUseError(
+            f"another run works on {directory}; wait for its end, or take another "
+            "folder."
+        ) from error
+    try:
+        yield
+    finally:
+        lock.release()
+
+
+def _keep(store: Store, task: Task, result: Result) -> None:
+    try:
+        store.write(task, result)
+    except OSError as error:
+        raise TaskFailedError(
+            f"the result of {task.name} cannot be written to {store.directory}: "
+            f"{error.strerror or error}; what is finished is kept, make room and call "
+            "again to go on."
+        ) from error
+
+
+def in_processes(tasks: list[Task], tell: Progress, *, workers: int) -> Finished:
+    """Run tasks in processes of this machine; an `Executor` with so many workers."""
     # Spawned, not forked: a fork after torch or OpenMP has started may hang.
     context = multiprocessing.get_context("spawn")
     reports: Any = context.Queue()
-    results = {}
     with ProcessPoolExecutor(
         max_workers=min(workers, len(tasks)),
         mp_context=context,
@@ -121,19 +187,13 @@ def _run_in_processes(
                 _pass_on(reports, tell)
                 for future in done:
                     task = waiting.pop(future)
-                    results[task.name] = {
-                        **_outcome(task, future),
-                        "made": circumstances(workers),
-                    }
-                    _write(task, results[task.name], directory)
-                    tell(task.name, 1.0)
+                    yield task, _outcome(task, future)
         except BaseException:
             # What is under way is lost anyhow: stop now, and not minutes later.
             pool.shutdown(wait=False, cancel_futures=True)
             for process in multiprocessing.active_children():
                 process.terminate()
             raise
-    return results
 
 
 def _outcome(task: Task, future: Future[Result]) -> Result:
@@ -188,39 +248,66 @@ def _pass_on(reports: Any, tell: Progress) -> None:
         tell(name, min(fraction, 0.999))
 
 
-def _file(task: Task, directory: Path) -> Path:
-    return directory / f"{task.name}.json"
+class JsonStore:
+    """A JSON file a task.
 
+    Attributes:
+        directory: where they are.
+    """
 
-def _read(task: Task, directory: Path) -> Result | None:
-    """The kept result of a task; None if there is none that may be used."""
-    try:
-        stored = json.loads(_file(task, directory).read_text())
-    except (FileNotFoundError, json.JSONDecodeError, UnicodeDecodeError):
-        return None
-    if not isinstance(stored, dict) or stored.get("key") != task.key:
-        return None
-    result = stored.get("result")
-    return result if isinstance(result, dict) else None
+    def __init__(self, directory: Path) -> None:
+        self.directory = directory
 
+    def read(self, task: Task) -> Result | None:
+        """See `Store.read`."""
+        try:
+            stored = json.loads(self._file(task).read_text())
+        except (FileNotFoundError, json.JSONDecodeError, UnicodeDecodeError):
+            return None
+        if not isinstance(stored, dict) or stored.get("key") != task.key:
+            return None
+        result = stored.get("result")
+        return result if isinstance(result, dict) else None
 
-def _write(task: Task, result: Result, directory: Path) -> None:
-    text = json.dumps({"key": task.key, "settings": task.settings, "result": result})
-    write_atomically(_file(task, directory), text.encode())
+    def write(self, task: Task, result: Result) -> None:
+        """See `Store.write`."""
+        text = json.dumps(
+            {"key": task.key, "settings": task.settings, "result": result}
+        )
+        write_atomically(self._file(task), text.encode())
+
+    def _file(self, task: Task) -> Path:
+        return self.directory / f"{task.name}.json"
 
 
 # Modules and packages that draw and tell what has been run, and change nothing in it,
-# and the courses, whose settings are in the keys of the runs that they are for.
+# and those whose settings are in the keys of the runs that they are for.
 _LEFT_OUT = frozenset(
     {
+        "aco_theory",
         "captions",
+        "catalogue",
+        "claims",
+        "cli",
+        "cluster",
         "comparison",
+        "compiling",
         "courses",
         "drawing",
         "figures",
+        "grid_drawing",
         "intervals",
+        "navigation_picture",
+        "page",
+        "ranges",
+        "rendering",
         "report",
+        "reproduce",
         "statistics",
+        "store",
+        "systems",
+        "theory",
+        "verdicts",
         "wording",
     }
 )
@@ -242,8 +329,32 @@ def circumstances(workers: int) -> dict[str, Any]:
         "cpu": _cpu_name(),
         "cores": os.cpu_count(),
         "processes": workers,
+        "commit": _commit(),
         **versions(),
     }
+
+
+@cache
+def _commit() -> str | None:
+    """The commit of a checkout, with a plus sign if files differ; None elsewhere."""
+    folder = Path(acl_gym.__file__).parent
+    try:
+        found, changes = (
+            subprocess.run(
+                ["git", "-C", str(folder), *arguments],
+                capture_output=True,
+                text=True,
+                check=True,
+                timeout=10,
+            ).stdout.strip()
+            for arguments in (
+                ("rev-parse", "HEAD"),
+                ("status", "--porcelain", "--untracked-files=no", "."),
+            )
+        )
+    except (OSError, subprocess.SubprocessError):
+        return None
+    return f"{found}+" if changes else found
 
 
 @cache
@@ -263,7 +374,7 @@ def code_fingerprint() -> str:
     package = Path(acl_gym.__file__).parent
     for source in sorted(package.rglob("*.py")):
         parts = source.relative_to(package).with_suffix("").parts
-        if parts[0] == "experiments" and not _LEFT_OUT.isdisjoint(parts):
+        if not _LEFT_OUT.isdisjoint(parts):
             continue
         digest.update(source.relative_to(package).as_posix().encode())
         digest.update(source.read_bytes())

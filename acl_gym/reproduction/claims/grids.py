@@ -1,0 +1,274 @@
+"""Claims C1 to C8: the grid searches of §3.6."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from scipy import stats
+
+from acl_gym.agents.model import TabularModel
+from acl_gym.agents.value_iteration import policy_value, value_iteration
+from acl_gym.evaluation import control_env
+from acl_gym.reproduction.catalogue import GAMMAS_ROW, SIZES
+from acl_gym.reproduction.evidence import Evidence
+from acl_gym.reproduction.settings import Setting
+from acl_gym.reproduction.systems import row, world
+from acl_gym.reproduction.verdicts import Claim, Part, interval, ratio, trial_of
+
+OPTIMUM_1D = 5.0
+"""J of the optimal policy on the row of ten states."""
+
+LATE = 20
+"""So many trials at the end count as late."""
+
+
+def _optimal(evidence: Evidence, setting: Setting) -> Any:
+    return evidence.rows(setting) <= OPTIMUM_1D + 1e-9
+
+
+def c1(evidence: Evidence) -> list[Part]:
+    """rho = 0 never converges."""
+    late = _optimal(evidence, row(global_decay=0.0))[:, -LATE:].all(axis=1)
+    return [
+        Part(
+            f"no run keeps J = 5 over the last {LATE} trials",
+            f"{late.sum()} of {late.size} runs",
+            not late.any(),
+        )
+    ]
+
+
+def c2(evidence: Evidence) -> list[Part]:
+    """rho = 0.1, gamma = 0 converges in every run."""
+    late = _optimal(evidence, row())[:, -LATE:].all(axis=1)
+    return [
+        Part(
+            f"every run keeps J = 5 over the last {LATE} trials",
+            f"{late.sum()} of {late.size} runs",
+            bool(late.all()),
+        )
+    ]
+
+
+def c3(evidence: Evidence) -> list[Part]:
+    """Large rho converges first and does not settle."""
+    parts = []
+    for rho in (0.9, 1.0):
+        optimal = _optimal(evidence, row(global_decay=rho))
+        reached = optimal.any(axis=1)
+        left = np.array(
+            [run.any() and not run[int(run.argmax()) :].all() for run in optimal]
+        )
+        parts += [
+            Part(
+                f"rho = {rho:g}: nine of ten runs come to J = 5 once",
+                f"{reached.mean():.0%}",
+                bool(reached.mean() >= 0.9),
+            ),
+            Part(
+                f"rho = {rho:g}: half of the runs or more leave it again",
+                f"{left.mean():.0%}",
+                bool(left.mean() >= 0.5),
+            ),
+        ]
+    return parts
+
+
+def c4(evidence: Evidence) -> list[Part]:
+    """gamma = 0 is best; the larger gamma, the worse."""
+    gammas = (0.0, *GAMMAS_ROW)
+    means = [
+        evidence.rows(row(local_decay=gamma)).mean(axis=1) for gamma in gammas
+    ]  # over the trials: fast and low is little
+    centres = [interval(each).value for each in means]
+    rank = float(stats.spearmanr(gammas, centres).statistic)
+    listed = ", ".join(
+        f"{gamma:g}: {centre:.3g}"
+        for gamma, centre in zip(gammas, centres, strict=True)
+    )
+    better = [
+        gamma
+        for gamma, values in zip(gammas, means, strict=True)
+        if ratio(values, means[0]).high < 1
+    ]
+    return [
+        Part(
+            "no gamma has a lower mean cost over the trials than gamma = 0: no interval "
+            "of a ratio to it lies below 1",
+            listed,
+            not better,
+        ),
+        Part(
+            "the mean cost rises with gamma: rank correlation of 0.9 or more",
+            f"{rank:.2f}",
+            rank >= 0.9,
+        ),
+    ]
+
+
+def c5(evidence: Evidence) -> list[Part]:
+    """More ants, fewer trials; all reach the optimum."""
+    first, ends = [], []
+    for ants in (1, 5, 9):
+        optimal = _optimal(evidence, replace(row(), ants=ants))
+        first.append(float(np.median(trial_of(optimal))))
+        ends.append(float(optimal[:, -1].mean()))
+    return [
+        Part(
+            "the median trial from which on J = 5 falls from 1 to 5 to 9 ants",
+            ", ".join(f"{each:g}" for each in first),
+            first[0] > first[1] > first[2],
+        ),
+        Part(
+            "with each number 95% of the runs or more end at J = 5",
+            ", ".join(f"{each:.0%}" for each in ends),
+            min(ends) >= 0.95,
+        ),
+    ]
+
+
+def _exact(setting: Setting) -> tuple[Any, Any, Any]:
+    """The model, its optimum, and the states that are no goals."""
+    env = setting.make_env(1)
+    model = TabularModel.of(env)
+    optimum = value_iteration(model)
+    goals = control_env(env).system.goal_states  # type: ignore[attr-defined]
+    return model, optimum, np.setdiff1d(np.arange(len(optimum.values)), goals)
+
+
+def c6(evidence: Evidence) -> list[Part]:
+    """J is about (mean shortest path) / p."""
+    parts = []
+    shortest = float(-_exact(world())[1].values[_exact(world())[2]].mean())
+    for p in (0.5, 0.7, 0.9, 1.0):
+        model, _, free = _exact(world(p=p))
+        costs = np.array(
+            [
+                -policy_value(model, policy.best_actions())[free].mean()
+                for policy in evidence.policies(world(p=p))
+            ]
+        )
+        found = interval(costs)
+        parts.append(
+            Part(
+                f"p = {p:g}: the last policy costs {shortest / p:.2f} within 10%",
+                str(found),
+                abs(found.value * p / shortest - 1) <= 0.1,
+            )
+        )
+    return parts
+
+
+def c7(evidence: Evidence) -> list[Part]:
+    """p = 0.5 and p = 0.9 give nearly the same policy."""
+    _, optimum, free = _exact(world())
+    values = optimum.action_values[free]
+    single = (values >= values.max(axis=1, keepdims=True) - 1e-6).sum(axis=1) == 1
+    cells = free[single]
+    low, high = (
+        np.array([policy.best_actions()[cells] for policy in evidence.policies(s)])
+        for s in (world(p=0.5), world(p=0.9))
+    )
+    between = float((low == high).mean())
+    within = float(
+        np.mean([(each == np.roll(each, 1, axis=0)).mean() for each in (low, high)])
+    )
+    return [
+        Part(
+            "where one action is best, the policies agree in 90% of the cells or more",
+            f"{between:.0%}",
+            between >= 0.9,
+        ),
+        Part(
+            "they agree as often as two runs at one p, within 5 points",
+            f"{between:.0%} against {within:.0%}",
+            between >= within - 0.05,
+        ),
+    ]
+
+
+def c8(evidence: Evidence) -> list[Part]:
+    """Trials depend on coverage, hardly on size."""
+    trials: dict[tuple[str, float], Any] = {}
+    for size, states in SIZES.items():
+        for share in (0.2, 1.0):
+            costs = evidence.rows(world(size, max(1, round(share * states))))
+            end = np.median(costs[:, -LATE:], axis=1, keepdims=True)
+            trials[size, share] = trial_of(costs <= 1.05 * end)
+    parts = []
+    for size in SIZES:
+        found = ratio(trials[size, 0.2], trials[size, 1.0])
+        parts.append(
+            Part(
+                f"{size}: with 20% of the ants at least 1.5 times the trials until the "
+                "cost stays within 5% of its end",
+                str(found),
+                found.value >= 1.5,
+            )
+        )
+    for share in (0.2, 1.0):
+        found = ratio(trials["31x31", share], trials["11x11", share])
+        parts.append(
+            Part(
+                f"{share:.0%}: at most twice the trials on 7.4 times the states",
+                str(found),
+                found.value <= 2.0,
+            )
+        )
+    return parts
+
+
+CLAIMS = (
+    Claim("C1", "rho = 0 never converges.", "§3.6.3", ("fig3.6",), c1),
+    Claim(
+        "C2",
+        "rho = 0.1 with gamma = 0 converges to the optimum, J = 5, in every run.",
+        "§3.6.3",
+        ("fig3.6",),
+        c2,
+    ),
+    Claim(
+        "C3",
+        "A large rho (0.9, 1) converges first, and does not settle afterwards.",
+        "§3.6.3",
+        ("fig3.6",),
+        c3,
+    ),
+    Claim(
+        "C4",
+        "gamma = 0 is best; the larger gamma, the worse.",
+        "§3.6.4",
+        ("fig3.6", "fig3.8"),
+        c4,
+    ),
+    Claim(
+        "C5",
+        "More ants need fewer trials; 1, 5 and 9 ants all reach the optimum.",
+        "§3.6.5",
+        ("fig3.9",),
+        c5,
+    ),
+    Claim(
+        "C6",
+        "The policy costs about the mean shortest path divided by p.",
+        "§3.6.7",
+        ("fig3.11",),
+        c6,
+    ),
+    Claim(
+        "C7",
+        "p = 0.5 and p = 0.9 give nearly the same policy.",
+        "§3.6.7",
+        ("fig3.13",),
+        c7,
+    ),
+    Claim(
+        "C8",
+        "How many trials it takes depends on the coverage by ants, hardly on the size.",
+        "§3.6.8",
+        ("fig3.14",),
+        c8,
+    ),
+)

@@ -1,0 +1,399 @@
+"""Claims C13 to C20: the pendulum of §5.3."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from scipy import stats
+
+from acl_gym.evaluation import record_trajectory
+from acl_gym.reproduction.catalogue import ANTS, GAMMAS, NEARLY_ONE, RHOS, partitions
+from acl_gym.reproduction.evidence import Evidence, FloatArray
+from acl_gym.reproduction.settings import Setting
+from acl_gym.reproduction.systems import swing
+from acl_gym.reproduction.verdicts import (
+    Claim,
+    Part,
+    interval,
+    middle_half,
+    ratio,
+    swing_at_the_end,
+)
+
+OPTIMUM = 38.5
+"""J* on the evaluation set, by value iteration on fine cells (docs/comparison.md)."""
+
+SETTLED = 0.25
+"""A run has settled if its cost swings by less than this in the last 20 trials."""
+
+GOOD = 3.0
+"""A run has come to something if its last policies cost less than so many J*."""
+
+
+def _late(evidence: Evidence, setting: Setting) -> FloatArray:
+    """The mean cost of the policy over the last ten trials of each run."""
+    return np.asarray(evidence.rows(setting)[:, -10:].mean(axis=1))
+
+
+def _converged(evidence: Evidence, setting: Setting) -> tuple[bool, str]:
+    """Whether most runs have settled, and on a policy that is some good."""
+    costs = evidence.rows(setting)
+    settled = swing_at_the_end(costs) <= SETTLED
+    good = _late(evidence, setting) <= GOOD * OPTIMUM
+    share = float((settled & good).mean())
+    return share > 0.5, f"{share:.0%} of the runs, cost {interval(costs[:, -1])}"
+
+
+CONVERGES = (
+    f"in most runs the cost swings by less than {SETTLED:.0%} over the last 20 trials "
+    f"and ends below {GOOD:g} J*"
+)
+
+
+def c13(evidence: Evidence) -> list[Part]:
+    """Crisp: where it converges as rho varies."""
+    parts = []
+    for rho in (0.0, 0.5, 1.0):
+        converged, measured = _converged(evidence, swing("crisp", global_decay=rho))
+        parts.append(
+            Part(
+                f"rho = {rho:g} does not converge ({CONVERGES})",
+                measured,
+                not converged,
+            )
+        )
+    ends = {rho: _late(evidence, swing("crisp", global_decay=rho)) for rho in RHOS}
+    centres = {rho: interval(costs).value for rho, costs in ends.items()}
+    listed = ", ".join(f"{rho:g}: {cost:.3g}" for rho, cost in centres.items())
+    settled = swing_at_the_end(evidence.rows(swing("crisp", global_decay=0.1)))
+    above = ratio(ends[0.1], ends[0.001])
+    return [
+        *parts,
+        Part(
+            "of all rho, 0.001 ends lowest",
+            listed,
+            min(centres, key=lambda rho: centres[rho]) == 0.001,
+        ),
+        Part(
+            f"rho = 0.1 settles: most runs swing by less than {SETTLED:.0%}",
+            f"{(settled <= SETTLED).mean():.0%} of the runs",
+            bool((settled <= SETTLED).mean() > 0.5),
+        ),
+        Part(
+            "rho = 0.1 ends higher than 0.001: the interval of the ratio lies above 1",
+            str(above),
+            above.low > 1,
+        ),
+    ]
+
+
+def c14(evidence: Evidence) -> list[Part]:
+    """Fuzzy converges for every rho > 0."""
+    parts = []
+    for rho in RHOS[1:]:
+        converged, measured = _converged(evidence, swing("fuzzy", global_decay=rho))
+        parts.append(
+            Part(f"rho = {rho:g} converges ({CONVERGES})", measured, converged)
+        )
+    return parts
+
+
+def _by_gamma(evidence: Evidence, kind: str) -> dict[float, FloatArray]:
+    return {g: _late(evidence, swing(kind, local_decay=g)) for g in GAMMAS}
+
+
+def c15(evidence: Evidence) -> list[Part]:
+    """Crisp: gamma = 0.1 is clearly best."""
+    ends = _by_gamma(evidence, "crisp")
+    centres = {gamma: interval(costs).value for gamma, costs in ends.items()}
+    second = min((g for g in GAMMAS if g != 0.1), key=lambda gamma: centres[gamma])
+    lead = ratio(ends[second], ends[0.1])
+    parts = [
+        Part(
+            "gamma = 0.1 ends lowest, and clearly: the interval of the ratio of the "
+            "second (if it is second) to it lies above 1",
+            f"gamma = {second:g} to 0.1: {lead}",
+            lead.low > 1,
+        )
+    ]
+    for gamma in (0.5, NEARLY_ONE):
+        converged, measured = _converged(evidence, swing("crisp", local_decay=gamma))
+        parts.append(
+            Part(
+                f"gamma = {gamma:g} does not converge ({CONVERGES})",
+                measured,
+                not converged,
+            )
+        )
+    return parts
+
+
+def c16(evidence: Evidence) -> list[Part]:
+    """Fuzzy: gamma matters little, 0.1 a little best."""
+    centres = {g: interval(c).value for g, c in _by_gamma(evidence, "fuzzy").items()}
+    small = [centres[gamma] for gamma in GAMMAS if gamma <= 0.1]
+    listed = ", ".join(f"{gamma:g}: {cost:.3g}" for gamma, cost in centres.items())
+    return [
+        Part(
+            "up to gamma = 0.1 the dearest costs at most 1.2 times the cheapest",
+            f"{max(small) / min(small):.2f}",
+            max(small) <= 1.2 * min(small),
+        ),
+        Part(
+            "of all gamma, 0.1 ends lowest",
+            listed,
+            min(centres, key=lambda gamma: centres[gamma]) == 0.1,
+        ),
+    ]
+
+
+def c17(evidence: Evidence) -> list[Part]:
+    """More ants are faster and better."""
+    parts, ends = [], {}
+    for kind in ("fuzzy", "crisp"):
+        late = {m: interval(_late(evidence, swing(kind, m))).value for m in ANTS}
+        whole = {
+            m: interval(evidence.rows(swing(kind, m)).mean(axis=1)).value for m in ANTS
+        }
+        ends[kind] = late
+        for what, values in (("last policies", late), ("mean over trials", whole)):
+            rank = float(stats.spearmanr(ANTS, list(values.values())).statistic)
+            listed = ", ".join(f"{m}: {cost:.3g}" for m, cost in values.items())
+            parts.append(
+                Part(
+                    f"{kind}: the cost ({what}) falls with M: rank correlation of -0.8 "
+                    "or less",
+                    f"{rank:.2f} ({listed})",
+                    rank <= -0.8,
+                )
+            )
+    gain = ends["fuzzy"][250] / ends["fuzzy"][2000]
+    enough = [m for m in ANTS if ends["crisp"][m] <= 1.05 * ends["fuzzy"][250]]
+    parts += [
+        Part(
+            "fuzzy: 250 ants end within 10% of 2000",
+            f"{gain:.3f} times",
+            gain <= 1.1,
+        ),
+        Part(
+            "crisp comes within 5% of 250 fuzzy ants, with 1000 ants or more only",
+            f"with {enough[0]} ants" if enough else "not with 2000 ants",
+            bool(enough) and enough[0] >= 1000,
+        ),
+    ]
+    return parts
+
+
+def trajectory(evidence: Evidence, setting: Setting, run: int) -> Any:
+    """From hanging at rest, by the last policy of a run."""
+    policy = evidence.policy(setting, run)
+    return record_trajectory(policy, setting.make_env(1), np.zeros(2), max_steps=300)
+
+
+def swing_up(path: Any) -> tuple[float, int]:
+    """Seconds until the goal (infinity if never), and how often the velocity turns."""
+    omega = path.states[1:, 1]
+    turns = int(np.sum(np.diff(np.sign(omega[np.abs(omega) > 0.5])) != 0))
+    seconds = 0.1 * len(path.actions) if path.success else float("inf")
+    return seconds, turns
+
+
+def c18(evidence: Evidence) -> list[Part]:
+    """Fuzzy swings up in 3 s and 2 s, crisp takes several more swings."""
+    parts, turns = [], {}
+    for gamma, seconds in ((0.01, 3.0), (0.1, 2.0)):
+        setting = swing("fuzzy", local_decay=gamma)
+        best = swing_up(trajectory(evidence, setting, evidence.best_run(setting)))
+        runs = range(len(evidence.runs(setting)))
+        every = [swing_up(trajectory(evidence, setting, run))[0] for run in runs]
+        turns[gamma] = best[1]
+        parts.append(
+            Part(
+                f"gamma = {gamma:g}: the best fuzzy policy is up within 0.5 s of "
+                f"{seconds:g} s",
+                f"{best[0]:.1f} s; the runs in the median {np.median(every):.1f} s",
+                abs(best[0] - seconds) <= 0.5,
+            )
+        )
+    for label, setting in (
+        ("rho = 0.001", swing("crisp", global_decay=0.001)),
+        ("gamma = 0.1", swing("crisp", local_decay=0.1)),
+        ("M = 2000", swing("crisp", 2000)),
+    ):
+        seconds, count = swing_up(
+            trajectory(evidence, setting, evidence.best_run(setting))
+        )
+        parts.append(
+            Part(
+                f"the best crisp policy ({label}) swings more often than the fuzzy one",
+                f"{count} turns in {seconds:.1f} s against {turns[0.01]}",
+                count > turns[0.01],
+            )
+        )
+    return parts
+
+
+def c19(evidence: Evidence) -> list[Part]:
+    """Crisp gains little past N = 32, fuzzy gains steadily."""
+    parts, late = [], {}
+    for kind in ("crisp", "fuzzy"):
+        late[kind] = [_late(evidence, s.setting) for s in partitions(kind)]
+    first, second = (ratio(late["crisp"][i], late["crisp"][i + 1]) for i in (0, 1))
+    parts += [
+        Part(
+            "crisp: N = 16 costs at least 1.1 times what N = 32 costs",
+            str(first),
+            first.value >= 1.1,
+        ),
+        Part(
+            "crisp: N = 32 costs at most 1.1 times what N = 64 costs",
+            str(second),
+            second.value <= 1.1,
+        ),
+    ]
+    for i, pair in enumerate(((16, 32), (32, 64))):
+        found = ratio(late["fuzzy"][i], late["fuzzy"][i + 1])
+        parts.append(
+            Part(
+                f"fuzzy: N = {pair[0]} costs more than N = {pair[1]}: the interval of "
+                "the ratio lies above 1",
+                str(found),
+                found.low > 1,
+            )
+        )
+    spread = middle_half(late["fuzzy"][2]) / float(np.median(late["fuzzy"][2]))
+    parts.append(
+        Part(
+            "fuzzy, N = 64: the middle half of the runs is within 5% of their median",
+            f"{spread:.1%}",
+            spread <= 0.05,
+        )
+    )
+    return parts
+
+
+def structure(policy: Any, setting: Setting) -> tuple[float, float, float]:
+    """How structured a policy is, at the centres of its cells.
+
+    Returns:
+        The share of neighbouring pairs of cells with the same action; of cells within
+        0.5 rad of hanging whose torque drives the motion; of cells within 0.5 rad of
+        upright and moving away whose torque brakes it.
+    """
+    n_theta, n_omega = setting.cells
+    action = policy.best_actions().reshape(n_theta, n_omega) - 1  # -1, 0, 1
+    same_theta = action == np.roll(action, 1, axis=0)
+    same_omega = action[:, 1:] == action[:, :-1]
+    smooth = np.concatenate([same_theta.ravel(), same_omega.ravel()]).mean()
+    theta, omega = np.meshgrid(*policy.partition.centres, indexing="ij")
+    from_hanging = (theta + np.pi) % (2 * np.pi) - np.pi
+    from_upright = theta - np.pi
+    moving = np.abs(omega) > 0.5
+    low = moving & (np.abs(from_hanging) < 0.5)
+    away = moving & (np.abs(from_upright) < 0.5) & (from_upright * omega > 0)
+    drives = (action * np.sign(omega) > 0)[low].mean()
+    brakes = (action * np.sign(omega) < 0)[away].mean()
+    return float(smooth), float(drives), float(brakes)
+
+
+def c20(evidence: Evidence) -> list[Part]:
+    """The fuzzy policy is structured, the crisp one noisy."""
+    found = {}
+    for kind in ("fuzzy", "crisp"):
+        setting = swing(kind)
+        found[kind] = np.array(
+            [structure(policy, setting) for policy in evidence.policies(setting)]
+        )
+    smoother = ratio(found["fuzzy"][:, 0], found["crisp"][:, 0])
+    drives, brakes = (interval(found["fuzzy"][:, i]) for i in (1, 2))
+    more = ratio(found["fuzzy"][:, 1], found["crisp"][:, 1])
+    return [
+        Part(
+            "fuzzy: neighbouring cells have the same action more often: the interval of "
+            "the ratio to crisp lies above 1",
+            str(smoother),
+            smoother.low > 1,
+        ),
+        Part(
+            "fuzzy: near hanging the torque drives the motion in 80% of the cells",
+            str(drives),
+            drives.value >= 0.8,
+        ),
+        Part(
+            "fuzzy: near upright the torque brakes what moves away in 80% of the cells",
+            str(brakes),
+            brakes.value >= 0.8,
+        ),
+        Part(
+            "near hanging fuzzy drives the motion in more cells than crisp: the "
+            "interval of the ratio lies above 1",
+            str(more),
+            more.low > 1,
+        ),
+    ]
+
+
+CLAIMS = (
+    Claim(
+        "C13",
+        "Crisp ACL does not converge for rho = 0, 0.5 and 1; rho = 0.001 is best; "
+        "rho = 0.1 settles at a higher cost.",
+        "§5.3.1",
+        ("fig5.2",),
+        c13,
+    ),
+    Claim(
+        "C14",
+        "Fuzzy ACL converges for every rho > 0, also for 1.",
+        "§5.3.1",
+        ("fig5.4",),
+        c14,
+    ),
+    Claim(
+        "C15",
+        "For crisp ACL gamma = 0.1 is clearly best; gamma = 0.5 and 1 do not converge.",
+        "§5.3.2",
+        ("fig5.7",),
+        c15,
+    ),
+    Claim(
+        "C16",
+        "For fuzzy ACL gamma matters little; 0.1 is a little best.",
+        "§5.3.2",
+        ("fig5.9",),
+        c16,
+    ),
+    Claim(
+        "C17",
+        "More ants are faster and better; fuzzy needs no more than 250, crisp about ten "
+        "times as many.",
+        "§5.3.3",
+        ("fig5.12", "fig5.14"),
+        c17,
+    ),
+    Claim(
+        "C18",
+        "From hanging at rest the fuzzy policy swings up in about 3 s (gamma = 0.01) "
+        "and 2 s (gamma = 0.1); the crisp one takes several more swings.",
+        "§5.3",
+        ("fig5.3", "fig5.5", "fig5.8", "fig5.10", "fig5.13"),
+        c18,
+    ),
+    Claim(
+        "C19",
+        "With finer cells crisp gains little past N = 32; fuzzy gains steadily and is "
+        "nearly without spread at N = 64.",
+        "§5.3.4",
+        ("fig5.16", "fig5.17"),
+        c19,
+    ),
+    Claim(
+        "C20",
+        "The fuzzy policy is structured (it destabilises near hanging and stabilises "
+        "near upright), the crisp one is noisy.",
+        "§5.3",
+        ("fig5.6",),
+        c20,
+    ),
+)

@@ -7,13 +7,15 @@ from typing import Annotated
 import typer
 
 import acl_gym
-from acl_gym.cli.common import DebugOption, Group
+from acl_gym.cli.common import Command, DebugOption, Group
 from acl_gym.cli.compare import HELP as COMPARE_HELP
 from acl_gym.cli.compare import CompareCommand, compare
 from acl_gym.cli.envs import HELP as ENVS_HELP
 from acl_gym.cli.envs import envs
 from acl_gym.cli.evaluate import HELP as EVALUATE_HELP
 from acl_gym.cli.evaluate import evaluate
+from acl_gym.cli.reproduce import HELP as REPRODUCE_HELP
+from acl_gym.cli.reproduce import REPORT_HELP, ReproduceCommand, report, reproduce
 from acl_gym.cli.train import HELP as TRAIN_HELP
 from acl_gym.cli.train import train
 
@@ -25,6 +27,7 @@ Examples:
   acl-gym train acl_gym/Pendulum-v0 --out a.npz   learn, a few seconds
   acl-gym evaluate a.npz                          what the policy costs
   acl-gym compare                                 ants, Q-learning and DQN
+  acl-gym reproduce fig5.4 --runs 3               a figure of the thesis
 
 Each command explains itself: acl-gym train --help. It ends with exit code 0 for
 success, 1 for a run that failed, 2 for bad arguments, 130 for Ctrl-C.
@@ -60,3 +63,5 @@ app.command(help=TRAIN_HELP)(train)
 app.command(help=EVALUATE_HELP)(evaluate)
 app.command(help=ENVS_HELP)(envs)
 app.command(help=COMPARE_HELP, cls=CompareCommand)(compare)
+app.command(help=REPRODUCE_HELP, cls=ReproduceCommand)(reproduce)
+app.command(help=REPORT_HELP, cls=Command)(report)

@@ -34,6 +34,26 @@ from acl_gym.storage import write_atomically
 EXECUTORS = ("local", "ray")
 TASKS = "tasks"  # the folder of the raw results
 
+CURVES = ("policy_cost", "ants_cost", "policy_variation", "sensitivity")
+"""The measures that are kept trial by trial for the report."""
+
+_BAND = "Black, the mean of the runs; grey, from the lowest to the highest of them"
+CAPTIONS = {
+    "bands": f"{_BAND}; dashed, the optimal cost where it is known.",
+    "measures": f"{_BAND}.",
+    "policies": "The last policy of the run whose last policy is the cheapest.",
+    "baseline": "Forces at rest, and ways to the goal.",
+    "bands_and_policies": f"{_BAND}; dashed, the optimal cost. Below, the last policy of "
+    "the run whose last policy is the cheapest: white is the full positive torque, black "
+    "the negative one, grey none.",
+    "swing": "Angle (the line is upright), velocity, torque and cost from hanging at "
+    "rest, by the last policy of the run whose last policy is the cheapest.",
+    "level_band": "The pheromone of the one pair in q: simulated runs between the bounds "
+    "on their expectation.",
+    "policy_gap": "Where the blue and the orange region do not overlap, Delta is "
+    "positive.",
+}
+
 Outcome = dict[str, Any]
 """All that a report needs, JSON types: `experiments`, `claims`, `runs`, `made`."""
 
@@ -167,6 +187,7 @@ def summary(experiment: Experiment, evidence: Evidence) -> dict[str, Any]:
                 "seconds": float(
                     np.median([run["seconds"] for run in evidence.runs(study.setting)])
                 ),
+                "curves": curves(study.setting, evidence),
             }
         )
     return {
@@ -175,7 +196,74 @@ def summary(experiment: Experiment, evidence: Evidence) -> dict[str, Any]:
         "section": experiment.section,
         "text": experiment.text,
         "claims": list(experiment.claims),
+        "caption": CAPTIONS[experiment.drawing],
         "studies": found,
+    }
+
+
+def curves(setting: Setting, evidence: Evidence) -> dict[str, Any]:
+    """Mean, least and largest value of each measure after each trial, 5 digits."""
+    found = {}
+    for measure in CURVES:
+        if measure not in evidence.runs(setting)[0]["rows"]:
+            continue
+        values = evidence.rows(setting, measure)
+        found[measure] = {
+            name: [float(f"{value:.5g}") for value in line]
+            for name, line in (
+                ("mean", values.mean(axis=0)),
+                ("low", values.min(axis=0)),
+                ("high", values.max(axis=0)),
+            )
+        }
+    return found
+
+
+def draw(
+    experiments: Iterable[Experiment],
+    evidence: Evidence,
+    directory: Path,
+    console: Console,
+) -> None:
+    """Draw the figure of each experiment into figures/, as PNG and SVG.
+
+    Args:
+        experiments: which.
+        evidence: their runs.
+        directory: where figures/ is, or is made.
+        console: where progress is shown.
+    """
+    from acl_gym.reproduction import figures
+
+    folder = directory / "figures"
+    folder.mkdir(parents=True, exist_ok=True)
+    with console.status("Drawing") as status:
+        for experiment in experiments:
+            status.update(f"Drawing {experiment.name}")
+            figures.save(experiment, evidence, folder)
+
+
+def write_report(directory: Path) -> Path:
+    """Write report.html from what is in a folder; returns its path."""
+    from acl_gym.reproduction.page import write_page
+
+    return write_page(directory)
+
+
+def figures_only(outcome: Outcome) -> Outcome:
+    """An outcome without its curves, to be printed."""
+    return {
+        **outcome,
+        "experiments": [
+            {
+                **each,
+                "studies": [
+                    {name: value for name, value in study.items() if name != "curves"}
+                    for study in each["studies"]
+                ],
+            }
+            for each in outcome["experiments"]
+        ],
     }
 
 

@@ -107,7 +107,7 @@ def interval(values: FloatArray, seed: int = 0) -> Interval:
         seed: of the bootstrap.
     """
     drawn = _resample(values, np.random.default_rng(seed))
-    low, high = np.quantile(iqm(drawn), [0.025, 0.975])
+    low, high = np.quantile(iqm(drawn), [0.025, 0.975], method="inverted_cdf")
     return Interval(float(iqm(values)), float(low), float(high))
 
 
@@ -123,7 +123,7 @@ def ratio(first: FloatArray, second: FloatArray, seed: int = 0) -> Interval:
     """
     rng = np.random.default_rng(seed)
     drawn = iqm(_resample(first, rng)) / iqm(_resample(second, rng))
-    low, high = np.quantile(drawn, [0.025, 0.975])
+    low, high = np.quantile(drawn, [0.025, 0.975], method="inverted_cdf")
     return Interval(float(iqm(first) / iqm(second)), float(low), float(high))
 
 

@@ -24,14 +24,14 @@ from acl_gym.experiments.figures.policies import (
 Comparison = dict[str, Any]
 
 _WALL, _LINE = "0.25", "0.85"
-_BEST, _OTHER = "0.1", "#D55E00"
-_SHADES = LinearSegmentedColormap.from_list("cost", ["#FFFFFF", "#9CC3DE"])
-_NEVER: dict[str, Any] = {
+BEST, OTHER = "0.1", "#D55E00"
+SHADES = LinearSegmentedColormap.from_list("cost", ["#FFFFFF", "#9CC3DE"])
+NEVER: dict[str, Any] = {
     "facecolor": "#F6D8C6",
     "hatch": "////",
     "edgecolor": "#DDA98B",
 }
-_GOAL: dict[str, Any] = {
+GOAL: dict[str, Any] = {
     "color": "#009E73",
     "marker": "o",
     "markersize": 5,
@@ -58,7 +58,7 @@ def policy_maps(comparison: Comparison) -> Figure:
         figure = drawing.new_figure(0.35 + (height + 0.35) * shape[0], width)
     axes = figure.subplots(*shape, squeeze=False)
     for ax, (title, picture) in zip(axes.flat, panels, strict=False):
-        _draw(ax, scene, picture, norm)
+        draw_policy(ax, scene, picture, norm)
         if is_strip:
             ax.set_ylabel(title, fontsize=SMALL, rotation=0, ha="right", va="center")
         else:
@@ -66,7 +66,7 @@ def policy_maps(comparison: Comparison) -> Figure:
     for ax in axes.flat[len(panels) :]:
         ax.remove()
     shades = figure.colorbar(
-        ScalarMappable(norm, _SHADES),
+        ScalarMappable(norm, SHADES),
         ax=list(axes.flat[: len(panels)]),
         shrink=0.8,
         pad=0.01,
@@ -76,28 +76,29 @@ def policy_maps(comparison: Comparison) -> Figure:
     shades.ax.tick_params(labelsize=TINY)
     shades.outline.set_visible(False)
     handles: list[Any] = [
-        _arrow_handle(_BEST, "a best action"),
-        _arrow_handle(_OTHER, "another action"),
-        Patch(**_NEVER, label="from here never to the goal"),
-        Line2D([], [], **_GOAL, label="goal"),
+        arrow_handle(BEST, "a best action"),
+        arrow_handle(OTHER, "another action"),
+        Patch(**NEVER, label="from here never to the goal"),
+        Line2D([], [], **GOAL, label="goal"),
     ]
     drawing.legend(figure, handles, ncols=4, loc="outside lower center")
     return figure
 
 
-def _draw(
+def draw_policy(
     ax: Axes, scene: dict[str, Any], picture: dict[str, Any], norm: Normalize
 ) -> None:
+    """An arrow a cell, over what the policy costs from there."""
     rows, columns = len(scene["rows"]), len(scene["rows"][0])
     cells = np.array(scene["cells"])
     shown = np.full((rows, columns), np.nan)
     for (row, column), cost in zip(cells, picture["cost_to_go"], strict=True):
         if cost is None:
             corner = (column - 0.5, row - 0.5)
-            ax.add_patch(Rectangle(corner, 1, 1, **_NEVER, linewidth=0))
+            ax.add_patch(Rectangle(corner, 1, 1, **NEVER, linewidth=0))
         else:
             shown[row, column] = cost
-    shades = ax.imshow(shown, cmap=_SHADES, norm=norm)
+    shades = ax.imshow(shown, cmap=SHADES, norm=norm)
     shades.set_zorder(0.5)
     for row, text in enumerate(scene["rows"]):
         for column, character in enumerate(text):
@@ -107,14 +108,14 @@ def _draw(
     lines: dict[str, Any] = {"color": _LINE, "linewidth": 0.5, "zorder": 0.6}
     ax.vlines(np.arange(columns - 1) + 0.5, -0.5, rows - 0.5, **lines)
     ax.hlines(np.arange(rows - 1) + 0.5, -0.5, columns - 0.5, **lines)
-    ax.plot(*cells[scene["goals"]].T[::-1], **_GOAL)
+    ax.plot(*cells[scene["goals"]].T[::-1], **GOAL)
 
     starts = np.setdiff1d(np.arange(len(cells)), scene["goals"])
     actions = np.array(picture["policy_map"])[starts]
     steps = np.array(scene["directions"])[actions]
     best = scene["optimal_actions"]
     colors = [
-        _BEST if action in best[state] else _OTHER
+        BEST if action in best[state] else OTHER
         for state, action in zip(starts, actions, strict=True)
     ]
     ax.quiver(
@@ -139,7 +140,8 @@ def _draw(
     ax.spines[:].set_color("0.4")
 
 
-def _arrow_handle(color: str, label: str) -> Line2D:
+def arrow_handle(color: str, label: str) -> Line2D:
+    """Of the legend: an arrow."""
     return Line2D(
         [],
         [],

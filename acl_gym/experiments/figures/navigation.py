@@ -42,10 +42,10 @@ def policy_maps(comparison: Comparison) -> Figure:
 
     def draw(ax: Axes, number: int) -> None:
         title, picture = panels[number]
-        _draw_forces(ax, comparison["scene"], picture)
+        draw_forces(ax, comparison["scene"], picture)
         ax.set_title(title, fontsize=SMALL)
 
-    figure = _small_multiples(comparison["scene"], len(panels), draw)
+    figure = small_multiples(comparison["scene"], len(panels), draw)
     handles = [
         Line2D(
             *([], []),
@@ -63,7 +63,7 @@ def policy_maps(comparison: Comparison) -> Figure:
             linestyle="",
             label="none",
         ),
-        *_shared_handles(),
+        *shared_handles(),
     ]
     drawing.legend(figure, handles, ncols=4, loc="outside lower center")
     return figure
@@ -83,27 +83,30 @@ def trajectories(comparison: Comparison) -> Figure:
         color = _REFERENCE if agent is None else drawing.style(agent).color
         paths = picture["trajectories"]
         for path in paths:
-            _draw_path(ax, path, color)
+            draw_path(ax, path, color)
         arrived = sum(path["reached"] for path in paths)
         cost = wording.cost(sum(path["cost"] for path in paths) / len(paths))
         ending = f"arrives {arrived} of {len(paths)} times, mean cost {cost}"
         ax.set_title(f"{title}\n{ending}", fontsize=SMALL)
 
-    figure = _small_multiples(comparison["scene"], len(panels), draw)
+    figure = small_multiples(comparison["scene"], len(panels), draw)
     handles = [
-        Line2D([], [], **_end("0.2", reached=True), label="arrived at the goal"),
-        Line2D([], [], **_end("0.2", reached=False), label="time was up"),
-        *_shared_handles(),
+        Line2D([], [], **end("0.2", reached=True), label="arrived at the goal"),
+        Line2D([], [], **end("0.2", reached=False), label="time was up"),
+        *shared_handles(),
     ]
     drawing.legend(figure, handles, ncols=4, loc="outside lower center")
     return figure
 
 
-def _small_multiples(
-    scene: dict[str, Any], count: int, draw: Callable[[Axes, int], None]
+def small_multiples(
+    scene: dict[str, Any],
+    count: int,
+    draw: Callable[[Axes, int], None],
+    columns: int = _COLUMNS,
 ) -> Figure:
     """So many panels of the plane, its damping and its goal; `draw` adds to each."""
-    columns = min(_COLUMNS, count)
+    columns = min(columns, count)
     rows = math.ceil(count / columns)
     width = 0.4 + (drawing.WIDTH - 0.4) * columns / _COLUMNS
     figure = drawing.new_figure(0.6 + 2.45 * rows, width)
@@ -138,7 +141,8 @@ def _small_multiples(
     return figure
 
 
-def _draw_forces(ax: Axes, scene: dict[str, Any], picture: Picture) -> None:
+def draw_forces(ax: Axes, scene: dict[str, Any], picture: Picture) -> None:
+    """An arrow for the force at each position, a dot where there is none."""
     positions = np.array(scene["positions"])
     c1, c2 = np.meshgrid(positions, positions)
     forces = np.array(scene["forces"])[np.array(picture["policy_map"])]
@@ -170,12 +174,14 @@ def _draw_forces(ax: Axes, scene: dict[str, Any], picture: Picture) -> None:
     )
 
 
-def _draw_path(ax: Axes, path: dict[str, Any], color: str) -> None:
+def draw_path(ax: Axes, path: dict[str, Any], color: str) -> None:
+    """A way, and whether it ends at the goal."""
     ax.plot(path["c1"], path["c2"], color=color, linewidth=1.1, zorder=2)
-    ax.plot(path["c1"][-1], path["c2"][-1], **_end(color, reached=path["reached"]))
+    ax.plot(path["c1"][-1], path["c2"][-1], **end(color, reached=path["reached"]))
 
 
-def _end(color: str, *, reached: bool) -> dict[str, Any]:
+def end(color: str, *, reached: bool) -> dict[str, Any]:
+    """The marker at the end of a way."""
     return {
         "color": color,
         "marker": "o" if reached else "x",
@@ -186,7 +192,8 @@ def _end(color: str, *, reached: bool) -> dict[str, Any]:
     }
 
 
-def _shared_handles() -> list[Any]:
+def shared_handles() -> list[Any]:
+    """Of the legend: damping and goal."""
     return [
         Patch(facecolor=_DARK, label="damping, darker is stronger"),
         Patch(facecolor=_GOAL, label="goal"),

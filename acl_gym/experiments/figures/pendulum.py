@@ -33,7 +33,7 @@ _ARRIVAL: dict[str, Any] = {
     "zorder": 3,
     "clip_on": False,
 }
-_GOAL: dict[str, Any] = {
+GOAL: dict[str, Any] = {
     "color": "#D55E00",
     "marker": "o",
     "markersize": 5,
@@ -72,7 +72,7 @@ def policy_maps(comparison: Comparison) -> Figure:
             shading="nearest",
             rasterized=True,
         )
-        ax.plot(math.pi, 0.0, **_GOAL)
+        ax.plot(math.pi, 0.0, **GOAL)
         ax.set_title(title, fontsize=SMALL)
         ax.set_xlim(0.0, 2 * math.pi)
         ax.set_ylim(omega[0], omega[-1])
@@ -90,7 +90,7 @@ def policy_maps(comparison: Comparison) -> Figure:
         Patch(facecolor=grey, edgecolor="0.3", label=drawing.torque(torques[action]))
         for action, grey in zip(order, greys, strict=True)
     ]
-    handles.append(Line2D([], [], **_GOAL, label="goal"))
+    handles.append(Line2D([], [], **GOAL, label="goal"))
     drawing.legend(figure, handles, ncols=len(handles), loc="outside lower center")
     return figure
 

@@ -1,0 +1,112 @@
+"""The report of a reproduction: one HTML page that holds everything and loads nothing."""
+
+from __future__ import annotations
+
+import base64
+import json
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+
+from acl_gym.reproduction.reproduce import Outcome
+from acl_gym.reproduction.verdicts import HOLDS, IN_PART, NOT, UNDECIDED
+from acl_gym.storage import write_atomically
+
+FIGURES = "figures"
+RESULTS = "results.json"
+PAGE = "report.html"
+ANIMATION = "learning.gif"
+
+_CLASSES = {HOLDS: "yes", IN_PART: "part", NOT: "no", UNDECIDED: "open"}
+
+
+def read_outcome(directory: Path) -> Outcome:
+    """What `reproduce` has written.
+
+    Raises:
+        FileNotFoundError: there is nothing of it in `directory`.
+        ValueError: the file is not what `reproduce` writes.
+    """
+    path = directory / RESULTS
+    if not path.is_file():
+        raise FileNotFoundError(
+            f"there is no {RESULTS} in {directory}; `acl-gym reproduce --out "
+            f"{directory}` makes one."
+        )
+    try:
+        outcome = json.loads(path.read_text())
+        if not {"claims", "experiments", "runs"} <= outcome.keys():
+            raise KeyError
+    except (ValueError, AttributeError, KeyError) as error:
+        raise ValueError(
+            f"{path} is not the result of a reproduction; make it again with "
+            "`acl-gym reproduce`."
+        ) from error
+    return dict(outcome)
+
+
+def write_page(directory: Path) -> Path:
+    """Write report.html from the results and figures of a folder.
+
+    Args:
+        directory: with what `reproduce` has written, and the folder figures/.
+
+    Returns:
+        The path of the page, which appears whole or not at all.
+
+    Raises:
+        FileNotFoundError: there are no results.
+        ValueError: the results cannot be read.
+    """
+    outcome = read_outcome(directory)
+    environment = Environment(
+        loader=PackageLoader("acl_gym.reproduction"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    counts = Counter(claim["verdict"] for claim in outcome["claims"])
+    there = {each["name"] for each in outcome["experiments"]}
+    text = environment.get_template("page.html.j2").render(
+        outcome=outcome,
+        counts=[(name, counts[name]) for name in _CLASSES if counts[name]],
+        classes=_CLASSES,
+        there=there,
+        images={
+            each["name"]: _image(directory / FIGURES / f"{each['name']}.png")
+            for each in outcome["experiments"]
+        },
+        animation=_image(directory / FIGURES / ANIMATION),
+        curves={
+            each["name"]: [
+                {"label": study["label"], **study["curves"]}
+                for study in each["studies"]
+            ]
+            for each in outcome["experiments"]
+        },
+        parameters=_parameters,
+    )
+    path = directory / PAGE
+    write_atomically(path, text.encode())
+    return path
+
+
+def _image(path: Path) -> str:
+    """A picture as text, nothing if it is not there."""
+    if not path.is_file():
+        return ""
+    return base64.b64encode(path.read_bytes()).decode("ascii")
+
+
+def _parameters(setting: dict[str, Any]) -> str:
+    """A setting in one line."""
+    parts = [f"{setting['ants']} ants", f"{setting['trials']} trials", setting["kind"]]
+    cells = setting["cells"]
+    if cells is not None:
+        parts.append(cells if isinstance(cells, str) else " x ".join(map(str, cells)))
+    values = {**setting["colony"], **setting["env"]}
+    parts += [f"{name} = {value}" for name, value in values.items()]
+    return ", ".join(parts)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from typing import Any
 
 from acl_gym.experiments.runner import Finished, Progress, Result, Task, TaskFailedError
@@ -24,7 +25,7 @@ def in_ray(tasks: list[Task], tell: Progress) -> Finished:
             "the executor 'ray' needs Ray; pip install 'acl-gym[cluster]'."
         ) from error
     try:
-        ray.init(address="auto", log_to_driver=False, logging_level="ERROR")
+        ray.init(address="auto", log_to_driver=False, logging_level=logging.ERROR)
     except ConnectionError as error:
         raise TaskFailedError(
             "there is no Ray cluster here; `ray start --head` makes one of this "

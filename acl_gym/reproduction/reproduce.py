@@ -54,6 +54,9 @@ CAPTIONS = {
     "positive.",
 }
 
+ANIMATED = "fig5.6"
+"""With this experiment the animation of its policy is drawn."""
+
 Outcome = dict[str, Any]
 """All that a report needs, JSON types: `experiments`, `claims`, `runs`, `made`."""
 
@@ -158,7 +161,7 @@ def reproduce(
         "claims": [claim.judge(evidence) for claim in CLAIMS],
         "made": results[-1]["made"] if results else {},
     }
-    text = json.dumps(outcome, indent=1)
+    text = json.dumps(outcome)
     write_atomically(directory / "results.json", text.encode())
     return outcome, evidence
 
@@ -241,6 +244,9 @@ def draw(
         for experiment in experiments:
             status.update(f"Drawing {experiment.name}")
             figures.save(experiment, evidence, folder)
+        if any(experiment.name == ANIMATED for experiment in experiments):
+            status.update("Drawing the animation")
+            figures.animation.animate(folder / "learning.gif")
 
 
 def write_report(directory: Path) -> Path:

@@ -10,11 +10,13 @@ from typing import NamedTuple
 from matplotlib.figure import Figure
 
 from acl_gym.reproduction.evidence import Evidence
-from acl_gym.reproduction.figures import bands, policies, swings, theory
+from acl_gym.reproduction.figures import animation, bands, policies, swings, theory
 from acl_gym.reproduction.settings import Experiment
 from acl_gym.storage import write_atomically
 
-DPI = 200
+__all__ = ["DRAWINGS", "Files", "animation", "save"]
+
+DPI = 150
 
 DRAWINGS: dict[str, Callable[[Experiment, Evidence], Figure]] = {
     "bands": bands.bands,

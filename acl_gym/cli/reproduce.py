@@ -32,7 +32,9 @@ Examples:
   acl-gym reproduce all --executor ray       on a cluster (pip install acl-gym[cluster])
 """
 
-REPORT_HELP = """Write the report of a reproduction anew, from its results and figures.
+REPORT_HELP = """Write the report of a reproduction anew.
+
+It is made from results.json and the figures; no run is needed, and none is made.
 
 \b
 Examples:
@@ -145,7 +147,10 @@ def report(
         Path, typer.Argument(metavar="DIR", help="What `reproduce` has written.")
     ] = Path("results/reproduce"),
     seed: Annotated[
-        int, typer.Option(min=0, hidden=True, help="Nothing is drawn at random.")
+        int,
+        typer.Option(
+            min=0, metavar="N", help="Not used: a report has no chance in it."
+        ),
     ] = 0,
     as_json: JsonOption = False,
     debug: DebugOption = False,

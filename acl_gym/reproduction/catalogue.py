@@ -84,7 +84,7 @@ _QUADRATIC = (
         "§4.5.2",
         _both("quadratic"),
         "bands",
-        ("C9",),
+        ("C9", "C11"),
         _GOAL,
     ),
     Experiment(
@@ -162,7 +162,7 @@ _TIME_SPENT = (
         "§4.5.3",
         _both("time")[1:],
         "baseline",
-        (),
+        ("C12",),
         _BASELINE,
     ),
 )
@@ -197,7 +197,7 @@ EXPERIMENTS: tuple[Experiment, ...] = (
         "§3.6.3",
         studies({f"rho = {number(r)}": row(global_decay=r) for r in RHOS_ROW}),
         "bands",
-        ("C1", "C2", "C3"),
+        ("C1", "C2", "C3", "C4"),
         "gamma = 0, 9 ants. alpha = 3, tau0 = 0.001, T = 50 and K = 100 are decisions.",
     ),
     Experiment(

@@ -154,16 +154,28 @@ def reproduce(
     for task, result in zip(tasks, results, strict=True):
         by_setting[task.arguments[0].key].append(result)
     evidence = Evidence(by_setting)
-    outcome = {
+    made = results[-1]["made"]
+    outcome = outcome_of(experiments, evidence, runs, first_seed, made)
+    text = json.dumps(outcome)
+    write_atomically(directory / "results.json", text.encode())
+    return outcome, evidence
+
+
+def outcome_of(
+    experiments: Sequence[Experiment],
+    evidence: Evidence,
+    runs: int,
+    first_seed: int,
+    made: dict[str, Any],
+) -> Outcome:
+    """What the runs say: each experiment summed up, each claim judged."""
+    return {
         "runs": runs,
         "first_seed": first_seed,
         "experiments": [summary(each, evidence) for each in experiments],
         "claims": [claim.judge(evidence) for claim in CLAIMS],
-        "made": results[-1]["made"] if results else {},
+        "made": made,
     }
-    text = json.dumps(outcome)
-    write_atomically(directory / "results.json", text.encode())
-    return outcome, evidence
 
 
 def summary(experiment: Experiment, evidence: Evidence) -> dict[str, Any]:

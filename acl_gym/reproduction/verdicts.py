@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
+from acl_gym.reproduction.catalogue import EXPERIMENTS
 from acl_gym.reproduction.evidence import Evidence, MissingRunsError
 
 FloatArray = NDArray[np.float64]
@@ -45,7 +46,6 @@ class Claim:
         name: C1 .. C23.
         text: in this project's words.
         section: of the thesis.
-        experiments: the names of those that decide it.
         decide: takes it apart.
         understanding: what was tried where it does not hold; "" if nothing was.
     """
@@ -53,9 +53,13 @@ class Claim:
     name: str
     text: str
     section: str
-    experiments: tuple[str, ...]
     decide: Callable[[Evidence], list[Part]]
     understanding: str = ""
+
+    @property
+    def experiments(self) -> list[str]:
+        """The names of the experiments that decide it."""
+        return [each.name for each in EXPERIMENTS if self.name in each.claims]
 
     def judge(self, evidence: Evidence) -> dict[str, Any]:
         """The verdict with all that led to it, JSON types."""
@@ -67,7 +71,7 @@ class Claim:
             "claim": self.name,
             "text": self.text,
             "section": self.section,
-            "experiments": list(self.experiments),
+            "experiments": self.experiments,
             "verdict": verdict(parts),
             "parts": [{**p._asdict(), "holds": bool(p.holds)} for p in parts],
             "understanding": self.understanding,
@@ -130,6 +134,13 @@ def ratio(first: FloatArray, second: FloatArray, seed: int = 0) -> Interval:
 def _resample(values: FloatArray, rng: np.random.Generator) -> FloatArray:
     data = np.asarray(values, dtype=np.float64)
     return data[rng.integers(data.size, size=(RESAMPLES, data.size))]
+
+
+def rank_correlation(x: Any, y: Any) -> float:
+    """Spearman's, from -1 to 1; 0 where one of both does not vary."""
+    if np.ptp(x) == 0 or np.ptp(y) == 0:
+        return 0.0
+    return float(stats.spearmanr(x, y).statistic)
 
 
 def middle_half(values: FloatArray) -> float:

@@ -12,10 +12,16 @@ from pathlib import Path
 
 import gymnasium as gym
 import pytest
+from filelock import FileLock
 
 from acl_gym import ACL, Fuzzy
 from acl_gym.experiments import runner
-from acl_gym.experiments.runner import Task, TaskFailedError, run_tasks
+from acl_gym.experiments.runner import (
+    FolderInUseError,
+    Task,
+    TaskFailedError,
+    run_tasks,
+)
 
 
 def square(number: int, calls: str, report) -> dict:
@@ -223,3 +229,59 @@ def test_ctrl_c_stops_at_once_and_leaves_nothing_running(tmp_path: Path) -> None
     process.wait(timeout=60)  # the task itself would sleep for ten minutes
     assert process.returncode != 0
     assert not _runs(int((tmp_path / "worker").read_text()))
+
+
+def test_two_runners_do_not_share_a_folder(tmp_path: Path) -> None:
+    calls = tmp_path / "calls"
+    with FileLock(tmp_path / "running.lock"):
+        with pytest.raises(FolderInUseError, match="another run works on"):
+            run_tasks(tasks(calls), tmp_path, workers=1)
+        assert not calls.exists()
+    run_tasks(tasks(calls), tmp_path, workers=1)
+    assert calls_in(calls) == ["0", "1", "2", "3"]
+
+
+FULL = """
+import resource, sys
+from pathlib import Path
+from acl_gym.experiments.runner import Task, TaskFailedError, run_tasks
+from tests.experiments.test_runner import long_text, square
+
+if __name__ == "__main__":
+    folder, calls = Path(sys.argv[1]), sys.argv[2]
+    tasks = [
+        Task("small", square, (2, calls), {}),
+        Task("large", long_text, (), {}),
+    ]
+    # No file may grow beyond this: writing fails as on a full disk.
+    resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000))
+    try:
+        run_tasks(tasks, folder, workers=1)
+    except TaskFailedError as error:
+        print(error)
+"""
+
+
+def long_text(report) -> dict:
+    """A result that a small disk does not hold."""
+    return {"text": "x" * 100_000}
+
+
+def test_a_full_disk_loses_nothing(tmp_path: Path) -> None:
+    script, folder = tmp_path / "full.py", tmp_path / "runs"
+    script.write_text(FULL)
+    for _ in range(2):
+        done = subprocess.run(
+            [sys.executable, script, folder, tmp_path / "calls"],
+            env={**os.environ, "PYTHONPATH": os.pathsep.join(["", *sys.path])},
+            capture_output=True,
+            text=True,
+            check=False,
+            timeout=120,
+        )
+        assert done.returncode == 0, done.stderr
+        assert "the result of large cannot be written to" in done.stdout
+        assert "make room and call again" in done.stdout
+        assert sorted(path.name for path in folder.glob("*.json")) == ["small.json"]
+        assert not list(folder.glob(".*")), "no temporary file may stay"
+    assert calls_in(tmp_path / "calls") == ["2"], "what was there is not made again"

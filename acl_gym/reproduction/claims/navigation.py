@@ -182,7 +182,6 @@ CLAIMS = (
         "With the quadratic cost fuzzy ACL converges faster, to a lower cost, and with "
         "less spread than crisp.",
         "§4.5.2",
-        ("fig4.6", "navigation-rules"),
         c9,
     ),
     Claim(
@@ -190,14 +189,12 @@ CLAIMS = (
         "The policy variation never reaches zero; the sensitivity falls, and crisp ends "
         "with the lower one.",
         "§4.5.2",
-        ("fig4.7", "fig4.8"),
         c10,
     ),
     Claim(
         "C11",
         "The policy of fuzzy ACL is close to that of fuzzy Q-iteration.",
         "§4.5.2",
-        ("fig4.6", "fig4.10"),
         c11,
     ),
     Claim(
@@ -205,7 +202,6 @@ CLAIMS = (
         "With the time-spent cost on denser cells fuzzy ends lower than crisp and goes "
         "round the damping; crisp fails from some corners.",
         "§4.5.3",
-        ("fig4.11", "fig4.13", "fig4.14", "navigation-rules"),
         c12,
     ),
 )

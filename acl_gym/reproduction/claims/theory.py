@@ -126,21 +126,18 @@ CLAIMS = (
         "C21",
         "The levels stay between tau0 and the bound (3.23).",
         "§3.4.5",
-        ("fig3.3", "fig3.4"),
         c21,
     ),
     Claim(
         "C22",
         "For one ant the mean level converges to the limit of §3.4.7.",
         "§3.4.7",
-        ("fig3.3", "fig3.4"),
         c22,
     ),
     Claim(
         "C23",
         "Delta > 0 predicts a settled policy on the two-state system of Figure 3.2.",
         "§3.4.8",
-        ("fig3.4",),
         c23,
     ),
 )

@@ -1,0 +1,57 @@
+"""acl-gym reproduce and report."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from tests.cli.runner import figures, invoke, refused, run
+
+SMALL = ["reproduce", "fig3.9", "--runs", "2", "--workers", "1"]
+
+
+def test_a_figure_and_its_report(tmp_path: Path) -> None:
+    done = run(*SMALL, "--out", "r", "--json", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
+    assert found["runs"] == 2
+    (experiment,) = found["experiments"]
+    assert experiment["name"] == "fig3.9"
+    assert [s["label"] for s in experiment["studies"]] == ["M = 1", "M = 5", "M = 9"]
+    verdicts = {claim["claim"]: claim["verdict"] for claim in found["claims"]}
+    assert verdicts["C5"] != "undecided"
+    assert verdicts["C13"] == "undecided"
+    folder = tmp_path / "r"
+    for name in ("report.html", "results.json", "figures/fig3.9.png"):
+        assert (folder / name).is_file()
+    files = sorted((folder / "tasks").glob("*.parquet"))
+    assert len(files) == 6
+    before = [path.stat().st_mtime_ns for path in files]
+
+    again = run(*SMALL, "--out", "r", "--no-figures", cwd=tmp_path)
+    assert again.returncode == 0, again.stderr
+    assert [path.stat().st_mtime_ns for path in files] == before
+    assert "C5" in again.stdout
+
+    (folder / "report.html").unlink()
+    told = figures("report", str(folder))
+    assert told["report"] == str(folder / "report.html")
+    assert told["claims"] == verdicts
+    assert (folder / "report.html").is_file()
+
+
+def test_the_list() -> None:
+    lines = invoke("reproduce", "--list").stdout.splitlines()
+    assert any(line.startswith("fig5.4 ") and "C14" in line for line in lines)
+    rows = figures("reproduce", "claims", "--list")
+    assert {"fig5.4", "fig3.6"} <= {row["name"] for row in rows}
+    assert "fig3.7" not in {row["name"] for row in rows}
+
+
+def test_bad_arguments() -> None:
+    assert "got 'fig9'" in refused(2, "reproduce", "fig9")
+    assert "--executor must be one of local, ray" in refused(
+        *(2, "reproduce", "fig3.9", "--executor", "slurm")
+    )
+    assert "there is no results.json in" in refused(2, "report", "/no/such/folder")
+    refused(2, "reproduce", "fig3.9", "--runs", "0")

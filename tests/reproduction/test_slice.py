@@ -1,0 +1,189 @@
+"""A slice of every experiment runs, is judged, drawn, and told on a page."""
+
+from __future__ import annotations
+
+import json
+import re
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from acl_gym.reproduction import evidence as evidence_module
+from acl_gym.reproduction import figures, page, reproduce
+from acl_gym.reproduction.catalogue import EXPERIMENTS
+from acl_gym.reproduction.claims import CLAIMS
+from acl_gym.reproduction.settings import Experiment
+from tests.reproduction.slices import SEEDS, TRIALS, evidence
+
+DRAWN = list(
+    {
+        (each.drawing, each.studies[0].setting.env_id): each for each in EXPERIMENTS
+    }.values()
+)
+"""One experiment for each way of drawing each system."""
+
+
+@pytest.fixture(autouse=True)
+def short_iterations(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Fuzzy Q-iteration of three sweeps, not 500."""
+    whole = evidence_module.fuzzy_q_iteration
+
+    def short(*arguments: Any, **options: Any) -> Any:
+        return whole(*arguments, **{**options, "max_iterations": 3})
+
+    monkeypatch.setattr(evidence_module, "fuzzy_q_iteration", short)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Results and figures as `reproduce` leaves them, and the page."""
+    path = tmp_path_factory.mktemp("reproduction")
+    (path / "figures").mkdir()
+    patch = pytest.MonkeyPatch()
+    short_iterations.__wrapped__(patch)  # type: ignore[attr-defined]
+    for experiment in DRAWN:
+        figures.save(experiment, evidence(), path / "figures")
+    figures.animation.animate(path / "figures" / "learning.gif", shown=(0, 1))
+    outcome = reproduce.outcome_of(list(EXPERIMENTS), evidence(), SEEDS, 0, {})
+    patch.undo()
+    (path / "results.json").write_text(json.dumps(outcome))
+    page.write_page(path)
+    return path
+
+
+@pytest.mark.parametrize("claim", CLAIMS, ids=lambda claim: claim.name)
+def test_every_claim_is_decided(claim: Any) -> None:
+    found = claim.judge(evidence())
+    assert found["verdict"] in ("holds", "holds in part", "does not hold")
+    assert json.loads(json.dumps(found)) == found
+    for part in found["parts"]:
+        assert part["statement"]
+        assert part["measured"]
+
+
+@pytest.mark.parametrize("experiment", DRAWN, ids=lambda each: each.name)
+def test_every_kind_of_figure_is_drawn(folder: Path, experiment: Experiment) -> None:
+    png = folder / "figures" / f"{experiment.name}.png"
+    svg = folder / "figures" / f"{experiment.name}.svg"
+    assert png.read_bytes().startswith(b"\x89PNG")
+    assert png.stat().st_size > 5_000
+    assert "<svg" in svg.read_text()[:1000]
+
+
+@pytest.mark.parametrize("experiment", EXPERIMENTS, ids=lambda each: each.name)
+def test_every_summary_is_json_with_curves(experiment: Experiment) -> None:
+    text = json.dumps(reproduce.summary(experiment, evidence()), allow_nan=False)
+    found = json.loads(text)
+    for study in found["studies"]:
+        assert study["runs"] == SEEDS
+        for curve in study["curves"].values():
+            assert len(curve["mean"]) == TRIALS
+            for low, mean, high in zip(
+                curve["low"], curve["mean"], curve["high"], strict=True
+            ):
+                assert low <= mean * (1 + 1e-4) + 1e-9
+                assert mean <= high * (1 + 1e-4) + 1e-9
+
+
+class Links(HTMLParser):
+    """All ids, internal links and addresses of a page."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.ids: list[str] = []
+        self.links: list[str] = []
+        self.sources: list[str] = []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        found = dict(attrs)
+        if "id" in found:
+            self.ids.append(str(found["id"]))
+        if tag == "a":
+            self.links.append(str(found["href"]))
+        if "src" in found:
+            self.sources.append(str(found["src"]))
+
+
+def test_the_page_is_one_file_and_its_links_lead_somewhere(folder: Path) -> None:
+    text = (folder / "report.html").read_text()
+    links = Links()
+    links.feed(text)
+    assert len(set(links.ids)) == len(links.ids)
+    assert links.links
+    assert all(link.startswith("#") and link[1:] in links.ids for link in links.links)
+    assert len(links.sources) == len(DRAWN) + 1
+    assert all(source.startswith("data:image/") for source in links.sources)
+    assert not re.search(r"https?://(?!www\.w3\.org/2000/svg)", text)
+    for claim in CLAIMS:
+        assert claim.name in links.ids
+
+
+def test_a_page_needs_results(tmp_path: Path) -> None:
+    with pytest.raises(FileNotFoundError, match=r"there is no results\.json in"):
+        page.write_page(tmp_path)
+    for content in ("{", "[]", "{}", '{"claims": []}'):
+        (tmp_path / "results.json").write_text(content)
+        with pytest.raises(ValueError, match="is not the result of a reproduction"):
+            page.write_page(tmp_path)
+
+
+CHROMIUM = next(
+    (p for p in map(Path, ("/usr/bin/chromium", "/usr/bin/chromium-browser"))
+     if p.exists()),
+    None,
+)  # fmt: skip
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason="needs chromium (apt install chromium)")
+@pytest.mark.parametrize("width", [1200, 390])
+def test_the_page_in_a_browser(folder: Path, width: int) -> None:
+    """No errors, no requests, every picture visible, links and hovering work."""
+    sync = pytest.importorskip("playwright.sync_api")
+    wrong: list[str] = []
+    with sync.sync_playwright() as playwright:
+        browser = playwright.chromium.launch(
+            executable_path=str(CHROMIUM),
+            args=["--no-sandbox", "--disable-gpu", "--disable-background-networking"],
+        )
+        tab = browser.new_page(viewport={"width": width, "height": 800})
+        tab.on("console", lambda m: m.type == "error" and wrong.append(m.text))
+        tab.on("pageerror", lambda error: wrong.append(str(error)))
+        tab.on(
+            "request",
+            lambda r: r.url.startswith(("file:", "data:")) or wrong.append(r.url),
+        )
+        tab.goto((folder / "report.html").as_uri())
+        for image in tab.locator("figure img").all():
+            image.scroll_into_view_if_needed()
+            tab.wait_for_function(
+                "image => image.complete && image.naturalWidth > 0",
+                arg=image.element_handle(),
+            )
+            assert image.is_visible()
+        overflow = tab.evaluate("document.documentElement.scrollWidth")
+        assert overflow <= width, "no scrolling sideways"
+        tab.locator("tr#C14 a").first.click()
+        assert tab.url.endswith("#fig5.4")
+        box = tab.locator('.explore[data-name="fig5.4"]')
+        box.locator("select").first.select_option(label="rho = 0.1")
+        box.locator("svg").hover()
+        assert "mean" in box.locator("output").inner_text()
+        browser.close()
+    assert wrong == []
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason="needs chromium (apt install chromium)")
+def test_the_page_without_javascript(folder: Path) -> None:
+    sync = pytest.importorskip("playwright.sync_api")
+    with sync.sync_playwright() as playwright:
+        browser = playwright.chromium.launch(
+            executable_path=str(CHROMIUM), args=["--no-sandbox", "--disable-gpu"]
+        )
+        tab = browser.new_context(java_script_enabled=False).new_page()
+        tab.goto((folder / "report.html").as_uri())
+        assert tab.locator("tr#C1 .verdict").is_visible()
+        assert not tab.locator(".explore").first.is_visible()
+        assert tab.locator("figure img").first.is_visible()
+        browser.close()

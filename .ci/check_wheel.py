@@ -28,6 +28,10 @@ if strangers:
 if not (package / "py.typed").is_file():
     sys.exit("the wheel lacks acl_gym/py.typed, without which its types are not seen")
 
+for template in ("experiments/templates/report", "reproduction/templates/page"):
+    if not (package / f"{template}.html.j2").is_file():
+        sys.exit(f"the wheel lacks acl_gym/{template}.html.j2, which a report needs")
+
 env = gym.make("acl_gym/Pendulum-v0")
 env.reset(seed=0)
 env.step(env.action_space.sample())

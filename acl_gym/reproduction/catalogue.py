@@ -29,7 +29,7 @@ RHOS = (0.0, 0.001, 0.01, 0.1, 0.5, 1.0)
 GAMMAS = (0.0, 0.001, 0.01, 0.1, 0.5, NEARLY_ONE)
 ANTS = (100, 250, 500, 1000, 1500, 2000)
 SIZES = {"11x11": 86, "21x21": 278, "31x31": 640}
-_KINDS = ("crisp", "fuzzy")
+KINDS = ("crisp", "fuzzy")
 _NUMBER = {NEARLY_ONE: "1"}
 
 
@@ -39,7 +39,7 @@ def number(value: float) -> str:
 
 
 def _both(cost: str, rule: str = "bounds") -> tuple[Study, ...]:
-    return studies({kind: vehicle(cost, kind, rule) for kind in _KINDS})
+    return studies({kind: vehicle(cost, kind, rule) for kind in KINDS})
 
 
 def _cells_of(kind: str, n: int) -> tuple[int, int, int]:
@@ -313,7 +313,7 @@ EXPERIMENTS: tuple[Experiment, ...] = (
         "fig5.6",
         "Pendulum, policies, gamma = 0.01",
         "§5.3.1",
-        studies({kind: swing(kind) for kind in _KINDS}),
+        studies({kind: swing(kind) for kind in KINDS}),
         "policies",
         ("C20",),
         "White is the full positive torque, black the full negative one, grey none; on "
@@ -362,7 +362,7 @@ EXPERIMENTS: tuple[Experiment, ...] = (
         "fig5.11",
         "Pendulum, policies, gamma = 0.1",
         "§5.3.2",
-        studies({kind: swing(kind, local_decay=0.1) for kind in _KINDS}),
+        studies({kind: swing(kind, local_decay=0.1) for kind in KINDS}),
         "policies",
         ("C20",),
     ),
@@ -420,6 +420,46 @@ EXPERIMENTS: tuple[Experiment, ...] = (
         "Ants are 15% of the states.",
     ),
     Experiment(
+        "omega-max",
+        "Pendulum with other bounds on the velocity",
+        "§5.2.2",
+        studies(
+            {
+                f"{kind}, gamma = {number(gamma)}, omega_max = {limit:g}": replace(
+                    swing(kind, local_decay=gamma), env={"omega_max": limit}
+                )
+                for kind in KINDS
+                for gamma in (0.01, 0.1)
+                for limit in (7.0, 15.0)
+            }
+        ),
+        "bands",
+        ("C15", "C16"),
+        "The thesis does not name omega_max; 9 rad/s is taken elsewhere. The cells cover "
+        "the same range.",
+        {"columns": 2},
+    ),
+    Experiment(
+        "row-choices",
+        "1-D grid: one ant, other choices",
+        "§3.6.5",
+        studies(
+            {
+                "alpha = 1": replace(row(alpha=1.0), ants=1),
+                "alpha = 2": replace(row(alpha=2.0), ants=1),
+                "tau0 = 0.0001": replace(row(tau0=1e-4), ants=1),
+                "epsilon = 0.1": replace(
+                    row(selection="max_boltzmann", epsilon=0.1), ants=1
+                ),
+                "tabu list": replace(row(tabu=True), ants=1),
+                "K = 1000": replace(row(), ants=1, trials=1000),
+            }
+        ),
+        "bands",
+        ("C5",),
+        "Chapter 3 names no alpha, tau0, epsilon and K: what one ant does with others.",
+    ),
+    Experiment(
         "navigation-rules",
         "Navigation under the other goal rule",
         "§4.3.2",
@@ -427,7 +467,7 @@ EXPERIMENTS: tuple[Experiment, ...] = (
             {
                 f"{cost}, {kind}": vehicle(cost, kind, "membership")
                 for cost in ("quadratic", "time")
-                for kind in _KINDS
+                for kind in KINDS
             }
         ),
         "bands",

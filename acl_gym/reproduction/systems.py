@@ -112,4 +112,4 @@ def two_state(ants: int, **colony: Any) -> Setting:
         "global_decay": 0.1,
         "max_steps": 2,
     }
-    return Setting(TWO_STATE, ants, 200, {**parameters, **colony})
+    return Setting(TWO_STATE, ants, 2_000, {**parameters, **colony})

@@ -22,6 +22,7 @@ FloatArray = NDArray[np.float64]
 
 HOLDS, IN_PART, NOT, UNDECIDED = "holds", "holds in part", "does not hold", "undecided"
 RESAMPLES = 2_000
+_NEVER = 1e100  # stands for infinity, of which a ratio would be NaN
 
 
 class Part(NamedTuple):
@@ -126,6 +127,7 @@ def ratio(first: FloatArray, second: FloatArray, seed: int = 0) -> Interval:
         seed: of the bootstrap.
     """
     rng = np.random.default_rng(seed)
+    first, second = np.minimum(first, _NEVER), np.minimum(second, _NEVER)
     drawn = iqm(_resample(first, rng)) / iqm(_resample(second, rng))
     low, high = np.quantile(drawn, [0.025, 0.975], method="inverted_cdf")
     return Interval(float(iqm(first) / iqm(second)), float(low), float(high))

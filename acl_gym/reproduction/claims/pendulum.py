@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -45,6 +46,10 @@ def _converged(evidence: Evidence, setting: Setting) -> tuple[bool, str]:
     return share > 0.5, f"{share:.0%} of the runs, cost {interval(costs[:, -1])}"
 
 
+def _listed(costs: Mapping[Any, float]) -> str:
+    return ", ".join(f"{value:g}: {cost:.3g}" for value, cost in costs.items())
+
+
 CONVERGES = (
     f"in most runs the cost swings by less than {SETTLED:.0%} over the last 20 trials "
     f"and ends below {GOOD:g} J*"
@@ -65,14 +70,13 @@ def c13(evidence: Evidence) -> list[Part]:
         )
     ends = {rho: _late(evidence, swing("crisp", global_decay=rho)) for rho in RHOS}
     centres = {rho: interval(costs).value for rho, costs in ends.items()}
-    listed = ", ".join(f"{rho:g}: {cost:.3g}" for rho, cost in centres.items())
     settled = swing_at_the_end(evidence.rows(swing("crisp", global_decay=0.1)))
     above = ratio(ends[0.1], ends[0.001])
     return [
         *parts,
         Part(
             "of all rho, 0.001 ends lowest",
-            listed,
+            _listed(centres),
             min(centres, key=lambda rho: centres[rho]) == 0.001,
         ),
         Part(
@@ -111,9 +115,9 @@ def c15(evidence: Evidence) -> list[Part]:
     lead = ratio(ends[second], ends[0.1])
     parts = [
         Part(
-            "gamma = 0.1 ends lowest, and clearly: the interval of the ratio of the "
-            "second (if it is second) to it lies above 1",
-            f"gamma = {second:g} to 0.1: {lead}",
+            "gamma = 0.1 ends lowest, and clearly: the interval of the ratio of the best "
+            "other one to it lies above 1",
+            f"gamma = {second:g} to 0.1: {lead} ({_listed(centres)})",
             lead.low > 1,
         )
     ]
@@ -133,7 +137,6 @@ def c16(evidence: Evidence) -> list[Part]:
     """Fuzzy: gamma matters little, 0.1 a little best."""
     centres = {g: interval(c).value for g, c in _by_gamma(evidence, "fuzzy").items()}
     small = [centres[gamma] for gamma in GAMMAS if gamma <= 0.1]
-    listed = ", ".join(f"{gamma:g}: {cost:.3g}" for gamma, cost in centres.items())
     return [
         Part(
             "up to gamma = 0.1 the dearest costs at most 1.2 times the cheapest",
@@ -142,7 +145,7 @@ def c16(evidence: Evidence) -> list[Part]:
         ),
         Part(
             "of all gamma, 0.1 ends lowest",
-            listed,
+            _listed(centres),
             min(centres, key=lambda gamma: centres[gamma]) == 0.1,
         ),
     ]
@@ -159,12 +162,11 @@ def c17(evidence: Evidence) -> list[Part]:
         ends[kind] = late
         for what, values in (("last policies", late), ("mean over trials", whole)):
             rank = rank_correlation(ANTS, list(values.values()))
-            listed = ", ".join(f"{m}: {cost:.3g}" for m, cost in values.items())
             parts.append(
                 Part(
                     f"{kind}: the cost ({what}) falls with M: rank correlation of -0.8 "
                     "or less",
-                    f"{rank:.2f} ({listed})",
+                    f"{rank:.2f} ({_listed(values)})",
                     rank <= -0.8,
                 )
             )

@@ -159,6 +159,7 @@ def report(
     from acl_gym.reproduction import page
 
     try:
+        page.write_claims(directory)
         path = page.write_page(directory)
     except (FileNotFoundError, ValueError) as error:
         raise BadArgumentError(str(error)) from error

@@ -294,6 +294,7 @@ _LEFT_OUT = frozenset(
         "compiling",
         "courses",
         "drawing",
+        "evidence",
         "figures",
         "grid_drawing",
         "intervals",
@@ -303,6 +304,7 @@ _LEFT_OUT = frozenset(
         "rendering",
         "report",
         "reproduce",
+        "runner",
         "statistics",
         "store",
         "systems",
@@ -339,7 +341,7 @@ def _commit() -> str | None:
     """The commit of a checkout, with a plus sign if files differ; None elsewhere."""
     folder = Path(acl_gym.__file__).parent
     try:
-        found, changes = (
+        _, found, changes = (
             subprocess.run(
                 ["git", "-C", str(folder), *arguments],
                 capture_output=True,
@@ -348,6 +350,8 @@ def _commit() -> str | None:
                 timeout=10,
             ).stdout.strip()
             for arguments in (
+                # First, whether it is this package's checkout, and not one around it.
+                ("ls-files", "--error-unmatch", "__init__.py"),
                 ("rev-parse", "HEAD"),
                 ("status", "--porcelain", "--untracked-files=no", "."),
             )

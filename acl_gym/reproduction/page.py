@@ -94,6 +94,35 @@ def write_page(directory: Path) -> Path:
     return path
 
 
+def write_claims(directory: Path) -> Path:
+    """Write claims.md, the table of claims as text; see `write_page`."""
+    outcome = read_outcome(directory)
+    there = {each["name"] for each in outcome["experiments"]}
+    lines = [
+        "# The claims of the thesis",
+        "",
+        f"{outcome['runs']} runs of each setting. In brackets: 95% bootstrap intervals "
+        "of the interquartile mean. The page report.html has the figures.",
+        "",
+        "| claim | verdict | statement | measured | |",
+        "| --- | --- | --- | --- | --- |",
+    ]
+    for claim in outcome["claims"]:
+        figures = ", ".join(name for name in claim["experiments"] if name in there)
+        text = f"**{claim['text']}** {claim['section']}; {figures}"
+        lines.append(f"| {claim['claim']} | {claim['verdict']} | {text} | | |")
+        lines += [
+            f"| | | {part['statement']} | {part['measured']} | "
+            f"{'yes' if part['holds'] else 'no'} |"
+            for part in claim["parts"]
+        ]
+        if claim["understanding"]:
+            lines.append(f"| | | {claim['understanding']} | | |")
+    path = directory / "claims.md"
+    write_atomically(path, ("\n".join(lines) + "\n").encode())
+    return path
+
+
 def _image(path: Path) -> str:
     """A picture as text, nothing if it is not there."""
     if not path.is_file():

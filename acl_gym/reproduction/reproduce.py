@@ -262,9 +262,14 @@ def draw(
 
 
 def write_report(directory: Path) -> Path:
-    """Write report.html from what is in a folder; returns its path."""
-    from acl_gym.reproduction.page import write_page
+    """Write report.html and claims.md from what is in a folder.
 
+    Returns:
+        The path of the page.
+    """
+    from acl_gym.reproduction.page import write_claims, write_page
+
+    write_claims(directory)
     return write_page(directory)
 
 

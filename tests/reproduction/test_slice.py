@@ -120,6 +120,14 @@ def test_the_page_is_one_file_and_its_links_lead_somewhere(folder: Path) -> None
         assert claim.name in links.ids
 
 
+def test_the_claims_as_text(folder: Path) -> None:
+    lines = page.write_claims(folder).read_text().splitlines()
+    for claim in CLAIMS:
+        assert sum(line.startswith(f"| {claim.name} | ") for line in lines) == 1
+    rows = [line for line in lines if line.startswith("|")]
+    assert {line.count("|") for line in rows} == {6}
+
+
 def test_a_page_needs_results(tmp_path: Path) -> None:
     with pytest.raises(FileNotFoundError, match=r"there is no results\.json in"):
         page.write_page(tmp_path)

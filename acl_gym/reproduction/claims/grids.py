@@ -10,7 +10,7 @@ import numpy as np
 from acl_gym.agents.model import TabularModel
 from acl_gym.agents.value_iteration import policy_value, value_iteration
 from acl_gym.evaluation import control_env
-from acl_gym.reproduction.catalogue import GAMMAS_ROW, SIZES
+from acl_gym.reproduction.catalogue.common import GAMMAS_ROW, SIZES
 from acl_gym.reproduction.evidence import Evidence
 from acl_gym.reproduction.settings import Setting
 from acl_gym.reproduction.systems import row, world

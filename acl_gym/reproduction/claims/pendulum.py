@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from acl_gym.evaluation import record_trajectory
-from acl_gym.reproduction.catalogue import ANTS, GAMMAS, NEARLY_ONE, RHOS, partitions
+from acl_gym.reproduction.catalogue.common import ANTS, GAMMAS, NEARLY_ONE, RHOS
+from acl_gym.reproduction.catalogue.pendulum import partitions
 from acl_gym.reproduction.evidence import Evidence, FloatArray
 from acl_gym.reproduction.settings import Setting
 from acl_gym.reproduction.systems import swing

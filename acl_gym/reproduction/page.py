@@ -6,7 +6,6 @@ import base64
 import json
 from collections import Counter
 from pathlib import Path
-from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
@@ -82,12 +81,15 @@ def write_page(directory: Path) -> Path:
         animation=_image(directory / FIGURES / ANIMATION),
         curves={
             each["name"]: [
-                {"label": study["label"], **study["curves"]}
+                {
+                    "label": study["label"],
+                    "positions": study["positions"],
+                    **study["curves"],
+                }
                 for study in each["studies"]
             ]
             for each in outcome["experiments"]
         },
-        parameters=_parameters,
     )
     path = directory / PAGE
     write_atomically(path, text.encode())
@@ -128,14 +130,3 @@ def _image(path: Path) -> str:
     if not path.is_file():
         return ""
     return base64.b64encode(path.read_bytes()).decode("ascii")
-
-
-def _parameters(setting: dict[str, Any]) -> str:
-    """A setting in one line."""
-    parts = [f"{setting['ants']} ants", f"{setting['trials']} trials", setting["kind"]]
-    cells = setting["cells"]
-    if cells is not None:
-        parts.append(cells if isinstance(cells, str) else " x ".join(map(str, cells)))
-    values = {**setting["colony"], **setting["env"]}
-    parts += [f"{name} = {value}" for name, value in values.items()]
-    return ", ".join(parts)

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterable, Sequence
-from dataclasses import asdict, replace
+from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -21,14 +20,14 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 
-from acl_gym.experiments.runner import Executor, Task, in_processes, run_tasks
+from acl_gym.experiments.runner import Executor, Result, Task, in_processes, run_tasks
 from acl_gym.reproduction.catalogue import BY_NAME, EXPERIMENTS, RUNS
 from acl_gym.reproduction.claims import CLAIMS
 from acl_gym.reproduction.evidence import Evidence
-from acl_gym.reproduction.settings import Experiment, Setting
+from acl_gym.reproduction.settings import Experiment, Runnable
 from acl_gym.reproduction.store import ParquetStore
-from acl_gym.reproduction.training import learn
 from acl_gym.reproduction.verdicts import interval
+from acl_gym.reproduction.versus.findings import FINDINGS
 from acl_gym.storage import write_atomically
 
 EXECUTORS = ("local", "ray")
@@ -38,6 +37,7 @@ CURVES = ("policy_cost", "ants_cost", "policy_variation", "sensitivity")
 """The measures that are kept trial by trial for the report."""
 
 _BAND = "Black, the mean of the runs; grey, from the lowest to the highest of them"
+_LAST = "Cost of the last policies, and the interquartile mean with its interval"
 CAPTIONS = {
     "bands": f"{_BAND}; dashed, the optimal cost where it is known.",
     "measures": f"{_BAND}.",
@@ -50,6 +50,12 @@ CAPTIONS = {
     "rest, by the last policy of the run whose last policy is the cheapest.",
     "level_band": "The pheromone of the one pair in q: simulated runs between the bounds "
     "on their expectation.",
+    "race": "Median of the runs, the middle half of them, and faintly all; the line is the "
+    "best cost that dynamic programming finds. Right, the last policy of each run, and "
+    "the interquartile mean with its interval.",
+    "harder": f"{_LAST}.",
+    "sweep": f"{_LAST}, faintly each run.",
+    "order": "On the line nothing depends on the order of the slots.",
     "policy_gap": "Where the blue and the orange region do not overlap, Delta is "
     "positive.",
 }
@@ -85,7 +91,7 @@ def chosen(names: Sequence[str]) -> list[Experiment]:
     return [experiment for experiment in EXPERIMENTS if experiment.name in wanted]
 
 
-def settings_of(experiments: Iterable[Experiment]) -> list[Setting]:
+def settings_of(experiments: Iterable[Experiment]) -> list[Runnable]:
     """What is run for experiments: each setting once, whoever shares it."""
     settings = {
         study.setting.key: study.setting
@@ -95,7 +101,7 @@ def settings_of(experiments: Iterable[Experiment]) -> list[Setting]:
     return list(settings.values())
 
 
-def tasks_for(settings: Iterable[Setting], seeds: Iterable[int]) -> list[Task]:
+def tasks_for(settings: Iterable[Runnable], seeds: Iterable[int]) -> list[Task]:
     """A task for each setting and seed, seed by seed: early results are of all."""
     settings = list(settings)
     return [
@@ -103,11 +109,17 @@ def tasks_for(settings: Iterable[Setting], seeds: Iterable[int]) -> list[Task]:
             f"{setting.system}-{setting.key}-{seed}",
             learn,
             (setting, seed),
-            {**asdict(setting), "seed": seed},
+            {**setting.about, "seed": seed},
         )
-        for seed in seeds
+        for place, seed in enumerate(seeds)
         for setting in settings
+        if setting.most_runs is None or place < setting.most_runs
     ]
+
+
+def learn(setting: Runnable, seed: int, report: Callable[[float], None]) -> Result:
+    """What a task calls: a method does not travel to other processes by its name."""
+    return setting.learn(seed, report)
 
 
 def reproduce(
@@ -187,7 +199,9 @@ def summary(experiment: Experiment, evidence: Evidence) -> dict[str, Any]:
         found.append(
             {
                 "label": study.label,
-                "setting": asdict(study.setting),
+                "setting": study.setting.about,
+                "parameters": study.setting.text,
+                "positions": study.setting.positions(),
                 "runs": len(costs),
                 "policy_cost": {
                     "interquartile_mean": centre.value,
@@ -213,10 +227,13 @@ def summary(experiment: Experiment, evidence: Evidence) -> dict[str, Any]:
         "claims": list(experiment.claims),
         "caption": CAPTIONS[experiment.drawing],
         "studies": found,
+        "findings": None
+        if not experiment.findings
+        else FINDINGS[experiment.findings](experiment, evidence),
     }
 
 
-def curves(setting: Setting, evidence: Evidence) -> dict[str, Any]:
+def curves(setting: Runnable, evidence: Evidence) -> dict[str, Any]:
     """Mean, least and largest value of each measure after each trial, 5 digits."""
     found = {}
     for measure in CURVES:
@@ -290,12 +307,11 @@ def figures_only(outcome: Outcome) -> Outcome:
     }
 
 
-def _compile(settings: list[Setting]) -> None:
-    """Let each kind of colony on each system make a short trial."""
-    kinds = {(each.env_id, each.kind, len(each.env)): each for each in settings}
+def _compile(settings: list[Runnable]) -> None:
+    """Let each kind of learner on each system make a short trial."""
+    kinds = {each.kernels: each for each in settings}
     for setting in kinds.values():
-        short = {**setting.colony, "max_steps": 2}
-        learn(replace(setting, ants=2, trials=1, colony=short), 0, lambda done: None)
+        setting.brief().learn(0, lambda done: None)
 
 
 def _executor(name: str, workers: int) -> Executor:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from gymnasium.vector import VectorEnv
 from gymnasium.wrappers.vector import TransformReward
+from numpy.typing import NDArray
 
 from acl_gym.agents.acl import ACL, PheromoneBoundWarning
 from acl_gym.agents.q_learning import QLearning
@@ -122,7 +123,9 @@ class Contest:
             self, seed, report
         )
 
-    def along(self, runs: list[dict[str, Any]], measure: str) -> Any:
+    def along(
+        self, runs: Sequence[dict[str, Any]], measure: str
+    ) -> NDArray[np.float64]:
         """A measure of each run at `positions`, `(runs, points)`.
 
         A policy counts from its evaluation to the next; before the first, the first.
@@ -152,12 +155,9 @@ def _learn_table(contest: Contest, seed: int, report: Report) -> dict[str, Any]:
         agent.learn(total_timesteps=arena.steps, callback=evaluation)
     except ValueError as error:  # values that overflow: Q-learning may diverge
         failure = str(error)
-        last = evaluation.rows[-1] if evaluation.rows else None
         evaluation.rows.append(
             {
-                "env_steps": agent.num_timesteps + 1
-                if last is None
-                else last["env_steps"] + 1,
+                "env_steps": agent.num_timesteps + 1,
                 "seconds": agent.seconds,
                 "policy_cost": arena.ceiling,
                 "success_rate": 0.0,

@@ -92,6 +92,15 @@ def test_a_system() -> None:
     assert table["Range"] == "12 to 12.09"
 
 
+def test_the_overview() -> None:
+    found = findings.overview(BY_NAME["versus"], made_up("versus", cost_of))
+    assert [row[0] for row in found["rows"]] == list(BY_NAME["versus"].options["rows"])
+    count = "Of 12 duels of ACL: 4 won, 4 without a difference, 4 lost."
+    assert found["sentences"][0] == f"cost of the last policy: {count}"
+    assert len(found["duels"]) == 12 * 5
+    json.dumps(found, allow_nan=False)
+
+
 @pytest.mark.parametrize("name", ["cells", "noise", "partial", "wholes", "slots"])
 def test_several_arenas(name: str) -> None:
     experiment = BY_NAME[f"versus-{name}"]

@@ -195,6 +195,8 @@ def test_costs_of_whole_solutions() -> None:
 
 def test_experiments_are_those_of_the_issue() -> None:
     names = [name for name in BY_NAME if name.startswith("versus-")]
+    overview = BY_NAME["versus"]
+    assert len(overview.studies) == 4 * (len(METHODS) + 1)
     assert names == [f"versus-{name}" for name in SYSTEMS] + [
         f"versus-{name}"
         for name in ("cells", "noise", "partial", "wholes", "slots", "order")

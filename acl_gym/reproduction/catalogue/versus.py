@@ -35,6 +35,27 @@ def contest(name: str, method: str) -> Contest:
     return Contest(ARENAS[name], method, settings_of(name, method), most_runs=runs)
 
 
+def _overview() -> Experiment:
+    rows = {
+        LABELS[name]: {method: contest(name, method) for method in methods_in(arena)}
+        for name, arena in SYSTEMS.items()
+    }
+    found = _of_rows(
+        "versus",
+        "ACL against reinforcement learning",
+        rows,
+        f"The four systems at a glance; each has a figure of its own below. {_TUNED} "
+        f"{_JUDGED}",
+        findings="overview",
+        of="System",
+    )
+    references = (
+        Study(f"{LABELS[name]}, dynamic programming", Reference(arena))
+        for name, arena in SYSTEMS.items()
+    )
+    return replace(found, studies=(*found.studies, *references))
+
+
 def _systems() -> tuple[Experiment, ...]:
     return tuple(
         Experiment(
@@ -144,6 +165,7 @@ def _order() -> Experiment:
 
 
 EXPERIMENTS = (
+    _overview(),
     *_systems(),
     _harder(
         "versus-cells",

@@ -32,9 +32,8 @@ def race(experiment: Experiment, evidence: Evidence) -> Figure:
     """Cost of policies over interactions and over seconds, and the last ones."""
     name, cost = reference_of(experiment, evidence)
     figure = drawing.new_figure(3.1)
-    steps, seconds, last = figure.subplots(
-        1, 3, sharey=True, width_ratios=(1.0, 1.0, 0.55)
-    )
+    steps, seconds, last = figure.subplots(1, 3, width_ratios=(1.0, 1.0, 0.8))
+    seconds.sharey(steps)
     found = contests(experiment)
     for contest in found.values():
         _curve(steps, evidence.runs(contest), "env_steps", contest.method)
@@ -46,9 +45,12 @@ def race(experiment: Experiment, evidence: Evidence) -> Figure:
         ax.axhline(cost, **drawing.BOUND)
     drawing.prepare(last)
     _strips(last, found.values(), evidence)
-    last.axhline(cost, **drawing.BOUND)
+    last.axhline(cost, **drawing.BOUND)  # its own scale: they are close together
     last.set_xlabel("last policies", fontsize=SMALL)
+    last.set_yscale("log")
+    drawing.plain_log(last.yaxis, sparse=True)
     steps.set_yscale("log")
+    seconds.tick_params(labelleft=False)
     steps.set_ylabel("policy cost $J^h$", fontsize=SMALL)
     drawing.plain_log(steps.yaxis, sparse=True)
     drawing.optimal_cost_line(steps, cost, "J*" if name == "J*" else "best known")

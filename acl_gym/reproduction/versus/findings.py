@@ -240,6 +240,43 @@ def harder(experiment: Experiment, evidence: Evidence) -> Findings:
     }
 
 
+def overview(experiment: Experiment, evidence: Evidence) -> Findings:
+    """As `harder`, and the duels for the interactions and the time that learning takes."""
+    found = harder(experiment, evidence)
+    duels, sentences = [], []
+    for mark in MARKS:
+        for x, unit in (("env_steps", "interactions"), ("seconds", "seconds")):
+            measure = f"{unit} to within {mark}% of the best known cost"
+            own = []
+            for where, row in experiment.options["rows"].items():
+                at = {}
+                for method, contest in row.items():
+                    best = float(evidence.last(Reference(contest.arena))[0])
+                    at[method] = np.array(
+                        [
+                            reached(run, best * (1 + mark / 100), x)
+                            for run in evidence.runs(contest)
+                        ]
+                    )
+                own += [
+                    duel(where, measure, METHODS[m], at["acl"], values)
+                    for m, values in at.items()
+                    if m != "acl"
+                ]
+            sentences.append(f"{measure}: {_count(own)}")
+            duels += own
+    return {
+        **found,
+        "sentences": [
+            f"cost of the last policy: {found['sentences'][0]}",
+            *sentences,
+            *found["sentences"][1:],
+            *map(str, duels),
+        ],
+        "duels": found["duels"] + [each.as_json() for each in duels],
+    }
+
+
 def _count(duels: Iterable[Duel]) -> str:
     """How often ACL wins and loses."""
     verdicts = [each.verdict for each in duels]
@@ -315,6 +352,7 @@ def _differing(first: dict[str, Any], second: dict[str, Any], actions: int = 3) 
 
 
 FINDINGS: dict[str, Callable[[Experiment, Evidence], Findings]] = {
+    "overview": overview,
     "system": system,
     "harder": harder,
     "slots": slots,

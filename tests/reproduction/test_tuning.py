@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import builtins
 import json
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -23,6 +25,8 @@ from acl_gym.reproduction.versus.tuned import (
 )
 
 PAIRS = [(name, method) for name in ARENAS for method in methods_in(ARENAS[name])]
+
+SCRIPT = Path(__file__).resolve().parents[2] / "benchmarks" / "tune.py"
 
 
 def inside(dimension: Any, value: Any) -> bool:
@@ -143,6 +147,27 @@ def test_searches_that_are_missing_or_damaged(tmp_path: Path) -> None:
         path_of("row", "acl", tmp_path).write_text(text)
         with pytest.raises(ValueError, match="is not the data of a search"):
             read_search("row", "acl", tmp_path)
+
+
+def tune(*arguments: str, out: Path) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, str(SCRIPT), *arguments, "--out", str(out)],
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=300,
+    )
+
+
+def test_the_command(tmp_path: Path) -> None:
+    pytest.importorskip("optuna")
+    done = tune("--only", "row-q", "--evaluations", "1", out=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "| 1-D grid | Q-learning | 5 | 5 | " in done.stdout
+    assert [path.name for path in tmp_path.iterdir()] == ["row-q.json"]
+    wrong = tune("--only", "moon", out=tmp_path)
+    assert wrong.returncode == 2
+    assert "--only must be arenas or arena-method, got 'moon'" in wrong.stderr
 
 
 def test_the_folder_is_in_the_package() -> None:

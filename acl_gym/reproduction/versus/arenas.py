@@ -116,7 +116,7 @@ SYSTEMS = {
 
 
 def _swing(**changes: Any) -> Arena:
-    return replace(_SWING, **changes)
+    return replace(_SWING, **{"steps": 500_000, **changes})
 
 
 def _slippery(p: float) -> Arena:
@@ -130,15 +130,15 @@ def _slippery(p: float) -> Arena:
 
 
 HARDER = {
-    "pendulum-10x11": _swing(cells=(10, 11)),
-    "pendulum-16x17": _swing(cells=(16, 17)),
-    "pendulum-24x25": _swing(cells=(24, 25)),
-    "pendulum-40x41": _swing(),
+    "pendulum-10x11": replace(_SWING, cells=(10, 11)),
+    "pendulum-16x17": replace(_SWING, cells=(16, 17)),
+    "pendulum-24x25": replace(_SWING, cells=(24, 25)),
+    "pendulum-40x41": _SWING,
     "grid-p0.7": _slippery(0.7),
     "grid-p0.5": _slippery(0.5),
     "pendulum-noise": _swing(veil={"noise": [0.1, 0.5]}),
     "pendulum-slips": _swing(veil={"slips": 0.2}),
-    "navigation-hidden": Arena(NAVIGATION, 1_000_000, 150, veil={"hidden": [3]}),
+    "navigation-hidden": Arena(NAVIGATION, 500_000, 150, veil={"hidden": [3]}),
     "pendulum-sign": _swing(veil={"rounded": [0, 2]}, cells=(40, 3)),
     "pendulum-settling": _swing(judged_by="settling"),
     "pendulum-switches": _swing(judged_by="switches"),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -20,7 +20,7 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 
-from acl_gym.experiments.runner import Executor, Result, Task, in_processes, run_tasks
+from acl_gym.experiments.runner import Executor, Task, in_processes, run_tasks
 from acl_gym.reproduction.catalogue import BY_NAME, EXPERIMENTS, RUNS
 from acl_gym.reproduction.claims import CLAIMS
 from acl_gym.reproduction.evidence import Evidence
@@ -107,7 +107,7 @@ def tasks_for(settings: Iterable[Runnable], seeds: Iterable[int]) -> list[Task]:
     return [
         Task(
             f"{setting.system}-{setting.key}-{seed}",
-            learn,
+            setting.learner,
             (setting, seed),
             {**setting.about, "seed": seed},
         )
@@ -115,11 +115,6 @@ def tasks_for(settings: Iterable[Runnable], seeds: Iterable[int]) -> list[Task]:
         for setting in settings
         if setting.most_runs is None or place < setting.most_runs
     ]
-
-
-def learn(setting: Runnable, seed: int, report: Callable[[float], None]) -> Result:
-    """What a task calls: a method does not travel to other processes by its name."""
-    return setting.learn(seed, report)
 
 
 def reproduce(
@@ -311,7 +306,7 @@ def _compile(settings: list[Runnable]) -> None:
     """Let each kind of learner on each system make a short trial."""
     kinds = {each.kernels: each for each in settings}
     for setting in kinds.values():
-        setting.brief().learn(0, lambda done: None)
+        setting.learner(setting.brief(), 0, lambda done: None)
 
 
 def _executor(name: str, workers: int) -> Executor:

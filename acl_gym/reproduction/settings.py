@@ -30,6 +30,9 @@ KINDS = {"crisp": Crisp, "fuzzy": Fuzzy}
 Result = dict[str, Any]
 """Of a run: `rows`, `levels`, `seconds`; see `training.learn`."""
 
+Learner = Callable[[Any, int, Callable[[float], None]], Result]
+"""Runs a setting with a seed; is told whom to tell the fraction that is done."""
+
 
 class Runnable(Protocol):
     """What can be run with one seed after another: a frozen dataclass."""
@@ -61,8 +64,9 @@ class Runnable(Protocol):
     def brief(self) -> Runnable:
         """The same in a moment, to compile its kernels."""
 
-    def learn(self, seed: int, report: Callable[[float], None]) -> Result:
-        """Run it once; `report` is told the fraction that is done."""
+    @property
+    def learner(self) -> Learner:
+        """What runs it once: a function of a module, which travels to other processes."""
 
     def along(self, runs: Sequence[Result], measure: str) -> NDArray[np.float64]:
         """A measure of each run as it goes on, `(runs, points)`."""
@@ -137,11 +141,12 @@ class Setting:
         short = {**self.colony, "max_steps": 2}
         return replace(self, ants=2, trials=1, colony=short)
 
-    def learn(self, seed: int, report: Callable[[float], None]) -> Result:
+    @property
+    def learner(self) -> Learner:
         """See `training.learn`."""
         from acl_gym.reproduction.training import learn
 
-        return learn(self, seed, report)
+        return learn
 
     def along(self, runs: Sequence[Result], measure: str) -> NDArray[np.float64]:
         """A measure after each trial of each run."""

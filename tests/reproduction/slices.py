@@ -42,7 +42,7 @@ def evidence() -> Evidence:
     """Runs of the slice under the keys of the whole settings."""
     results: dict[str, list[dict[str, Any]]] = {
         setting.key: [
-            shortened(setting).learn(seed, silent)
+            setting.learner(shortened(setting), seed, silent)
             for seed in range(runs_of(setting.most_runs))
         ]
         for setting in settings_of(EXPERIMENTS)

@@ -18,7 +18,12 @@ from acl_gym.reproduction.catalogue import BY_NAME
 from acl_gym.reproduction.reproduce import tasks_for
 from acl_gym.reproduction.store import ParquetStore
 from acl_gym.reproduction.versus.arenas import ARENAS, LABELS, SYSTEMS, Arena
-from acl_gym.reproduction.versus.contest import COLUMNS, Contest, make_agent
+from acl_gym.reproduction.versus.contest import (
+    COLUMNS,
+    Contest,
+    learn,
+    make_agent,
+)
 from acl_gym.reproduction.versus.reference import Reference
 from acl_gym.reproduction.versus.spaces import METHODS, TABLES, defaults_of
 from acl_gym.reproduction.versus.tuned import methods_in
@@ -37,7 +42,7 @@ def contest(name: str, method: str, **changes: Any) -> Contest:
 @pytest.mark.parametrize(("name", "method"), PAIRS)
 def test_every_method_runs_in_every_arena(name: str, method: str) -> None:
     setting = contest(name, method).brief()
-    found = setting.learn(0, silent)
+    found = learn(setting, 0, silent)
     rows = found["rows"]
     assert set(rows) == set(COLUMNS)
     assert len({len(values) for values in rows.values()}) == 1
@@ -45,7 +50,7 @@ def test_every_method_runs_in_every_arena(name: str, method: str) -> None:
     assert np.isfinite(rows["policy_cost"]).all()
     assert max(rows["policy_cost"]) <= setting.arena.ceiling
     assert found["failure"] == ""
-    again = setting.learn(0, silent)
+    again = learn(setting, 0, silent)
     assert again["rows"]["policy_cost"] == rows["policy_cost"]
     assert np.array_equal(again["levels"], found["levels"])
     along = setting.along([found, again], "policy_cost")
@@ -86,7 +91,7 @@ def test_a_run_that_breaks_down_costs_the_most(
             raise ValueError("values have overflowed")
 
     monkeypatch.setattr(QLearning, "_check_values", overflow)
-    found = contest("pendulum", "q").brief().learn(0, silent)
+    found = learn(contest("pendulum", "q").brief(), 0, silent)
     assert found["failure"] == "values have overflowed"
     rows = found["rows"]
     assert len(rows["policy_cost"]) == 3
@@ -165,7 +170,7 @@ def test_the_order_of_ants_does_not_matter_and_that_of_q_learning_does() -> None
         setting = contest("pendulum", method, slots=40, max_steps=60)
         arena = replace(setting.arena, steps=6_000, cells=(10, 11))
         both = [
-            replace(setting, arena=arena, backwards=backwards).learn(1, silent)
+            learn(replace(setting, arena=arena, backwards=backwards), 1, silent)
             for backwards in (False, True)
         ]
         tables[method] = [found["levels"] for found in both]
@@ -231,7 +236,7 @@ def test_two_runs_of_an_experiment_from_its_name_to_its_findings(
     assert {each["verdict"] for each in found["findings"]["duels"]} == {"undecided"}
     assert len(list((tmp_path / "tasks").glob("*.parquet"))) == 2 * 3 + 1
     learner = brief.studies[0].setting
-    kept, made = evidence.runs(learner)[1], learner.learn(1, silent)
+    kept, made = evidence.runs(learner)[1], learn(learner, 1, silent)
     assert kept["rows"]["policy_cost"] == made["rows"]["policy_cost"]
     assert kept["levels"].tobytes() == made["levels"].tobytes()
 

@@ -20,6 +20,7 @@ from acl_gym.agents.q_learning import QLearning
 from acl_gym.agents.tabular import TabularAgent
 from acl_gym.callbacks import Callback, Row
 from acl_gym.evaluation import evaluate_policy_cost
+from acl_gym.reproduction.settings import Learner, Result
 from acl_gym.reproduction.versus.arenas import Arena
 from acl_gym.reproduction.versus.spaces import METHODS
 from acl_gym.reproduction.versus.veils import Backwards, BackwardsLuck
@@ -107,21 +108,10 @@ class Contest:
             settings = {**settings, "slots": 4, "max_steps": 10}
         return replace(self, arena=arena, settings=settings)
 
-    def learn(self, seed: int, report: Report) -> dict[str, Any]:
-        """Run it once.
-
-        Args:
-            seed: of the agent, and through it of its environment.
-            report: told the fraction that is done.
-
-        Returns:
-            `rows`, the values of each of `COLUMNS`; `levels`, the table at the end,
-            flat, nothing of DQN; `seconds` of learning; `failure`, why it broke down,
-            "" if it did not.
-        """
-        return (_learn_dqn if self.method == "dqn" else _learn_table)(
-            self, seed, report
-        )
+    @property
+    def learner(self) -> Learner:
+        """See `learn`."""
+        return learn
 
     def along(
         self, runs: Sequence[dict[str, Any]], measure: str
@@ -146,7 +136,24 @@ class Contest:
         return [int(x) for x in np.unique(np.rint(np.geomspace(first, last, POINTS)))]
 
 
-def _learn_table(contest: Contest, seed: int, report: Report) -> dict[str, Any]:
+def learn(contest: Contest, seed: int, report: Report) -> Result:
+    """Run a contest once.
+
+    Args:
+        contest: what to run.
+        seed: of the agent, and through it of its environment.
+        report: told the fraction that is done.
+
+    Returns:
+        `rows`, the values of each of `COLUMNS`; `levels`, the table at the end, flat,
+        nothing of DQN; `seconds` of learning; `failure`, why it broke down, "" if it
+        did not.
+    """
+    run = _learn_dqn if contest.method == "dqn" else _learn_table
+    return run(contest, seed, report)
+
+
+def _learn_table(contest: Contest, seed: int, report: Report) -> Result:
     arena = contest.arena
     agent = make_agent(contest, seed)
     evaluation = Evaluation(arena, report)
@@ -235,7 +242,7 @@ class Evaluation(Callback):
         return True
 
 
-def _learn_dqn(contest: Contest, seed: int, report: Report) -> dict[str, Any]:
+def _learn_dqn(contest: Contest, seed: int, report: Report) -> Result:
     # Only here: importing torch takes seconds that the other methods do not need.
     import torch
     from stable_baselines3.common.callbacks import ConvertCallback

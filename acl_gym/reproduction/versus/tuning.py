@@ -20,7 +20,7 @@ import numpy as np
 
 from acl_gym.experiments.runner import versions
 from acl_gym.reproduction.versus.arenas import ARENAS, Arena
-from acl_gym.reproduction.versus.contest import Contest
+from acl_gym.reproduction.versus.contest import Contest, learn
 from acl_gym.reproduction.versus.spaces import (
     Choice,
     Dimension,
@@ -126,7 +126,7 @@ def evaluate(contest: Contest, seeds: tuple[int, ...]) -> dict[str, Any]:
         run; `seconds` of learning, in the mean; `failures`, why runs broke down.
     """
     began = time.perf_counter()
-    runs = [contest.learn(seed, lambda done: None) for seed in seeds]
+    runs = [learn(contest, seed, lambda done: None) for seed in seeds]
     costs = [run["rows"]["policy_cost"][-1] for run in runs]
     return {
         "value": float(np.mean(costs)),

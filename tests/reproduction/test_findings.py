@@ -46,7 +46,8 @@ def test_what_is_never_reached_is_lost_to_what_is() -> None:
     assert str(lost) == "steps: ACL loses to DQN."
     assert duel("", "steps", "DQN", soon, never).verdict == "wins"
     both = duel("", "steps", "DQN", never, never)
-    assert both.verdict == "no difference"
+    assert both.verdict == "neither"
+    assert str(both) == "steps: neither ACL nor DQN gets there in most runs."
     for each in (lost, both):
         json.dumps(each.as_json(), allow_nan=False)
 
@@ -96,6 +97,7 @@ def test_the_overview() -> None:
     found = findings.overview(BY_NAME["versus"], made_up("versus", cost_of))
     assert [row[0] for row in found["rows"]] == list(BY_NAME["versus"].options["rows"])
     count = "Of 12 duels of ACL: 4 won, 4 without a difference, 4 lost."
+    assert found["sentences"][1].startswith("interactions to within 25% of the best")
     assert found["sentences"][0] == f"cost of the last policy: {count}"
     assert len(found["duels"]) == 12 * 5
     json.dumps(found, allow_nan=False)

@@ -33,6 +33,9 @@ SLACK = 1e-3
 """Ratios that are no farther from 1 are taken for 1."""
 
 WINS, LOSES, EVEN, OPEN = "wins", "loses", "no difference", "undecided"
+NEITHER = "neither"
+"""Of times: neither gets there in more than half of its runs."""
+
 NEVER = "–"
 
 
@@ -43,7 +46,7 @@ class Duel(NamedTuple):
         where: the arena.
         measure: what is held against each other; less is better.
         rival: the other method's name.
-        verdict: WINS, LOSES, EVEN or OPEN, of ACL.
+        verdict: WINS, LOSES, EVEN, NEITHER or OPEN, of ACL.
         ratio: how many times the rival's that of ACL is.
     """
 
@@ -67,6 +70,11 @@ class Duel(NamedTuple):
         at = f"{self.where}: " if self.where else ""
         if self.verdict == OPEN:
             return f"{at}{self.measure}: too few runs to tell ACL from {self.rival}."
+        if self.verdict == NEITHER:
+            return (
+                f"{at}{self.measure}: neither ACL nor {self.rival} gets there in most "
+                "runs."
+            )
         if self.verdict == EVEN:
             text = f"no difference between ACL and {self.rival}"
         else:
@@ -92,6 +100,8 @@ def duel(
     found = ratio(acl, other)
     if min(len(acl), len(other)) < FEW:
         verdict = OPEN
+    elif math.isinf(np.median(acl)) and math.isinf(np.median(other)):
+        verdict = NEITHER
     elif found.low > 1 + SLACK:
         verdict = LOSES
     elif found.high < 1 - SLACK:
@@ -103,8 +113,10 @@ def duel(
 
 def times(found: Interval) -> str:
     """A ratio in words."""
-    low, high = (f"{x:.3g}" if _tellable(x) else "∞" for x in found[1:])
-    return f"{found.value:.3g} [{low}, {high}] times as much"
+    value, low, high = (
+        f"{x:.3g}" if _tellable(x) else "∞" if x > 1 else "0" for x in found
+    )
+    return f"{value} [{low}, {high}] times"
 
 
 def _tellable(value: float) -> bool:
@@ -285,6 +297,7 @@ def _count(duels: Iterable[Duel]) -> str:
         for word, text in (
             (WINS, "won"),
             (EVEN, "without a difference"),
+            (NEITHER, "where neither gets there"),
             (LOSES, "lost"),
             (OPEN, "undecided"),
         )
@@ -304,7 +317,7 @@ def slots(experiment: Experiment, evidence: Evidence) -> Findings:
         change = ratio(costs[-1], costs[best])
         sentences.append(
             f"{METHODS[method]} does best with {table[best][0]}; with {table[-1][0]} "
-            f"and as many interactions its policies cost {times(change)}."
+            f"and as many interactions its policies cost {times(change)} as much."
         )
     return {**found, "sentences": sentences + found["sentences"]}
 

@@ -17,6 +17,7 @@ from acl_gym.reproduction.versus.arenas import ARENAS
 from acl_gym.reproduction.versus.contest import Contest
 from acl_gym.reproduction.versus.spaces import Choice, defaults_of, space_of
 from acl_gym.reproduction.versus.tuned import (
+    FOLDER,
     best_of,
     methods_in,
     path_of,
@@ -42,7 +43,8 @@ def test_the_search_that_is_kept(name: str, method: str) -> None:
     found = read_search(name, method)
     evaluations = found["evaluations"]
     assert len(evaluations) == tuning.EVALUATIONS
-    assert found["seeds"] == list(tuning.SEEDS)
+    # Arena, space, sampler and seeds are those of the code.
+    assert tuning.begun(name, method, FOLDER, tuning.SEEDS) == found
     assert evaluations[0]["parameters"] == {key: defaults[key] for key in space}
     for each in evaluations:
         assert set(each["parameters"]) == set(space)

@@ -77,7 +77,7 @@ def search(
         ) from error
     optuna.logging.set_verbosity(optuna.logging.WARNING)
     arena = ARENAS[name]
-    found = _begun(name, method, folder, seeds)
+    found = begun(name, method, folder, seeds)
     known = found["evaluations"]
     fixed = defaults_of(arena, method)
     distributions = {
@@ -146,8 +146,12 @@ def mean_cost(rows: dict[str, list[float]]) -> float:
     return float(spans @ held / steps[-1])
 
 
-def _begun(name: str, method: str, folder: Path, seeds: tuple[int, ...]) -> Search:
-    """The search as far as it is in its file."""
+def begun(name: str, method: str, folder: Path, seeds: tuple[int, ...]) -> Search:
+    """The search as far as it is in its file.
+
+    Raises:
+        ValueError: the file is of another search.
+    """
     arena: Arena = ARENAS[name]
     about = {
         "arena": name,

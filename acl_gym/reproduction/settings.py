@@ -39,6 +39,7 @@ class Setting:
             partition; None where the states are the cells.
         evaluation_steps: T of the evaluation after each trial; None takes that of the
             colony.
+        order: the reading of the local update, a key of `orders.ORDERS`.
     """
 
     env_id: str
@@ -49,6 +50,7 @@ class Setting:
     kind: str = "discrete"
     cells: Any = None
     evaluation_steps: int | None = None
+    order: str = "two phases"
 
     @cached_property
     def key(self) -> str:

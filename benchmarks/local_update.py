@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import argparse
 import json
+
 import numpy as np
 from rich.console import Console
 from rich.table import Table

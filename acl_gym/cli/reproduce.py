@@ -181,6 +181,7 @@ def _list(experiments: Any, as_json: bool) -> None:
                 "title": each.title,
                 "section": each.section,
                 "claims": list(each.claims),
+                "explains": list(each.explains),
                 "settings": [study.label for study in each.studies],
             }
             for each in experiments
@@ -188,8 +189,10 @@ def _list(experiments: Any, as_json: bool) -> None:
         typer.echo(json.dumps(rows, indent=1))
         return
     for each in experiments:
-        claims = f" ({', '.join(each.claims)})" if each.claims else ""
-        typer.echo(f"{each.name:17} {each.title}{claims}")
+        words = [", ".join(each.claims)] if each.claims else []
+        words += [f"to understand {', '.join(each.explains)}"] if each.explains else []
+        told = f" ({'; '.join(words)})" if words else ""
+        typer.echo(f"{each.name:17} {each.title}{told}")
 
 
 def _show(outcome: Any, screen: Any) -> None:

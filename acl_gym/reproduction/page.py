@@ -108,13 +108,18 @@ def write_claims(directory: Path) -> Path:
         "| --- | --- | --- | --- | --- |",
     ]
     for claim in outcome["claims"]:
-        figures = ", ".join(name for name in claim["experiments"] if name in there)
+        names = [*claim["experiments"], *claim["trials"]]
+        figures = ", ".join(name for name in names if name in there)
         text = f"**{claim['text']}** {claim['section']}; {figures}"
         lines.append(f"| {claim['claim']} | {claim['verdict']} | {text} | | |")
         lines += [
             f"| | | {part['statement']} | {part['measured']} | "
             f"{'yes' if part['holds'] else 'no'} |"
             for part in claim["parts"]
+        ]
+        lines += [
+            f"| | | tried: {each['what']} | {each['found']} | |"
+            for each in claim["tried"]
         ]
         if claim["understanding"]:
             lines.append(f"| | | {claim['understanding']} | | |")

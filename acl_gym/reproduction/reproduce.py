@@ -66,7 +66,7 @@ def chosen(names: Sequence[str]) -> list[Experiment]:
 
     Args:
         names: of experiments; "all" are all of them, "claims" those that decide a
-            claim.
+            claim or were tried to understand one.
 
     Raises:
         ValueError: there is no experiment of a name.
@@ -81,7 +81,9 @@ def chosen(names: Sequence[str]) -> list[Experiment]:
     if "all" in wanted:
         wanted |= set(BY_NAME)
     if "claims" in wanted:
-        wanted |= {name for claim in CLAIMS for name in claim.experiments}
+        wanted |= {
+            name for claim in CLAIMS for name in (*claim.experiments, *claim.trials)
+        }
     return [experiment for experiment in EXPERIMENTS if experiment.name in wanted]
 
 
@@ -211,6 +213,7 @@ def summary(experiment: Experiment, evidence: Evidence) -> dict[str, Any]:
         "section": experiment.section,
         "text": experiment.text,
         "claims": list(experiment.claims),
+        "explains": list(experiment.explains),
         "caption": CAPTIONS[experiment.drawing],
         "studies": found,
     }

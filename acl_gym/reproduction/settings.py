@@ -104,6 +104,7 @@ class Experiment:
         studies: its panels, in order.
         drawing: how it is drawn, a key of `figures.DRAWINGS`.
         claims: which claims it decides.
+        explains: for which claims it is tried why they do not hold.
         text: what the thesis says, what is decided here, in this project's words.
         options: more that the drawing needs.
     """
@@ -116,3 +117,4 @@ class Experiment:
     claims: tuple[str, ...] = ()
     text: str = ""
     options: dict[str, Any] = field(default_factory=dict)
+    explains: tuple[str, ...] = ()

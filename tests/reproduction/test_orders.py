@@ -67,5 +67,7 @@ def test_what_does_not_go_together() -> None:
     partition = swing("crisp").make_partition()
     with pytest.raises(ValueError, match=r"selection must be .* got 'epsilon_greedy'"):
         orders.colony(
-            *(orders.ONE_PHASE, None, partition), n_actions=3, selection="epsilon_greedy"
+            *(orders.ONE_PHASE, None, partition),
+            n_actions=3,
+            selection="epsilon_greedy",
         )

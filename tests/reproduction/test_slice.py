@@ -12,7 +12,7 @@ import pytest
 
 from acl_gym.reproduction import evidence as evidence_module
 from acl_gym.reproduction import figures, page, reproduce
-from acl_gym.reproduction.catalogue import EXPERIMENTS
+from acl_gym.reproduction.catalogue import BY_NAME, EXPERIMENTS
 from acl_gym.reproduction.claims import CLAIMS
 from acl_gym.reproduction.settings import Experiment
 from tests.reproduction.slices import SEEDS, TRIALS, evidence
@@ -85,6 +85,27 @@ def test_every_summary_is_json_with_curves(experiment: Experiment) -> None:
             ):
                 assert low <= mean * (1 + 1e-4) + 1e-9
                 assert mean <= high * (1 + 1e-4) + 1e-9
+
+
+def keys_of(names: list[str]) -> set[str]:
+    return {
+        setting.key
+        for setting in reproduce.settings_of(BY_NAME[name] for name in names)
+    }
+
+
+@pytest.mark.parametrize("claim", CLAIMS, ids=lambda claim: claim.name)
+def test_a_claim_needs_its_own_experiments_alone(claim: Any) -> None:
+    own = evidence().of(keys_of(claim.experiments))
+    assert claim.judge(own)["verdict"] != "undecided"
+    # What was tried is all told once its experiments are there too.
+    tried = claim.attempts(evidence().of(keys_of([*claim.experiments, *claim.trials])))
+    assert len(tried) == len(claim.tried)
+    assert all(each.what and each.found for each in tried)
+    if claim.trials:
+        assert len(claim.attempts(own)) < len(tried), "they are not looked at"
+    decisive = {"C1", "C2", "C3", "C17", "C21"}
+    assert claim.tried or claim.name in decisive
 
 
 class Links(HTMLParser):

@@ -48,9 +48,10 @@ def colony(order: str, *arguments: Any, **keywords: Any) -> ACL:
         return OnePhase(*arguments, **keywords)
     made = ACL(*arguments, **keywords)
     if order != TWO_PHASES:
-        levels, old = made.pheromone.levels, made.pheromone
-        made.pheromone = AtTheEnd(*levels.shape, old.tau0, old.alpha)
-        made.pheromone.each_ant = order == ONCE_AN_ANT
+        old = made.pheromone
+        late = AtTheEnd(len(old.levels), old.n_actions, old.tau0, old.alpha)
+        late.each_ant = order == ONCE_AN_ANT
+        made.pheromone = late
     return made
 
 
@@ -127,7 +128,7 @@ class OnePhase(ACL):
                 "in turn, got 'epsilon_greedy'."
             )
         old = self.pheromone
-        self.pheromone = _Decayed(*old.levels.shape, old.tau0, old.alpha)
+        self.pheromone = _Decayed(len(old.levels), old.n_actions, old.tau0, old.alpha)
 
     def _choose(
         self,

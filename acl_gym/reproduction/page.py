@@ -10,7 +10,7 @@ from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
-from acl_gym.reproduction.reproduce import Outcome
+from acl_gym.reproduction.outcome import Outcome
 from acl_gym.reproduction.verdicts import HOLDS, IN_PART, NOT, UNDECIDED
 from acl_gym.storage import write_atomically
 

@@ -12,6 +12,7 @@ import pytest
 
 from acl_gym.reproduction import evidence as evidence_module
 from acl_gym.reproduction import figures, page, reproduce
+from acl_gym.reproduction import outcome as outcomes
 from acl_gym.reproduction.catalogue import BY_NAME, EXPERIMENTS
 from acl_gym.reproduction.claims import CLAIMS
 from acl_gym.reproduction.settings import Experiment
@@ -46,7 +47,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     for experiment in DRAWN:
         figures.save(experiment, evidence(), path / "figures")
     figures.animation.animate(path / "figures" / "learning.gif", shown=(0, 1))
-    outcome = reproduce.outcome_of(list(EXPERIMENTS), evidence(), SEEDS, 0, {})
+    outcome = outcomes.outcome_of(list(EXPERIMENTS), evidence(), SEEDS, 0, {})
     patch.undo()
     (path / "results.json").write_text(json.dumps(outcome))
     page.write_page(path)
@@ -74,7 +75,7 @@ def test_every_kind_of_figure_is_drawn(folder: Path, experiment: Experiment) -> 
 
 @pytest.mark.parametrize("experiment", EXPERIMENTS, ids=lambda each: each.name)
 def test_every_summary_is_json_with_curves(experiment: Experiment) -> None:
-    text = json.dumps(reproduce.summary(experiment, evidence()), allow_nan=False)
+    text = json.dumps(outcomes.summary(experiment, evidence()), allow_nan=False)
     found = json.loads(text)
     for study in found["studies"]:
         assert study["runs"] == SEEDS

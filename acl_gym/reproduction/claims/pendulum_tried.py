@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -183,8 +184,9 @@ def structures(evidence: Evidence) -> Tried:
 
 def idle(evidence: Evidence) -> Tried:
     """Near upright, the cells without torque count as braking: the pendulum coasts."""
-    setting, shares = swing("fuzzy"), []
-    for policy in evidence.policies(setting):
+    shares = []
+    policies: list[Any] = evidence.policies(swing("fuzzy"))
+    for policy in policies:
         theta, omega = np.meshgrid(*policy.partition.centres, indexing="ij")
         action = policy.best_actions().reshape(theta.shape) - 1
         off = theta - np.pi

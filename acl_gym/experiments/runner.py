@@ -29,6 +29,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from filelock import FileLock, Timeout
+from tqdm.auto import tqdm
 
 import acl_gym
 from acl_gym.experiments.fingerprint import code_fingerprint
@@ -135,6 +136,8 @@ def run_tasks(
     tell = progress or (lambda name, fraction: None)
     results: dict[str, Result] = {}
     with _alone_in(directory):
+        for half in directory.glob(".*.tmp"):
+            half.unlink()  # of a runner that was killed while it wrote
         for task in tasks:
             found = kept.read(task)
             if found is not None:
@@ -235,6 +238,9 @@ def _start_worker(reports: Any) -> None:
     _reports = reports
     # Ctrl-C reaches every process of a terminal; the parent is the one to answer it.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    # The lock that tqdm makes otherwise is one for all processes: when this one is
+    # terminated, Python complains of a leak below the error that is the matter.
+    tqdm.set_lock(threading.RLock())
     threading.Thread(target=_end_with_parent, daemon=True).start()
 
 

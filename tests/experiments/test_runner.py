@@ -194,8 +194,12 @@ def test_killed_at_any_moment_it_goes_on(tmp_path: Path) -> None:
         time.sleep(0.05)
     while not (tmp_path / "worker").exists() and time.monotonic() < give_up:
         time.sleep(0.05)
+    # A second runner is refused while the first one lives, and loses nothing of it.
+    with pytest.raises(FolderInUseError, match="another run works on"):
+        run_tasks(tasks(tmp_path / "calls"), runs, workers=1)
     process.kill()
     process.wait()
+    (runs / ".square-1.json.77.tmp").write_text("{")
     worker = int((tmp_path / "worker").read_text())
     while _runs(worker) and time.monotonic() < give_up:
         time.sleep(0.05)
@@ -205,6 +209,7 @@ def test_killed_at_any_moment_it_goes_on(tmp_path: Path) -> None:
     results = run_tasks(tasks(tmp_path / "calls"), runs, workers=1)
     assert [result["square"] for result in results] == [0, 1, 4, 9]
     assert calls_in(tmp_path / "calls") == ["0", "1", "2", "3"]
+    assert not list(runs.glob(".*")), "nothing half written may stay"
 
 
 def _runs(pid: int) -> bool:

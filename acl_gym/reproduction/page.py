@@ -18,6 +18,8 @@ FIGURES = "figures"
 RESULTS = "results.json"
 PAGE = "report.html"
 ANIMATION = "learning.gif"
+POINTS = 250
+"""So many points of a line are explored at most."""
 
 _CLASSES = {HOLDS: "yes", IN_PART: "part", NOT: "no", UNDECIDED: "open"}
 
@@ -80,13 +82,7 @@ def write_page(directory: Path) -> Path:
             for each in outcome["experiments"]
         },
         animation=_image(directory / FIGURES / ANIMATION),
-        curves={
-            each["name"]: [
-                {"label": study["label"], **study["curves"]}
-                for study in each["studies"]
-            ]
-            for each in outcome["experiments"]
-        },
+        curves=_curves(outcome),
         parameters=_parameters,
     )
     path = directory / PAGE
@@ -126,6 +122,44 @@ def write_claims(directory: Path) -> Path:
     path = directory / "claims.md"
     write_atomically(path, ("\n".join(lines) + "\n").encode())
     return path
+
+
+def _curves(outcome: Outcome) -> dict[str, Any]:
+    """What can be explored: curves by setting, and which of them experiments show."""
+    curves: dict[str, Any] = {}
+    experiments: dict[str, list[dict[str, str]]] = {}
+    for each in outcome["experiments"]:
+        shown = experiments.setdefault(each["name"], [])
+        for study in each["studies"]:
+            key = json.dumps(study["setting"], sort_keys=True)
+            shown.append({"label": study["label"], "key": key})
+            if key not in curves:
+                curves[key] = _thinned(study["curves"])
+    # Keys are long and repeated: numbers will do.
+    numbers = {key: str(number) for number, key in enumerate(curves)}
+    for shown in experiments.values():
+        for entry in shown:
+            entry["key"] = numbers[entry["key"]]
+    return {
+        "experiments": experiments,
+        "curves": {numbers[key]: curve for key, curve in curves.items()},
+    }
+
+
+def _thinned(curves: dict[str, Any]) -> dict[str, Any]:
+    """At most `POINTS` points a line, four digits each; `every` so many trials one."""
+    trials = max(len(curve["mean"]) for curve in curves.values())
+    every = -(-trials // POINTS)
+    return {
+        "every": every,
+        **{
+            measure: {
+                name: [float(f"{value:.4g}") for value in line[::every]]
+                for name, line in curve.items()
+            }
+            for measure, curve in curves.items()
+        },
+    }
 
 
 def _image(path: Path) -> str:

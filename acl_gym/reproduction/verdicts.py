@@ -131,7 +131,12 @@ class Interval(NamedTuple):
 
     def __str__(self) -> str:
         """For instance 1.23 [1.1, 1.4]."""
-        return f"{self.value:.3g} [{self.low:.3g}, {self.high:.3g}]"
+        return f"{digits(self.value)} [{digits(self.low)}, {digits(self.high)}]"
+
+
+def digits(value: float) -> str:
+    """A number to three digits, without powers of ten: 2590, 44.7."""
+    return f"{float(f'{value:.3g}'):g}"
 
 
 def iqm(values: FloatArray, axis: int = -1) -> Any:

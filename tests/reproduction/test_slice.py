@@ -16,6 +16,7 @@ from acl_gym.reproduction import outcome as outcomes
 from acl_gym.reproduction.catalogue import BY_NAME, EXPERIMENTS
 from acl_gym.reproduction.claims import CLAIMS
 from acl_gym.reproduction.settings import Experiment
+from acl_gym.reproduction.systems import swing
 from tests.reproduction.slices import SEEDS, TRIALS, evidence
 
 DRAWN = list(
@@ -167,8 +168,8 @@ CHROMIUM = next(
 
 
 @pytest.mark.skipif(CHROMIUM is None, reason="needs chromium (apt install chromium)")
-@pytest.mark.parametrize("width", [1200, 390])
-def test_the_page_in_a_browser(folder: Path, width: int) -> None:
+@pytest.mark.parametrize(("width", "scheme"), [(1200, "dark"), (390, "light")])
+def test_the_page_in_a_browser(folder: Path, width: int, scheme: str) -> None:
     """No errors, no requests, every picture visible, links and hovering work."""
     sync = pytest.importorskip("playwright.sync_api")
     wrong: list[str] = []
@@ -177,7 +178,9 @@ def test_the_page_in_a_browser(folder: Path, width: int) -> None:
             executable_path=str(CHROMIUM),
             args=["--no-sandbox", "--disable-gpu", "--disable-background-networking"],
         )
-        tab = browser.new_page(viewport={"width": width, "height": 800})
+        tab = browser.new_page(
+            viewport={"width": width, "height": 800}, color_scheme=scheme
+        )
         tab.on("console", lambda m: m.type == "error" and wrong.append(m.text))
         tab.on("pageerror", lambda error: wrong.append(str(error)))
         tab.on(
@@ -197,9 +200,19 @@ def test_the_page_in_a_browser(folder: Path, width: int) -> None:
         tab.locator("tr#C14 a").first.click()
         assert tab.url.endswith("#fig5.4")
         box = tab.locator('.explore[data-name="fig5.4"]')
-        box.locator("select").first.select_option(label="rho = 0.1")
-        box.locator("svg").hover()
-        assert "mean" in box.locator("output").inner_text()
+        choice, measure = box.locator("select").all()
+        choice.select_option(label="rho = 0.1")
+        measure.select_option(label="sensitivity")
+        plot = box.locator("svg")
+        plot.hover(position={"x": plot.bounding_box()["width"] - 5, "y": 60})
+        curve = evidence().rows(swing("fuzzy"), "sensitivity")[:, -1]
+        told = box.locator("output").inner_text()
+        assert told.startswith(f"trial {TRIALS}: mean {curve.mean():.4g}, from ")
+        assert told.endswith(f"from {curve.min():.4g} to {curve.max():.4g}")
+        words = plot.locator("text").all_text_contents()
+        assert {"trial", "sensitivity", "1"} <= set(words)
+        paper = tab.evaluate("getComputedStyle(document.body).backgroundColor")
+        assert (paper == "rgb(255, 255, 255)") == (scheme == "light")
         browser.close()
     assert wrong == []
 

@@ -4,7 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from acl_gym.reproduction.catalogue.common import ANTS, GAMMAS, NEARLY_ONE, RHOS
+from acl_gym.reproduction.catalogue.common import (
+    ANTS,
+    GAMMAS,
+    NEARLY_ONE,
+    RHOS,
+    number,
+)
 from acl_gym.reproduction.catalogue.pendulum import partitions
 from acl_gym.reproduction.claims import pendulum_tried as tried
 from acl_gym.reproduction.claims.swings import (
@@ -97,7 +103,7 @@ def c15(evidence: Evidence) -> list[Part]:
         converged, measured = convergence(evidence, swing("crisp", local_decay=gamma))
         parts.append(
             Part(
-                f"gamma = {gamma:g} does not converge ({CONVERGES})",
+                f"gamma = {number(gamma)} does not converge ({CONVERGES})",
                 measured,
                 not converged,
             )

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 
 from acl_gym.evaluation import record_trajectory
-from acl_gym.reproduction.catalogue.common import GAMMAS
+from acl_gym.reproduction.catalogue.common import GAMMAS, number
 from acl_gym.reproduction.evidence import Evidence, FloatArray
 from acl_gym.reproduction.settings import Setting
 from acl_gym.reproduction.systems import swing
-from acl_gym.reproduction.verdicts import interval, swing_at_the_end
+from acl_gym.reproduction.verdicts import digits, interval, swing_at_the_end
 
 OPTIMUM = 38.5
 """J* on the evaluation set, by value iteration on fine cells (docs/comparison.md)."""
@@ -40,7 +40,9 @@ def convergence(evidence: Evidence, setting: Setting) -> tuple[bool, str]:
 
 def listed(costs: Mapping[Any, float]) -> str:
     """Costs under what was varied, in a line."""
-    return ", ".join(f"{value:g}: {cost:.3g}" for value, cost in costs.items())
+    return ", ".join(
+        f"{number(value)}: {digits(cost)}" for value, cost in costs.items()
+    )
 
 
 CONVERGES = (

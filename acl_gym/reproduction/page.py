@@ -18,6 +18,8 @@ FIGURES = "figures"
 RESULTS = "results.json"
 PAGE = "report.html"
 ANIMATION = "learning.gif"
+ANIMATED = "fig5.6"
+"""With this experiment the animation of its policy is drawn."""
 POINTS = 250
 """So many points of a line are explored at most."""
 
@@ -39,12 +41,17 @@ def read_outcome(directory: Path) -> Outcome:
         )
     try:
         outcome = json.loads(path.read_text())
-        if not {"claims", "experiments", "runs"} <= outcome.keys():
+        whole = (
+            {"claims", "experiments", "runs", "made"} <= outcome.keys()
+            and all({"tried", "trials"} <= each.keys() for each in outcome["claims"])
+            and all("explains" in each for each in outcome["experiments"])
+        )
+        if not whole:
             raise KeyError
     except (ValueError, AttributeError, KeyError) as error:
         raise ValueError(
-            f"{path} is not the result of a reproduction; make it again with "
-            "`acl-gym reproduce`."
+            f"{path} is not the result of a reproduction by this version; make it again "
+            "with `acl-gym reproduce`, which takes the runs that are there."
         ) from error
     return dict(outcome)
 

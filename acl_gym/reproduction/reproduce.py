@@ -32,6 +32,7 @@ from acl_gym.reproduction.catalogue import BY_NAME, EXPERIMENTS, RUNS
 from acl_gym.reproduction.claims import CLAIMS
 from acl_gym.reproduction.evidence import Evidence
 from acl_gym.reproduction.outcome import Outcome, outcome_of, runs_made
+from acl_gym.reproduction.page import ANIMATED, ANIMATION
 from acl_gym.reproduction.settings import Experiment, Setting
 from acl_gym.reproduction.store import ParquetStore
 from acl_gym.reproduction.training import learn
@@ -39,9 +40,6 @@ from acl_gym.storage import write_atomically
 
 EXECUTORS = ("local", "ray")
 TASKS = "tasks"  # the folder of the raw results
-
-ANIMATED = "fig5.6"
-"""With this experiment the animation of its policy is drawn."""
 
 
 def chosen(names: Sequence[str]) -> list[Experiment]:
@@ -198,7 +196,7 @@ def draw(
             figures.save(experiment, evidence, folder)
         if any(experiment.name == ANIMATED for experiment in experiments):
             status.update("Drawing the animation")
-            figures.animation.animate(folder / "learning.gif")
+            figures.animation.animate(folder / ANIMATION)
 
 
 def write_report(directory: Path) -> Path:

@@ -10,7 +10,14 @@ from typing import Any
 
 from acl_gym.experiments.fingerprint import ROOT
 from acl_gym.experiments.runner import Task
-from acl_gym.reproduction.page import FIGURES, PAGE, RESULTS, read_outcome
+from acl_gym.reproduction.page import (
+    ANIMATED,
+    ANIMATION,
+    FIGURES,
+    PAGE,
+    RESULTS,
+    read_outcome,
+)
 from acl_gym.reproduction.store import ParquetStore
 from acl_gym.storage import write_atomically
 
@@ -30,8 +37,11 @@ def stamp(tasks: Iterable[Task], figures: Iterable[str]) -> str:
 
 
 def begin(directory: Path) -> None:
-    """What is in the folder is about to change."""
+    """What is in the folder is about to change; what was half written goes."""
     (directory / FINISHED).unlink(missing_ok=True)
+    for folder in (directory, directory / FIGURES):
+        for half in folder.glob(".*.tmp"):
+            half.unlink()
 
 
 def finish(directory: Path, made_from: str) -> None:
@@ -62,6 +72,7 @@ def finished(
         files += [directory / PAGE, directory / "claims.md"]
         folder = directory / FIGURES
         files += [folder / f"{n}.{kind}" for n in figures for kind in ("png", "svg")]
+        files += [folder / ANIMATION] if ANIMATED in figures else []
     if said != stamp(tasks, figures) or not all(path.is_file() for path in files):
         return None
     return outcome if all(store.has(task) for task in tasks) else None

@@ -291,3 +291,19 @@ def test_simulated_means_lie_within_the_bounds(m: int) -> None:
     if m == 1:
         limit = theory.one_ant_limit(TAU0, gamma, rho, deposit)
         assert late.mean() == pytest.approx(float(limit), abs=noise)
+
+
+@pytest.mark.parametrize(("gamma", "rho"), [(0.1, 0.1), (0.4, 0.2), (0.02, 0.7)])
+def test_between_the_special_cases_fewer_ants_are_allowed(
+    gamma: float, rho: float
+) -> None:
+    """For small tau0: M (1 - alpha_lower) / (1 - alpha_upper) below the ratio."""
+    m, tau0 = 2, 1e-12
+    low = theory.lower_coefficients(m, tau0, gamma, rho).alpha
+    high = theory.upper_coefficients(m, tau0, gamma, rho).alpha
+    needed = float(m * (1 - low) / (1 - high))
+    assert needed > m
+    for ratio, sign in ((needed * 1.001, 1.0), (needed * 0.999, -1.0)):
+        assert m < theory.most_ants(ratio, 1.0), "(3.32) allows so many"
+        gap = theory.policy_gap(m, tau0, gamma, rho, ratio, 1.0)
+        assert np.sign(gap) == sign

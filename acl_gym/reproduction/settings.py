@@ -39,6 +39,7 @@ class Setting:
             partition; None where the states are the cells.
         evaluation_steps: T of the evaluation after each trial; None takes that of the
             colony.
+        order: the reading of the local update, a key of `orders.ORDERS`.
     """
 
     env_id: str
@@ -49,6 +50,7 @@ class Setting:
     kind: str = "discrete"
     cells: Any = None
     evaluation_steps: int | None = None
+    order: str = "two phases"
 
     @cached_property
     def key(self) -> str:
@@ -102,6 +104,7 @@ class Experiment:
         studies: its panels, in order.
         drawing: how it is drawn, a key of `figures.DRAWINGS`.
         claims: which claims it decides.
+        explains: for which claims it is tried why they do not hold.
         text: what the thesis says, what is decided here, in this project's words.
         options: more that the drawing needs.
     """
@@ -114,3 +117,4 @@ class Experiment:
     claims: tuple[str, ...] = ()
     text: str = ""
     options: dict[str, Any] = field(default_factory=dict)
+    explains: tuple[str, ...] = ()

@@ -7,6 +7,7 @@ from pathlib import Path
 import gymnasium as gym
 
 import acl_gym
+from acl_gym.reproduction.catalogue import EXPERIMENTS
 
 package = Path(acl_gym.__file__).parent
 if not package.is_relative_to(sys.prefix):
@@ -31,6 +32,11 @@ if not (package / "py.typed").is_file():
 for template in ("experiments/templates/report", "reproduction/templates/page"):
     if not (package / f"{template}.html.j2").is_file():
         sys.exit(f"the wheel lacks acl_gym/{template}.html.j2, which a report needs")
+
+# Reads what the searches for settings have found, which is data in the package.
+names = {experiment.name for experiment in EXPERIMENTS}
+if "versus-pendulum" not in names:
+    sys.exit(f"expected versus-pendulum among the experiments, got {sorted(names)}")
 
 env = gym.make("acl_gym/Pendulum-v0")
 env.reset(seed=0)

@@ -28,6 +28,7 @@ Examples:
   acl-gym reproduce --list                   the figures, and what they need
   acl-gym reproduce fig5.4 --runs 3          one figure, in a minute
   acl-gym reproduce claims --out results/c   all that decides a claim
+  acl-gym reproduce versus --runs 3          against Q-learning, Q(lambda) and DQN
   acl-gym reproduce all                      everything, an hour or so on two cores
   acl-gym reproduce all --executor ray       on a cluster (pip install acl-gym[cluster])
 """

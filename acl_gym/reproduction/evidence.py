@@ -13,7 +13,7 @@ from acl_gym.agents.policy import TablePolicy
 from acl_gym.agents.q_iteration import fuzzy_q_iteration
 from acl_gym.evaluation import PolicyCost, evaluate_policy_cost
 from acl_gym.partition import Discrete
-from acl_gym.reproduction.settings import Setting
+from acl_gym.reproduction.settings import Runnable, Setting
 
 FloatArray = NDArray[np.float64]
 
@@ -36,7 +36,7 @@ class Evidence:
         """The same of the settings with these keys alone."""
         return Evidence({k: v for k, v in self._results.items() if k in keys})
 
-    def runs(self, setting: Setting) -> list[dict[str, Any]]:
+    def runs(self, setting: Runnable) -> list[dict[str, Any]]:
         """All results of a setting.
 
         Raises:
@@ -47,13 +47,13 @@ class Evidence:
             raise MissingRunsError(setting.key)
         return found
 
-    def rows(self, setting: Setting, measure: str = "policy_cost") -> FloatArray:
+    def rows(self, setting: Runnable, measure: str = "policy_cost") -> FloatArray:
         """A measure after each trial of each run, `(runs, trials)`."""
-        return np.array([run["rows"][measure] for run in self.runs(setting)])
+        return setting.along(self.runs(setting), measure)
 
-    def last(self, setting: Setting, measure: str = "policy_cost") -> FloatArray:
+    def last(self, setting: Runnable, measure: str = "policy_cost") -> FloatArray:
         """A measure at the end of each run, `(runs,)`."""
-        return np.asarray(self.rows(setting, measure)[:, -1])
+        return np.array([run["rows"][measure][-1] for run in self.runs(setting)])
 
     def policy(self, setting: Setting, run: int) -> TablePolicy:
         """The last policy of a run."""

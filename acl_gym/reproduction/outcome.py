@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 
 from acl_gym.reproduction.claims import CLAIMS
 from acl_gym.reproduction.evidence import Evidence
-from acl_gym.reproduction.settings import Experiment, Setting
+from acl_gym.reproduction.settings import Experiment, Runnable
 from acl_gym.reproduction.verdicts import interval
+from acl_gym.reproduction.versus.findings import FINDINGS
 
 Outcome = dict[str, Any]
 """All that a report needs, JSON types: `experiments`, `claims`, `runs`, `made`."""
@@ -20,6 +20,7 @@ CURVES = ("policy_cost", "ants_cost", "policy_variation", "sensitivity")
 """The measures that are kept trial by trial for the report."""
 
 _BAND = "Black, the mean of the runs; grey, from the lowest to the highest of them"
+_LAST = "Cost of the last policies, and the interquartile mean with its interval"
 CAPTIONS = {
     "bands": f"{_BAND}; dashed, the optimal cost where it is known.",
     "measures": f"{_BAND}.",
@@ -32,6 +33,12 @@ CAPTIONS = {
     "rest, by the last policy of the run whose last policy is the cheapest.",
     "level_band": "The pheromone of the one pair in q: simulated runs between the bounds "
     "on their expectation.",
+    "race": "Median of the runs, the middle half of them, and faintly all; the line is the "
+    "best cost that dynamic programming finds. Right, the last policy of each run, and "
+    "the interquartile mean with its interval.",
+    "harder": f"{_LAST}.",
+    "sweep": f"{_LAST}, faintly each run.",
+    "order": "On the line nothing depends on the order of the slots.",
     "policy_gap": "Where the blue and the orange region do not overlap, Delta is "
     "positive.",
 }
@@ -72,7 +79,9 @@ def summary(experiment: Experiment, evidence: Evidence) -> dict[str, Any]:
         found.append(
             {
                 "label": study.label,
-                "setting": asdict(study.setting),
+                "setting": study.setting.about,
+                "parameters": study.setting.text,
+                "positions": study.setting.positions(),
                 "runs": len(costs),
                 "policy_cost": {
                     "interquartile_mean": centre.value,
@@ -99,10 +108,13 @@ def summary(experiment: Experiment, evidence: Evidence) -> dict[str, Any]:
         "explains": list(experiment.explains),
         "caption": CAPTIONS[experiment.drawing],
         "studies": found,
+        "findings": None
+        if not experiment.findings
+        else FINDINGS[experiment.findings](experiment, evidence),
     }
 
 
-def curves(setting: Setting, evidence: Evidence) -> dict[str, Any]:
+def curves(setting: Runnable, evidence: Evidence) -> dict[str, Any]:
     """Mean, least and largest value of each measure after each trial, 5 digits."""
     found = {}
     for measure in CURVES:

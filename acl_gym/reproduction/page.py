@@ -90,7 +90,6 @@ def write_page(directory: Path) -> Path:
         },
         animation=_image(directory / FIGURES / ANIMATION),
         curves=_curves(outcome),
-        parameters=_parameters,
     )
     path = directory / PAGE
     write_atomically(path, text.encode())
@@ -141,7 +140,7 @@ def _curves(outcome: Outcome) -> dict[str, Any]:
             key = json.dumps(study["setting"], sort_keys=True)
             shown.append({"label": study["label"], "key": key})
             if key not in curves:
-                curves[key] = _thinned(study["curves"])
+                curves[key] = _thinned(study["curves"], study["positions"])
     # Keys are long and repeated: numbers will do.
     numbers = {key: str(number) for number, key in enumerate(curves)}
     for shown in experiments.values():
@@ -153,12 +152,18 @@ def _curves(outcome: Outcome) -> dict[str, Any]:
     }
 
 
-def _thinned(curves: dict[str, Any]) -> dict[str, Any]:
-    """At most `POINTS` points a line, four digits each; `every` so many trials one."""
+def _thinned(curves: dict[str, Any], positions: list[int] | None) -> dict[str, Any]:
+    """At most `POINTS` points a line, four digits each; `every` so many trials one.
+
+    Args:
+        curves: lines by measure, see `outcome.curves`.
+        positions: the interactions at their points; None where these are trials.
+    """
     trials = max(len(curve["mean"]) for curve in curves.values())
     every = -(-trials // POINTS)
     return {
         "every": every,
+        "positions": positions and positions[::every],
         **{
             measure: {
                 name: [float(f"{value:.4g}") for value in line[::every]]
@@ -174,14 +179,3 @@ def _image(path: Path) -> str:
     if not path.is_file():
         return ""
     return base64.b64encode(path.read_bytes()).decode("ascii")
-
-
-def _parameters(setting: dict[str, Any]) -> str:
-    """A setting in one line."""
-    parts = [f"{setting['ants']} ants", f"{setting['trials']} trials", setting["kind"]]
-    cells = setting["cells"]
-    if cells is not None:
-        parts.append(cells if isinstance(cells, str) else " x ".join(map(str, cells)))
-    values = {**setting["colony"], **setting["env"]}
-    parts += [f"{name} = {value}" for name, value in values.items()]
-    return ", ".join(parts)

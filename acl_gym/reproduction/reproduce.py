@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Iterable, Sequence
-from dataclasses import asdict, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -33,9 +32,8 @@ from acl_gym.reproduction.claims import CLAIMS
 from acl_gym.reproduction.evidence import Evidence
 from acl_gym.reproduction.outcome import Outcome, outcome_of, runs_made
 from acl_gym.reproduction.page import ANIMATED, ANIMATION
-from acl_gym.reproduction.settings import Experiment, Setting
+from acl_gym.reproduction.settings import Experiment, Runnable
 from acl_gym.reproduction.store import ParquetStore
-from acl_gym.reproduction.training import learn
 from acl_gym.storage import write_atomically
 
 EXECUTORS = ("local", "ray")
@@ -68,7 +66,7 @@ def chosen(names: Sequence[str]) -> list[Experiment]:
     return [experiment for experiment in EXPERIMENTS if experiment.name in wanted]
 
 
-def settings_of(experiments: Iterable[Experiment]) -> list[Setting]:
+def settings_of(experiments: Iterable[Experiment]) -> list[Runnable]:
     """What is run for experiments: each setting once, whoever shares it."""
     settings = {
         study.setting.key: study.setting
@@ -78,18 +76,19 @@ def settings_of(experiments: Iterable[Experiment]) -> list[Setting]:
     return list(settings.values())
 
 
-def tasks_for(settings: Iterable[Setting], seeds: Iterable[int]) -> list[Task]:
+def tasks_for(settings: Iterable[Runnable], seeds: Iterable[int]) -> list[Task]:
     """A task for each setting and seed, seed by seed: early results are of all."""
     settings = list(settings)
     return [
         Task(
             f"{setting.system}-{setting.key}-{seed}",
-            learn,
+            setting.learner,
             (setting, seed),
-            {**asdict(setting), "seed": seed},
+            {**setting.about, "seed": seed},
         )
-        for seed in seeds
+        for place, seed in enumerate(seeds)
         for setting in settings
+        if setting.most_runs is None or place < setting.most_runs
     ]
 
 
@@ -211,12 +210,11 @@ def write_report(directory: Path) -> Path:
     return write_page(directory)
 
 
-def _compile(settings: list[Setting]) -> None:
-    """Let each kind of colony on each system make a short trial."""
-    kinds = {(each.env_id, each.kind, len(each.env)): each for each in settings}
+def _compile(settings: list[Runnable]) -> None:
+    """Let each kind of learner on each system make a short trial."""
+    kinds = {each.kernels: each for each in settings}
     for setting in kinds.values():
-        short = {**setting.colony, "max_steps": 2}
-        learn(replace(setting, ants=2, trials=1, colony=short), 0, lambda done: None)
+        setting.learner(setting.brief(), 0, lambda done: None)
 
 
 def _executor(name: str, workers: int) -> Executor:

@@ -17,11 +17,11 @@ from acl_gym.reproduction.catalogue import BY_NAME, EXPERIMENTS
 from acl_gym.reproduction.claims import CLAIMS
 from acl_gym.reproduction.settings import Experiment
 from acl_gym.reproduction.systems import swing
-from tests.reproduction.slices import SEEDS, TRIALS, evidence
+from tests.reproduction.slices import SEEDS, TRIALS, evidence, runs_of
 
 DRAWN = list(
     {
-        (each.drawing, each.studies[0].setting.env_id): each for each in EXPERIMENTS
+        (each.drawing, each.studies[0].setting.kernels[0]): each for each in EXPERIMENTS
     }.values()
 )
 """One experiment for each way of drawing each system."""
@@ -78,10 +78,12 @@ def test_every_kind_of_figure_is_drawn(folder: Path, experiment: Experiment) -> 
 def test_every_summary_is_json_with_curves(experiment: Experiment) -> None:
     text = json.dumps(outcomes.summary(experiment, evidence()), allow_nan=False)
     found = json.loads(text)
-    for study in found["studies"]:
-        assert study["runs"] == SEEDS
+    for study, own in zip(found["studies"], experiment.studies, strict=True):
+        assert study["runs"] == runs_of(own.setting.most_runs)
+        assert study["parameters"] == own.setting.text
+        points = TRIALS if study["positions"] is None else len(study["positions"])
         for curve in study["curves"].values():
-            assert len(curve["mean"]) == TRIALS
+            assert len(curve["mean"]) == points
             for low, mean, high in zip(
                 curve["low"], curve["mean"], curve["high"], strict=True
             ):

@@ -10,7 +10,14 @@ from typing import NamedTuple
 from matplotlib.figure import Figure
 
 from acl_gym.reproduction.evidence import Evidence
-from acl_gym.reproduction.figures import animation, bands, policies, swings, theory
+from acl_gym.reproduction.figures import (
+    animation,
+    bands,
+    policies,
+    swings,
+    theory,
+    versus,
+)
 from acl_gym.reproduction.settings import Experiment
 from acl_gym.storage import write_atomically
 
@@ -27,6 +34,10 @@ DRAWINGS: dict[str, Callable[[Experiment, Evidence], Figure]] = {
     "swing": swings.swing,
     "level_band": theory.level_band,
     "policy_gap": theory.policy_gap,
+    "race": versus.race,
+    "harder": versus.harder,
+    "sweep": versus.sweep,
+    "order": versus.order,
 }
 
 

@@ -1,0 +1,252 @@
+"""Arenas and contests: what is between system and learner, and what a run tells."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from acl_gym.agents.q_learning import QLearning
+from acl_gym.episodes import Episodes
+from acl_gym.reproduction import reproduce as reproduction
+from acl_gym.reproduction.catalogue import BY_NAME
+from acl_gym.reproduction.reproduce import tasks_for
+from acl_gym.reproduction.store import ParquetStore
+from acl_gym.reproduction.versus.arenas import ARENAS, LABELS, SYSTEMS, Arena
+from acl_gym.reproduction.versus.contest import (
+    COLUMNS,
+    Contest,
+    learn,
+    make_agent,
+)
+from acl_gym.reproduction.versus.reference import Reference
+from acl_gym.reproduction.versus.spaces import METHODS, TABLES, defaults_of
+from acl_gym.reproduction.versus.tuned import methods_in
+from acl_gym.reproduction.versus.veils import Backwards, BackwardsLuck, veiled
+from acl_gym.reproduction.versus.wholes import WHOLES, Peak, Switches
+from tests.reproduction.slices import silent
+
+PAIRS = [(name, method) for name in ARENAS for method in methods_in(ARENAS[name])]
+
+
+def contest(name: str, method: str, **changes: Any) -> Contest:
+    settings = {**defaults_of(ARENAS[name], method), **changes}
+    return Contest(ARENAS[name], method, settings)
+
+
+@pytest.mark.parametrize(("name", "method"), PAIRS)
+def test_every_method_runs_in_every_arena(name: str, method: str) -> None:
+    setting = contest(name, method).brief()
+    found = learn(setting, 0, silent)
+    rows = found["rows"]
+    assert set(rows) == set(COLUMNS)
+    assert len({len(values) for values in rows.values()}) == 1
+    assert np.all(np.diff(rows["env_steps"]) > 0)
+    assert np.isfinite(rows["policy_cost"]).all()
+    assert max(rows["policy_cost"]) <= setting.arena.ceiling
+    assert found["failure"] == ""
+    again = learn(setting, 0, silent)
+    assert again["rows"]["policy_cost"] == rows["policy_cost"]
+    assert np.array_equal(again["levels"], found["levels"])
+    along = setting.along([found, again], "policy_cost")
+    assert along.shape == (2, len(setting.positions()))
+
+
+def test_every_arena_has_a_label_and_tables_fit() -> None:
+    assert set(LABELS) == set(ARENAS)
+    assert list(SYSTEMS) == ["row", "grid", "navigation", "pendulum"]
+    for arena in SYSTEMS.values():
+        assert methods_in(arena) == tuple(METHODS)
+        assert Reference(arena).text
+    with pytest.raises(ValueError, match="without a veil"):
+        Reference(ARENAS["pendulum-noise"])
+
+
+def test_a_key_is_what_is_in_a_contest_but_the_number_of_runs() -> None:
+    first = contest("pendulum", "q")
+    assert replace(first, most_runs=3).key == first.key
+    others = [
+        contest("pendulum", "q-lambda"),
+        contest("pendulum", "q", epsilon=0.2),
+        contest("pendulum-40x41", "q"),
+        replace(first, backwards=True),
+    ]
+    assert len({first.key, *(each.key for each in others)}) == 1 + len(others)
+    assert json.loads(json.dumps(first.about)) is not None
+    assert "most_runs" not in first.about
+    names = [task.name for task in tasks_for([replace(first, most_runs=2)], range(5))]
+    assert names == [f"versus-q-{first.key}-{seed}" for seed in (0, 1)]
+
+
+def test_a_run_that_breaks_down_costs_the_most(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def overflow(agent: QLearning) -> None:
+        if agent.trials == 2:
+            raise ValueError("values have overflowed")
+
+    monkeypatch.setattr(QLearning, "_check_values", overflow)
+    found = learn(contest("pendulum", "q").brief(), 0, silent)
+    assert found["failure"] == "values have overflowed"
+    rows = found["rows"]
+    assert len(rows["policy_cost"]) == 3
+    assert rows["policy_cost"][-1] == ARENAS["pendulum"].ceiling
+    assert rows["success_rate"][-1] == 0.0
+    assert np.all(np.diff(rows["env_steps"]) > 0)
+
+
+def test_a_veil_of_another_name_is_refused() -> None:
+    with pytest.raises(ValueError, match=r"must be made of slips, .* got 'fog'"):
+        veiled(ARENAS["pendulum"].base(2), {"fog": 1})
+
+
+def test_noise_is_that_of_the_seed_and_stays_in_the_space() -> None:
+    env = Arena("acl_gym/Pendulum-v0", 1, 1, veil={"noise": [0.5, 3.0]}).make_env(500)
+    first, _ = env.reset(seed=3)
+    again, _ = env.reset(seed=3)
+    other, _ = env.reset(seed=4)
+    assert np.array_equal(first, again)
+    assert not np.array_equal(first, other)
+    true = env.unwrapped.states  # type: ignore[attr-defined]
+    env.reset(seed=4)
+    assert all(env.single_observation_space.contains(each) for each in first)
+    turn = 2 * math.pi
+    apart = (other[:, 0] - true[:, 0] + turn / 2) % turn - turn / 2
+    assert 0.4 < apart.std() < 0.6
+
+
+def test_slips_replace_as_many_actions_as_they_say() -> None:
+    env = veiled(ARENAS["pendulum"].base(4_000), {"slips": 0.3})
+    plain = ARENAS["pendulum"].base(4_000)
+    env.reset(seed=1)
+    plain.reset(seed=1)
+    chosen = np.zeros(4_000, dtype=np.int64)
+    differ = env.step(chosen)[0][:, 1] != plain.step(chosen)[0][:, 1]
+    assert 0.17 < differ.mean() < 0.23  # two of three draws are another action
+
+
+def test_rounded_and_hidden_observations() -> None:
+    arena = ARENAS["pendulum-sign"]
+    env = arena.make_env(50)
+    seen, _ = env.reset(seed=0)
+    true = env.unwrapped.states  # type: ignore[attr-defined]
+    assert np.array_equal(seen[:, 0], true[:, 0])
+    assert np.array_equal(seen[:, 1], np.where(true[:, 1] > 0, 9.0, -9.0))
+
+    arena = ARENAS["navigation-hidden"]
+    env = arena.make_env(7)
+    seen, _ = env.reset(seed=0)
+    true = env.unwrapped.states  # type: ignore[attr-defined]
+    assert np.array_equal(seen, true[:, :3])
+    assert env.step(np.zeros(7, dtype=np.int64))[0].shape == (7, 3)
+    assert arena.partition("fuzzy").n_cells == 9 * 3 * 9
+
+
+def test_backwards_gives_each_slot_what_it_had() -> None:
+    plain = ARENAS["pendulum"].base(6)
+    env = Backwards(ARENAS["pendulum"].base(6))
+    first, second = plain.reset(seed=2)[0], env.reset(seed=2)[0]
+    assert np.array_equal(first[::-1], second)
+    actions = np.array([0, 1, 2, 2, 1, 0]) % 3
+    actions[0] = 2
+    forth, back = plain.step(actions), env.step(actions[::-1])
+    for one, other in zip(forth[:4], back[:4], strict=True):
+        assert np.array_equal(one[::-1], other)
+    states = plain.states[:]
+    env.reset(options={"state": states[::-1]})
+    assert np.array_equal(env.unwrapped.states, states)  # type: ignore[attr-defined]
+    luck = BackwardsLuck(np.random.default_rng(5)).random((2, 4))
+    assert np.array_equal(luck[:, ::-1], np.random.default_rng(5).random((2, 4)))
+
+
+def test_the_order_of_ants_does_not_matter_and_that_of_q_learning_does() -> None:
+    tables = {}
+    for method in ("acl", "q"):
+        setting = contest("pendulum", method, slots=40, max_steps=60)
+        arena = replace(setting.arena, steps=6_000, cells=(10, 11))
+        both = [
+            learn(replace(setting, arena=arena, backwards=backwards), 1, silent)
+            for backwards in (False, True)
+        ]
+        tables[method] = [found["levels"] for found in both]
+    np.testing.assert_allclose(*tables["acl"], rtol=1e-9)
+    assert not np.allclose(*tables["q"], rtol=1e-3)
+
+
+def test_costs_of_whole_solutions() -> None:
+    episodes = Episodes(
+        observations=np.array(
+            [[[0.0, 1.0]], [[0.0, -5.0]], [[0.0, 2.0]], [[0.0, 9.0]]]
+        ),
+        actions=np.array([[0], [1], [0]]),
+        stage_costs=np.ones((3, 1)),
+        lengths=np.array([2]),
+        success=np.array([False]),
+    )
+    assert Switches()(episodes).tolist() == [1.0]
+    assert Peak(1)(episodes).tolist() == [5.0]
+    assert WHOLES["switches"].cost(episodes)[0] == pytest.approx(0.2 + 0.5)
+    for name in WHOLES:
+        arena = ARENAS[f"pendulum-{name}"]
+        assert arena.ceiling == WHOLES[name].ceiling
+        agent: Any = make_agent(Contest(arena, "acl", defaults_of(arena, "acl")), 0)
+        assert agent.cost == WHOLES[name].cost
+
+
+def test_experiments_are_those_of_the_issue() -> None:
+    names = [name for name in BY_NAME if name.startswith("versus-")]
+    overview = BY_NAME["versus"]
+    assert len(overview.studies) == 4 * (len(METHODS) + 1)
+    assert names == [f"versus-{name}" for name in SYSTEMS] + [
+        f"versus-{name}"
+        for name in ("cells", "noise", "partial", "wholes", "slots", "order")
+    ]
+    for name in names[:4]:
+        studies = BY_NAME[name].studies
+        assert [study.label for study in studies[:-1]] == list(METHODS.values())
+        assert all(study.setting.most_runs is None for study in studies[:-1])
+    for name in names[4:]:
+        assert {s.setting.method for s in BY_NAME[name].studies} == set(TABLES)
+        assert {s.setting.most_runs for s in BY_NAME[name].studies} == {10}
+
+
+def test_two_runs_of_an_experiment_from_its_name_to_its_findings(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    whole = BY_NAME["versus-row"]
+    brief = replace(
+        whole,
+        studies=tuple(
+            replace(study, setting=study.setting.brief())
+            for study in whole.studies
+            if study.label != "DQN"
+        ),
+    )
+    monkeypatch.setattr(reproduction, "EXPERIMENTS", (brief,))
+    outcome, evidence = reproduction.reproduce(["versus-row"], 2, tmp_path, workers=1)
+    (found,) = outcome["experiments"]
+    rows = found["findings"]["rows"]
+    assert [row[0] for row in rows] == ["ACL", "Q-learning", "Q(λ)"]
+    assert all(len(row) == len(found["findings"]["headings"]) for row in rows)
+    assert {each["verdict"] for each in found["findings"]["duels"]} == {"undecided"}
+    assert len(list((tmp_path / "tasks").glob("*.parquet"))) == 2 * 3 + 1
+    learner = brief.studies[0].setting
+    kept, made = evidence.runs(learner)[1], learn(learner, 1, silent)
+    assert kept["rows"]["policy_cost"] == made["rows"]["policy_cost"]
+    assert kept["levels"].tobytes() == made["levels"].tobytes()
+
+
+def test_a_run_without_a_table_is_kept_like_the_others(tmp_path: Path) -> None:
+    (task,) = tasks_for([contest("row", "dqn").brief()], [0])
+    result = task.function(*task.arguments, silent)
+    store = ParquetStore(tmp_path)
+    store.write(task, result)
+    found = store.read(task)
+    assert found is not None
+    assert found["rows"] == result["rows"]
+    assert found["levels"].size == 0

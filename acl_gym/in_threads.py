@@ -24,6 +24,7 @@ from acl_gym.membership import (
     FloatArray,
     IntArray,
     locate_block,
+    scratch_for,
 )
 
 
@@ -44,8 +45,9 @@ def locate(
     bad = np.empty(n_blocks, np.int64)
     for block in prange(n_blocks):
         own = first, count, cells, period, rate
+        ends, reals = scratch_for(len(first))
         bad[block] = locate_block(
-            states, slots, edges, own, fuzzy, index, degree, block
+            states, slots, edges, own, fuzzy, index, degree, block, ends, reals
         )
     for slot in bad:
         if slot >= 0:

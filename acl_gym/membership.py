@@ -31,6 +31,10 @@ number of cells, its period (0: none), and 1 / spacing (0: irregular)."""
 
 MOST_WRITTEN_OUT = 16
 
+MOST_COUNTED = 32
+"""Irregular centres up to which counting those that are passed, a vectorised loop for
+each, is faster than a search for each state."""
+
 
 def written_out(size: int) -> tuple[int, ...]:
     """A tuple of `size` zeros, for kernels with a short loop of that many rounds.
@@ -51,13 +55,15 @@ def locate_on_axis(
     rate: float,
     low: CellArray,
     fraction: FloatArray,
+    left: FloatArray,
+    right: FloatArray,
 ) -> None:
     """Find the interval of each x between centres, and how far along it x lies.
 
     x lies between centres `low` and `low` + 1, and the membership (4.7) is 1 -
     `fraction` to the former, `fraction` to the latter. Outside the centres the
-    fraction saturates at 0 or 1. Short loops one after the other: all but the last
-    are vectorised.
+    fraction saturates at 0 or 1. Short loops one after the other: all but the
+    look-up of centres are vectorised.
 
     Args:
         x: values of one state variable, finite, `(m,)`; changed into values between
@@ -67,8 +73,10 @@ def locate_on_axis(
         rate: 1 / spacing of a regular axis, 0 for an irregular one.
         low: receives the intervals, `(>= m,)`.
         fraction: receives the fractions, `(>= m,)`.
+        left: scratch, `(>= m,)`.
+        right: scratch, `(>= m,)`.
     """
-    first, last = edges[0], edges.size - 2
+    first, last, end = edges[0], edges.size - 2, edges[edges.size - 1]
     if last < 0:
         low[: x.size] = 0
         fraction[: x.size] = 0.0
@@ -77,23 +85,41 @@ def locate_on_axis(
         for i in range(x.size):
             x[i] -= period * np.floor((x[i] - first) / period)
     for i in range(x.size):
-        x[i] = min(max(x[i], first), edges[edges.size - 1])
+        x[i] = min(max(x[i], first), end)
     if rate > 0.0:
         # On a regular axis the interval is known but for the rounding of the guess.
+        highest = float(last)
         for i in range(x.size):
-            low[i] = np.int32(min((x[i] - first) * rate, float(last)))
+            low[i] = np.int32(min((x[i] - first) * rate, highest))
+    elif last < MOST_COUNTED:
+        low[: x.size] = 0
+        for interval in range(1, last + 1):
+            bound = edges[interval]
+            for i in range(x.size):
+                low[i] += x[i] >= bound
     else:
         for i in range(x.size):
             low[i] = min(np.searchsorted(edges, x[i], side="right") - 1, last)
+    for i in range(x.size):
+        centre = np.uint64(low[i])  # unsigned: no check for indices from the end
+        left[i] = edges[centre]
+        right[i] = edges[centre + np.uint64(1)]
+    wrong = 0
+    for i in range(x.size):
+        wrong += (x[i] < left[i]) | ((x[i] >= right[i]) & (right[i] < end))
+        fraction[i] = (x[i] - left[i]) / (right[i] - left[i])
+    if wrong == 0:
+        return
+    # Hardly ever: only states within rounding of a centre are guessed wrong.
     for i in range(x.size):
         interval = low[i]
         while x[i] < edges[interval]:
             interval -= 1
         while x[i] >= edges[interval + 1] and interval < last:
             interval += 1
-        left = edges[interval]
         low[i] = interval
-        fraction[i] = (x[i] - left) / (edges[interval + 1] - left)
+        width = edges[interval + 1] - edges[interval]
+        fraction[i] = (x[i] - edges[interval]) / width
 
 
 @njit(cache=True)
@@ -102,6 +128,13 @@ def _first_not_finite(states: FloatArray, slots: IntArray) -> int:
         if not np.isfinite(states[slot]).all():
             return int(slot)
     return -1
+
+
+@njit(cache=True)
+def scratch_for(dimensions: int) -> tuple[CellArray, FloatArray]:
+    """What `locate_block` works in, for states of so many variables."""
+    ends = np.empty((2 * dimensions, BLOCK), np.int32)
+    return ends, np.empty((3 + dimensions, BLOCK))
 
 
 @njit(cache=True, error_model="numpy")
@@ -114,45 +147,94 @@ def locate_block(
     index: CellArray,
     degree: FloatArray,
     block: int,
+    ends: CellArray,
+    reals: FloatArray,
 ) -> int:
-    """Do what `locate` does for the `BLOCK` slots from `block` * `BLOCK` on."""
+    """Do what `locate` does for the `BLOCK` slots from `block` * `BLOCK` on.
+
+    `ends` and `reals` are scratch, see `scratch_for`.
+    """
     start = block * BLOCK
     size = min(BLOCK, slots.size - start)
     first, count, cells, period, rate = axes
-    x = np.empty(size)
-    low = np.empty((len(cells), size), np.int32)
-    fraction = np.empty((len(cells), size))
-    for a in range(len(cells)):
+    dimensions = len(cells)
+    # Of each state and axis: what the cells below and above add to the index (4.8).
+    low, high, fraction = ends[:dimensions], ends[dimensions:], reals[3:]
+    x, left, right = reals[0, :size], reals[1], reals[2]
+    stride = 1
+    for a in range(dimensions - 1, -1, -1):
         finite = True
         for i in range(size):
-            x[i] = states[slots[start + i], a]
+            x[i] = states[np.uint64(slots[start + i]), a]
             finite &= np.isfinite(x[i])
         if not finite:
             return _first_not_finite(states, slots[start : start + size])
         own_edges = edges[first[a] : first[a] + count[a]]
-        locate_on_axis(x, own_edges, period[a], rate[a], low[a], fraction[a])
+        below, above, share = low[a], high[a], fraction[a]
+        locate_on_axis(x, own_edges, period[a], rate[a], below, share, left, right)
+        # A circular axis ends where it begins; one cell alone is its own end.
+        step, top = np.int32(stride), np.int32((cells[a] - 1) * stride)
+        for i in range(size):
+            below[i] *= step
+            above[i] = below[i] + step if below[i] < top else 0
+        stride *= cells[a]
+    if fuzzy:
+        _corners(low, high, fraction, cells, index, degree, start, size)
+        return -1
+    nearest = low[0]
+    for a in range(dimensions):
+        below, above, share = low[a], high[a], fraction[a]
+        for i in range(size):
+            chosen = above[i] if share[i] >= 0.5 else below[i]
+            nearest[i] = chosen if a == 0 else nearest[i] + chosen
     for i in range(size):
-        j = start + i
+        index[start + i, 0] = nearest[i]
+        degree[start + i, 0] = 1.0
+    return -1
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def _corners(
+    low: CellArray,
+    high: CellArray,
+    fraction: FloatArray,
+    cells: tuple[int, ...],
+    index: CellArray,
+    degree: FloatArray,
+    start: int,
+    size: int,
+) -> None:
+    """The cells around each state and their degrees, the products (4.8)."""
+    dimensions = len(cells)
+    for i in range(size):
+        j, state = np.uint64(start + i), np.uint64(i)
+        if dimensions <= 2:
+            # So few that the compiler writes all of them out and keeps them at hand.
+            for c in range(1 << dimensions):
+                cell, weight = np.int32(0), 1.0
+                for a in range(dimensions):
+                    share = fraction[a, state]
+                    up = (c >> (dimensions - 1 - a)) & 1
+                    cell += high[a, state] if up else low[a, state]
+                    weight *= share if up else 1.0 - share
+                index[j, np.uint64(c)] = cell
+                degree[j, np.uint64(c)] = weight
+            continue
         index[j, 0] = 0
         degree[j, 0] = 1.0
         corners = 1
-        for a in range(len(cells)):
-            below, share = low[a, i], fraction[a, i]
-            # A circular axis ends where it begins; one cell alone is its own end.
-            above = below + 1 if below + 1 < cells[a] else 0
-            if not fuzzy:
-                nearest = above if share >= 0.5 else below
-                index[j, 0] = index[j, 0] * cells[a] + nearest
-                continue
-            # Each corner splits in two along this axis: the product (4.8).
+        for a in range(dimensions):
+            below, above = low[a, state], high[a, state]
+            share = fraction[a, state]
+            # Each corner splits in two along this axis.
             for c in range(corners - 1, -1, -1):
-                cell, weight = index[j, c] * cells[a], degree[j, c]
-                index[j, 2 * c] = cell + below
-                degree[j, 2 * c] = weight * (1.0 - share)
-                index[j, 2 * c + 1] = cell + above
-                degree[j, 2 * c + 1] = weight * share
+                corner, even, odd = np.uint64(c), np.uint64(2 * c), np.uint64(2 * c + 1)
+                cell, weight = index[j, corner], degree[j, corner]
+                index[j, even] = cell + below
+                degree[j, even] = weight * (1.0 - share)
+                index[j, odd] = cell + above
+                degree[j, odd] = weight * share
             corners *= 2
-    return -1
 
 
 @njit(cache=True, error_model="numpy")
@@ -170,8 +252,11 @@ def locate(
     `axes` holds tuples, so that the number of axes is known when the kernel is compiled
     and the loops over the corners of a cell are written out.
     """
+    ends, reals = scratch_for(len(axes[0]))
     for block in range((slots.size + BLOCK - 1) // BLOCK):
-        bad = locate_block(states, slots, edges, axes, fuzzy, index, degree, block)
+        bad = locate_block(
+            states, slots, edges, axes, fuzzy, index, degree, block, ends, reals
+        )
         if bad >= 0:
             return bad
     return -1

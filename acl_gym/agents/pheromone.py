@@ -36,13 +36,9 @@ class Pheromone:
         self.levels: FloatArray = np.full((n_cells, n_actions), tau0)
         self.probabilities: FloatArray = np.empty_like(self.levels)
         self.stale: BoolArray = np.ones(n_cells, dtype=np.bool_)
-        # Scratch of the global update: zero between calls. Union and sum of a pair
-        # lie side by side, as they are used together.
-        pairs = self.levels.size
-        self._own: FloatArray = np.zeros(pairs)
-        self._sums: FloatArray = np.zeros((pairs, 2))
-        self._touched: IntArray = np.empty(pairs + 1, dtype=np.int64)
-        self._touched_by_ant: IntArray = np.empty(pairs + 1, dtype=np.int64)
+        # Scratch of the global update: by pair what `_lay` adds up.
+        self._laid: FloatArray = np.zeros((self.levels.size, 4))
+        self._touched: IntArray = np.empty(self.levels.size + 1, dtype=np.int64)
 
     @property
     def alpha(self) -> float:
@@ -130,27 +126,21 @@ class Pheromone:
             )
         n_touched = 0
         for block in solutions.blocks():
-            n_touched = _sum_deposits(
+            n_touched = _lay(
                 block.index,
                 block.degree,
                 written_out(block.index.shape[1]),
                 block.action,
                 block.ends,
+                block.ants.start,
                 deposits[block.ants],
-                self._own,
-                self._sums,
+                self._laid,
                 self._touched,
                 n_touched,
-                self._touched_by_ant,
                 self.n_actions,
             )
-        _reinforce(
-            self._touched[:n_touched],
-            self._sums,
-            global_decay,
-            self.levels,
-            self.stale,
-        )
+        touched = self._touched[:n_touched]
+        _reinforce(touched, self._laid, global_decay, self.levels, self.stale)
 
 
 @njit(cache=True, error_model="numpy")
@@ -215,25 +205,30 @@ def _decay(
                 stale[cell] = True
 
 
+# Columns of what ants have laid on a pair, side by side as they are used together.
+_LAST, _DUE, _TOTAL, _LARGEST = range(4)
+
+
 @njit(cache=True)
-def _sum_deposits(
+def _lay(
     index: CellArray,
     degree: FloatArray,
     corners: tuple[int, ...],
     action: ActionArray,
     ends: IntArray,
+    first: int,
+    deposits: FloatArray,
     laid: FloatArray,
-    own: FloatArray,
-    sums: FloatArray,
     touched: IntArray,
     n_touched: int,
-    touched_by_ant: IntArray,
     n_actions: int,
 ) -> int:
     """The sums of (4.14) and (4.15) over some ants and the pairs that they visited.
 
-    The lists of pairs are written without a branch, always one place beyond their
-    end, which the processor could not guess.
+    Within a solution a pair counts with its largest degree (4.13). So what an ant lays
+    on it stays due, and may grow, until another ant comes by; then it is added to the
+    total. That takes one look at each visit and no list of the pairs of one ant. Written
+    without a branch, which the processor could not guess.
 
     Args:
         index: cells, the rows of one ant after those of the other, `(r, k)`.
@@ -241,53 +236,53 @@ def _sum_deposits(
         corners: k, written out.
         action: actions, `(r,)`.
         ends: where the rows of each ant end, `(b,)`.
-        laid: what each ant lays, `(b,)`.
-        own: scratch, zero before and after: the union (4.13) of one ant, by pair.
-        sums: by pair, the union over ants (4.14) and the sum of deposits; added to.
-        touched: the pairs visited so far by any ant; added to.
+        first: the number of the first of these ants.
+        deposits: what each ant lays, `(b,)`, > 0.
+        laid: by pair, the last ant that was there, what is due from it, the total of
+            those before it, the largest degree so far; added to, and but for the ant
+            zero at first.
+        touched: the pairs visited so far with a degree > 0, and room for one; added to.
         n_touched: their number.
-        touched_by_ant: scratch for those of one ant.
         n_actions: columns of the table.
 
     Returns:
         The number of `touched` pairs.
     """
-    row = 0
-    for ant in range(ends.size):
-        n_own = 0
-        while row < ends[ant]:
+    # All indices are unsigned: no check for indices from the end.
+    row, count, width = np.uint64(0), np.uint64(n_touched), np.uint64(n_actions)
+    for i in range(ends.size):
+        ant, deposit, end = float(first + i), deposits[i], np.uint64(ends[i])
+        while row < end:
+            u = np.uint64(action[row])
             for c in range(len(corners) or index.shape[1]):
-                cell, weight = np.uint64(index[row, c]), degree[row, c]
-                pair = cell * np.uint64(n_actions) + np.uint64(action[row])
-                before = own[pair]
-                touched_by_ant[np.uint64(n_own)] = pair
-                n_own += (before == 0.0) & (weight > 0.0)
-                own[pair] = max(before, weight)
-            row += 1
-        for i in range(n_own):
-            pair = np.uint64(touched_by_ant[i])
-            before = sums[pair, 0]
-            touched[np.uint64(n_touched)] = pair
-            n_touched += before == 0.0
-            sums[pair, 0] = max(before, own[pair])
-            sums[pair, 1] += laid[ant] * own[pair]
-            own[pair] = 0.0
-    return n_touched
+                pair = np.uint64(index[row, c]) * width + u
+                weight = degree[row, c]
+                new = laid[pair, _LAST] != ant
+                due, largest = laid[pair, _DUE], laid[pair, _LARGEST]
+                laid[pair, _LAST] = ant
+                laid[pair, _TOTAL] += due if new else 0.0
+                laid[pair, _DUE] = max(0.0 if new else due, deposit * weight)
+                laid[pair, _LARGEST] = max(largest, weight)
+                touched[count] = pair
+                count += np.uint64((largest == 0.0) & (weight > 0.0))
+            row += np.uint64(1)
+    return int(count)
 
 
 @njit(cache=True)
 def _reinforce(
     touched: IntArray,
-    sums: FloatArray,
+    laid: FloatArray,
     global_decay: float,
     levels: FloatArray,
     stale: BoolArray,
 ) -> None:
-    """(4.15) on the touched pairs; leaves `sums` zero."""
+    """(4.15) on the touched pairs; leaves `laid` zero but for the ants."""
     n_actions = levels.shape[1]
     for pair in touched:
         cell, u = pair // n_actions, pair % n_actions
-        kept = (1.0 - global_decay * sums[pair, 0]) * levels[cell, u]
-        levels[cell, u] = kept + global_decay * sums[pair, 1]
+        deposit = laid[pair, _TOTAL] + laid[pair, _DUE]
+        kept = (1.0 - global_decay * laid[pair, _LARGEST]) * levels[cell, u]
+        levels[cell, u] = kept + global_decay * deposit
         stale[cell] = True
-        sums[pair] = 0.0
+        laid[pair, 1:] = 0.0

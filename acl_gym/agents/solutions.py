@@ -17,10 +17,12 @@ from acl_gym.partition.base import check_cells
 ActionArray = NDArray[np.integer[Any]]
 BoolArray = NDArray[np.bool_]
 
-ROWS_PER_BLOCK = 8_192
-"""State-action pairs that `Solutions.blocks` takes at a time, about half a megabyte."""
+ROWS_PER_BLOCK = 4_096
+"""State-action pairs that `Solutions.blocks` takes at a time, about 200 kilobytes."""
 
-STEPS_AT_A_TIME = 32
+RUN = 5
+"""Steps of an ant that lie side by side, then come as many of the next ant: a step of all
+ants is written at once, but the deposit goes through ant by ant."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,13 +43,12 @@ class Block:
 
 @dataclass(frozen=True, slots=True)
 class _Room:
-    """Scratch for a block; `all` is 0, 1, 2, ..., as many as there are rows."""
+    """Scratch for a block."""
 
-    seen: NDArray[Any]
+    places: IntArray
     action: ActionArray
     index: CellArray
     degree: FloatArray
-    all: IntArray
 
 
 class Solutions:
@@ -67,8 +68,6 @@ class Solutions:
         partition: turns observations into cells and degrees.
 
     Attributes:
-        action: what the ants did, `(max_steps, n_ants)`; of an ant the first `length`
-            count.
         length: how many steps each ant has made, `(n_ants,)`.
     """
 
@@ -77,12 +76,14 @@ class Solutions:
     ) -> None:
         self.n_ants, self.max_steps = n_ants, max_steps
         self.partition = partition
-        self.action: ActionArray = np.empty(
-            (max_steps, n_ants), dtype=np.min_scalar_type(n_actions - 1)
+        # Where step t of an ant lies, `_place` says.
+        self._size = (max_steps + RUN - 1) // RUN * RUN * n_ants
+        self._action: ActionArray = np.empty(
+            self._size, dtype=np.min_scalar_type(n_actions - 1)
         )
         self.length: IntArray = np.zeros(n_ants, dtype=np.int64)
         self._one_cell = partition.cells_per_state == 1
-        # Cells or observations, step by step: what is written together lies together.
+        # Cells or observations, a row each.
         self._rows: NDArray[Any] | None = None
         self._state_shape: tuple[int, ...] = ()
         self._room: _Room | None = None
@@ -91,8 +92,8 @@ class Solutions:
     def nbytes_per_step(self) -> int:
         """Memory of one step of one ant, in bytes; known after the first `append`."""
         rows = self._rows
-        seen = 0 if rows is None else rows.itemsize * rows.shape[2]
-        return self.action.itemsize + seen
+        seen = 0 if rows is None else rows.itemsize * rows.shape[1]
+        return self._action.itemsize + seen
 
     def clear(self) -> None:
         """Forget all solutions."""
@@ -118,12 +119,11 @@ class Solutions:
             flat = observation.ndim == 2
             seen = observation if flat else observation.reshape(self.n_ants, -1)
         rows = self._rows
-        if rows is None or rows.dtype != seen.dtype or rows.shape[2] != seen.shape[1]:
-            shape = (self.max_steps, self.n_ants, seen.shape[1])
-            self._rows = rows = np.empty(shape, dtype=seen.dtype)
+        if rows is None or rows.dtype != seen.dtype or rows.shape[1] != seen.shape[1]:
+            self._rows = rows = np.empty((self._size, seen.shape[1]), dtype=seen.dtype)
             self._state_shape = observation.shape[1:]
         by_slot = not self._one_cell
-        _append(ants, seen, by_slot, actions, rows, self.action, self.length)
+        _append(ants, seen, by_slot, actions, rows, self._action, self.length)
 
     def untried(
         self, ants: IntArray, index: CellArray, allowed: BoolArray
@@ -146,7 +146,7 @@ class Solutions:
         left = allowed.copy()
         if self._rows is not None:
             _strike_tried(
-                ants, index, self._rows, self.action, self.length, allowed, left
+                ants, index, self._rows, self._action, self.length, allowed, left
             )
         return left
 
@@ -158,42 +158,49 @@ class Solutions:
         rows = self._rows
         if rows is None:
             return
-        room = self._room_for(rows)
+        room = self._room_for()
         ends = np.cumsum(self.length)
         first = done = 0
         while first < self.n_ants:
             last = int(np.searchsorted(ends, done + ROWS_PER_BLOCK, side="right"))
             last = max(last, first + 1)
             size = int(ends[last - 1]) - done
-            seen, action = room.seen[:size], room.action[:size]
+            places, action = room.places[:size], room.action[:size]
             index, degree = room.index[:size], room.degree[:size]
-            _copy_block(first, last, rows, self.action, self.length, seen, action)
+            _collect(first, last, self.length, self._action, places, action)
             if self._one_cell:
-                index[:] = seen
+                np.take(rows, places, axis=0, out=index)
             else:
-                states = seen.reshape(size, *self._state_shape)
-                self.partition.locate(states, room.all[:size], index, degree)
+                states = rows.reshape(self._size, *self._state_shape)
+                self.partition.locate(states, places, index, degree)
                 if not self.partition.checked:
                     check_cells(index, self.partition)
             ants = slice(first, last)
             yield Block(ants, index, degree, action, ends[ants] - done)
             first, done = last, done + size
 
-    def _room_for(self, rows: NDArray[Any]) -> _Room:
+    def _room_for(self) -> _Room:
         """Scratch for a block, the same in every trial."""
-        room = self._room
-        if room is None or room.seen.dtype != rows.dtype:
+        if self._room is None:
             most = max(ROWS_PER_BLOCK, self.max_steps)
             k = self.partition.cells_per_state
-            room = _Room(
-                np.empty((most, rows.shape[2]), dtype=rows.dtype),
-                np.empty(most, dtype=self.action.dtype),
+            self._room = _Room(
+                np.empty(most, dtype=np.int64),
+                np.empty(most, dtype=self._action.dtype),
                 np.empty((most, k), dtype=np.int32),
                 np.ones((most, k)),
-                np.arange(most),
             )
-            self._room = room
-        return room
+        return self._room
+
+
+@njit(cache=True, inline="always")
+def _place(t: int, ant: int, n_ants: int) -> np.uint64:
+    """Where step t of an ant lies, see `RUN`.
+
+    Unsigned, which spares the check for indices from the end.
+    """
+    run, step = np.uint64(t) // np.uint64(RUN), np.uint64(t) % np.uint64(RUN)
+    return (run * np.uint64(n_ants) + np.uint64(ant)) * np.uint64(RUN) + step
 
 
 @njit(cache=True)
@@ -208,40 +215,32 @@ def _append(
 ) -> None:
     """Add a step; `seen` has a row for each slot if `by_slot`, else for each ant."""
     for j in range(ants.size):
-        ant = np.uint64(ants[j])  # unsigned: no check for indices from the end
-        t = np.uint64(length[ant])
+        ant = np.uint64(ants[j])  # unsigned, as in `_place`
+        place = _place(length[ant], ants[j], length.size)
         row = ant if by_slot else np.uint64(j)
         for i in range(seen.shape[1]):
-            all_seen[t, ant, i] = seen[row, i]
-        all_action[t, ant] = actions[j]
+            all_seen[place, i] = seen[row, i]
+        all_action[place] = actions[j]
         length[ant] += 1
 
 
 @njit(cache=True)
-def _copy_block(
+def _collect(
     first: int,
     last: int,
-    all_rows: NDArray[Any],
-    all_action: ActionArray,
     length: IntArray,
-    rows: NDArray[Any],
+    all_action: ActionArray,
+    places: IntArray,
     action: ActionArray,
 ) -> None:
-    """Write the steps of ants first .. last - 1 one ant after the other.
-
-    A few steps at a time, for ants that follow each other share what memory brings.
-    """
-    longest = length[first:last].max()
-    for start in range(0, longest, STEPS_AT_A_TIME):
-        row = np.uint64(start)
-        for ant in range(first, last):
-            end = min(start + STEPS_AT_A_TIME, length[ant])
-            for t in range(start, end):
-                place = row + np.uint64(t - start)
-                for i in range(rows.shape[1]):
-                    rows[place, i] = all_rows[t, ant, i]
-                action[place] = all_action[t, ant]
-            row += np.uint64(length[ant])
+    """Where the steps of ants first .. last - 1 lie, one ant after the other."""
+    row = np.uint64(0)
+    for ant in range(first, last):
+        for t in range(length[ant]):
+            place = _place(t, ant, length.size)
+            places[row] = place
+            action[row] = all_action[place]
+            row += np.uint64(1)
 
 
 @njit(cache=True)
@@ -258,8 +257,9 @@ def _strike_tried(
         ant = ants[j]
         count = allowed[j].sum()
         for t in range(length[ant]):
-            u = all_action[t, ant]
-            if all_index[t, ant, 0] == index[j, 0] and left[j, u]:
+            place = _place(t, ant, length.size)
+            u = all_action[place]
+            if all_index[place, 0] == index[j, 0] and left[j, u]:
                 left[j, u] = False
                 count -= 1
                 if count == 0:

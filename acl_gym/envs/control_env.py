@@ -329,6 +329,7 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
         elif slots.size:
             n_finished = self._step_some(
                 slots,
+                self._finished,
                 self._state,
                 self._steps,
                 checked,

@@ -319,7 +319,7 @@ def test_the_tabu_list_is_that_of_a_list_per_state(
             one,
             np.array([[cell]]),
             solutions._rows,
-            solutions.action,
+            solutions._action,
             solutions.length,
             allowed,
             plain,
@@ -346,28 +346,26 @@ def test_kernels_agree_with_themselves_as_plain_python(trial: Trial) -> None:
         ("__call__", levels, stale),
         ("py_func", again, stale_again),
     ):
-        own, sums = np.zeros(table.size), np.zeros((table.size, 2))
-        touched, by_ant = np.empty((2, table.size + 1), dtype=np.int64)
+        laid = np.zeros((table.size, 4))
+        touched = np.empty(table.size + 1, dtype=np.int64)
         n_touched.append(
-            getattr(module._sum_deposits, name)(
+            getattr(module._lay, name)(
                 block.index,
                 block.degree,
                 corners,
                 block.action,
                 block.ends,
+                0,
                 1.0 / trial.costs,
-                own,
-                sums,
+                laid,
                 touched,
                 0,
-                by_ant,
                 table.shape[1],
             )
         )
         reinforce = getattr(module._reinforce, name)
-        reinforce(touched[: n_touched[-1]], sums, trial.rho, table, flags)
-        assert not own.any()
-        assert not sums.any()
+        reinforce(touched[: n_touched[-1]], laid, trial.rho, table, flags)
+        assert not laid[:, 1:].any()
     assert n_touched[0] == n_touched[1]
     np.testing.assert_allclose(levels, again, rtol=1e-14)
     np.testing.assert_array_equal(stale, stale_again)

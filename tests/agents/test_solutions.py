@@ -121,8 +121,9 @@ def test_kernels_agree_with_themselves_as_plain_python() -> None:
     actions = rng.integers(5, size=(3, 3))
     results = []
     for name in ("__call__", "py_func"):
-        rows, cells = np.zeros((3, 3, 2)), np.zeros((3, 3, 1), np.int32)
-        action, own = np.zeros((3, 3), np.uint8), np.zeros((3, 3), np.uint8)
+        size = 3 * module.RUN
+        rows, cells = np.zeros((size, 2)), np.zeros((size, 1), np.int32)
+        action, own = np.zeros((2, size), np.uint8)
         walked, again = np.zeros((2, 3), np.int64)
         append = getattr(module._append, name)
         for t in range(3):
@@ -131,11 +132,24 @@ def test_kernels_agree_with_themselves_as_plain_python() -> None:
             append(ants, seen[t], True, actions[t, ants], rows, action, walked)
             append(ants, index, False, actions[t, ants], cells, own, again)
         np.testing.assert_array_equal(walked, length)
-        out, out_action = np.zeros((5, 2)), np.zeros(5, np.uint8)
-        getattr(module._copy_block, name)(0, 3, rows, action, length, out, out_action)
-        results.append((rows, cells, action, own, walked, again, out, out_action))
+        places, out = np.zeros(5, np.int64), np.zeros(5, np.uint8)
+        getattr(module._collect, name)(0, 3, walked, action, places, out)
+        results.append((rows, cells, action, own, walked, again, places, out))
     for compiled, plain in zip(*results, strict=True):
         np.testing.assert_array_equal(compiled, plain)
     pairs = [(t, ant) for ant in range(3) for t in range(length[ant])]
-    np.testing.assert_array_equal(results[0][6], [seen[pair] for pair in pairs])
-    np.testing.assert_array_equal(results[0][7], [actions[pair] for pair in pairs])
+    rows, *_, places, out = results[0]
+    np.testing.assert_array_equal(rows[places], [seen[pair] for pair in pairs])
+    np.testing.assert_array_equal(out, [actions[pair] for pair in pairs])
+
+
+@given(st.integers(1, 40), st.integers(1, 12))
+def test_every_step_has_a_place_of_its_own(steps: int, n_ants: int) -> None:
+    solutions = Solutions(n_ants, steps, 2, Fuzzy.from_box(SQUARE, 3))
+    places = [
+        int(module._place(t, ant, n_ants))
+        for t in range(steps)
+        for ant in range(n_ants)
+    ]
+    assert len(set(places)) == len(places)
+    assert max(places) < solutions._size

@@ -279,6 +279,45 @@ def test_kernels_run_the_same_without_the_compiler() -> None:
     assert not results[0][-1].any()  # limit 0 is none
 
 
+def test_slots_step_alike_however_many_are_idle(
+    case: SystemCase, mode: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    options = {"finished": "wait"}
+    seen = []
+    for most in (0.0, 1.0):  # idle slots are put back, and left out
+        monkeypatch.setattr(partial_step, "MOST", most)
+        env = case.vector(9, autoreset_mode=mode, max_episode_steps=30, **case.easy)
+        first = env.reset(seed=3, options=options)
+        seen.append([first, *walk(env, 60, 4)])
+    for one, other in zip(*seen, strict=True):
+        for ours, theirs in zip(arrays_in(one), arrays_in(other), strict=True):
+            assert_same_bits(ours, theirs)
+
+
+def test_idle_slots_are_put_back_the_same_without_the_compiler() -> None:
+    idle = np.array([False, True, False, True])
+    results = []
+    for name in ("__call__", "py_func"):
+        for limit in (0, 7):
+            states, steps = np.arange(8.0).reshape(2, 4), np.array([6, 6, 3, 9])
+            rewards, flags = np.full(4, -1.0), np.ones((2, 4), dtype=np.bool_)
+            put_back = getattr(partial_step.put_idle_back, name)
+            count = put_back(
+                idle, -states, limit, states, steps, rewards, flags[0], flags[1]
+            )
+            results.append([count, states, steps, rewards, flags])
+    for ours, plain in zip(results[:2], results[2:], strict=True):
+        for one, other in zip(ours, plain, strict=True):
+            np.testing.assert_array_equal(one, other)
+    count, states, steps, rewards, flags = results[1]
+    assert count == 2
+    assert states.tolist() == [[0.0, -1.0, 2.0, -3.0], [4.0, -5.0, 6.0, -7.0]]
+    assert steps.tolist() == [7, 6, 4, 9]
+    assert rewards.tolist() == [-1.0, 0.0, -1.0, 0.0]
+    assert flags.tolist() == [[True, False] * 2, [True, False, False, False]]
+    assert results[0][-1][1].tolist() == [False] * 4
+
+
 def test_counting_kernels_run_the_same_without_the_compiler() -> None:
     terminated = np.array([False, True, False, False])
     results = []

@@ -276,7 +276,8 @@ def test_shortcut_of_regular_axes_is_the_search(
 
     def find(kernel: Any, rate: float) -> list[list[float]]:
         low, fraction = np.empty(3, np.int32), np.empty(3)
-        kernel(near.copy(), edges, length, rate, low, fraction)
+        scratch = np.empty((2, 3))
+        kernel(near.copy(), edges, length, rate, low, fraction, *scratch)
         return [low.tolist(), fraction.tolist()]
 
     searched = find(module.locate_on_axis, 0.0)

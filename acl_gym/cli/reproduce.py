@@ -143,6 +143,8 @@ def reproduce(
         raise InterruptedRunError(
             "interrupted; finished runs are kept, give the same command to go on."
         ) from error
+    except OSError as error:
+        raise _cannot_write(out, error) from error
     _tell(outcome, as_json, screen, out / "report.html" if figures else None)
 
 
@@ -167,6 +169,8 @@ def report(
         path = page.write_page(directory)
     except (FileNotFoundError, ValueError) as error:
         raise BadArgumentError(str(error)) from error
+    except OSError as error:
+        raise _cannot_write(directory, error) from error
     if as_json:
         verdicts = {
             claim["claim"]: claim["verdict"]
@@ -197,6 +201,15 @@ def _list(experiments: Any, as_json: bool) -> None:
         words += [f"to understand {', '.join(each.explains)}"] if each.explains else []
         told = f" ({'; '.join(words)})" if words else ""
         typer.echo(f"{each.name:17} {each.title}{told}")
+
+
+def _cannot_write(directory: Path, error: OSError) -> RuntimeError:
+    """For instance of a disk that is full."""
+    return RuntimeError(
+        f"results, figures or report cannot be written to {directory}: "
+        f"{error.strerror or error}; runs that are finished are kept, mend it and give "
+        "the same command again."
+    )
 
 
 def _tell(outcome: Any, as_json: bool, screen: Any, page: Path | None) -> None:

@@ -125,6 +125,12 @@ def test_a_disk_that_is_full(small_disk: Path) -> None:
     kept = {p: p.stat().st_mtime_ns for p in small_disk.glob("r/tasks/*.parquet")}
     assert 0 < len(kept) < 18
     assert not list(small_disk.glob("r/tasks/.*"))
+    subprocess.run(["mount", "-o", "remount,size=200k", str(small_disk)], check=True)
+    full = run(*call[:-1], "--out", str(small_disk / "r"), cwd=small_disk)
+    assert full.returncode == 1, "there is room for the runs, not for the figures"
+    (line,) = full.stderr.splitlines()
+    assert "results, figures or report cannot be written to" in line
+    assert "No space left on device; runs that are finished are kept" in line
     subprocess.run(["mount", "-o", "remount,size=8m", str(small_disk)], check=True)
     done = run(*call, "--out", str(small_disk / "r"), "--json", cwd=small_disk)
     assert done.returncode == 0, done.stderr

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 from collections.abc import Iterable, Sequence
 from functools import partial
@@ -67,13 +68,22 @@ def chosen(names: Sequence[str]) -> list[Experiment]:
 
 
 def settings_of(experiments: Iterable[Experiment]) -> list[Runnable]:
-    """What is run for experiments: each setting once, whoever shares it."""
-    settings = {
-        study.setting.key: study.setting
-        for experiment in experiments
-        for study in experiment.studies
-    }
-    return list(settings.values())
+    """What is run for experiments: each setting once, whoever shares it.
+
+    Of those that share one, the most demanding says how many runs are made.
+    """
+    found: dict[str, Runnable] = {}
+    for experiment in experiments:
+        for study in experiment.studies:
+            setting: Runnable = study.setting
+            known = found.setdefault(setting.key, setting)
+            if _most(setting) > _most(known):
+                found[setting.key] = setting
+    return list(found.values())
+
+
+def _most(setting: Runnable) -> float:
+    return math.inf if setting.most_runs is None else setting.most_runs
 
 
 def tasks_for(settings: Iterable[Runnable], seeds: Iterable[int]) -> list[Task]:

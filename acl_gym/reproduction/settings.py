@@ -11,7 +11,7 @@ import json
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
-from typing import Any, ClassVar, Protocol
+from typing import Any, Protocol
 
 import gymnasium as gym
 import numpy as np
@@ -91,6 +91,7 @@ class Setting:
         evaluation_steps: T of the evaluation after each trial; None takes that of the
             colony.
         order: the reading of the local update, a key of `orders.ORDERS`.
+        most_runs: how many runs are made at most; not part of what results depend on.
     """
 
     env_id: str
@@ -102,18 +103,19 @@ class Setting:
     cells: Any = None
     evaluation_steps: int | None = None
     order: str = "two phases"
-
-    most_runs: ClassVar[int | None] = None
+    most_runs: int | None = None
 
     @property
     def about(self) -> dict[str, Any]:
-        """All of it, JSON types."""
-        return asdict(self)
+        """All that a result depends on but the seed, JSON types."""
+        about = asdict(self)
+        del about["most_runs"]
+        return about
 
     @cached_property
     def key(self) -> str:
         """Names the setting by what is in it."""
-        text = json.dumps(asdict(self), sort_keys=True)
+        text = json.dumps(self.about, sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()[:12]
 
     @property

@@ -7,6 +7,7 @@ from dataclasses import replace
 from acl_gym.reproduction import orders
 from acl_gym.reproduction.catalogue.common import (
     KINDS,
+    fewer,
     number,
     studies,
 )
@@ -139,7 +140,7 @@ EXPERIMENTS = (
         "navigation-long",
         "Navigation, time-spent cost: longer walks",
         "§4.5.3",
-        studies({"fuzzy, T = 600": PATIENT}),
+        studies(fewer({"fuzzy, T = 600": PATIENT})),
         "bands",
         text="The goal rule of §4.3.2; ants may walk four times as long, policies are "
         "evaluated over 150 steps as elsewhere.",
@@ -150,14 +151,16 @@ EXPERIMENTS = (
         "Pendulum with other bounds on the velocity",
         "§5.2.2",
         studies(
-            {
-                f"{kind}, gamma = {number(gamma)}, omega_max = {limit:g}": limited(
-                    swing(kind, local_decay=gamma), limit
-                )
-                for kind in KINDS
-                for gamma in GAMMAS_PENDULUM
-                for limit in OTHER_LIMITS
-            }
+            fewer(
+                {
+                    f"{kind}, gamma = {number(gamma)}, omega_max = {limit:g}": limited(
+                        swing(kind, local_decay=gamma), limit
+                    )
+                    for kind in KINDS
+                    for gamma in GAMMAS_PENDULUM
+                    for limit in OTHER_LIMITS
+                }
+            )
         ),
         "bands",
         text="The thesis does not name omega_max; 9 rad/s is taken elsewhere. The cells "
@@ -170,14 +173,16 @@ EXPERIMENTS = (
         "Pendulum: other readings of the local update",
         "§5.3.2",
         studies(
-            {
-                f"{kind}, {order}, gamma = {number(gamma)}": ordered(
-                    swing(kind, local_decay=gamma), order
-                )
-                for kind in KINDS
-                for order in OTHER_ORDERS
-                for gamma in GAMMAS_PENDULUM
-            }
+            fewer(
+                {
+                    f"{kind}, {order}, gamma = {number(gamma)}": ordered(
+                        swing(kind, local_decay=gamma), order
+                    )
+                    for kind in KINDS
+                    for order in OTHER_ORDERS
+                    for gamma in GAMMAS_PENDULUM
+                }
+            )
         ),
         "bands",
         text="The readings of row-orders.",
@@ -188,7 +193,11 @@ EXPERIMENTS = (
         "pendulum-long",
         "Pendulum: more trials",
         "§5.3.1",
-        studies({f"{kind}, rho = {rho:g}": long(kind, rho) for kind, rho in LONG_RUNS}),
+        studies(
+            fewer(
+                {f"{kind}, rho = {rho:g}": long(kind, rho) for kind, rho in LONG_RUNS}
+            )
+        ),
         "bands",
         text=f"K = {LONG}: whether what has not settled after 100 trials does so later.",
         explains=("C13", "C14"),
@@ -197,7 +206,7 @@ EXPERIMENTS = (
         "fuzzy-ants",
         "Pendulum, fuzzy, varying partition, one number of ants",
         "§5.3.4",
-        studies({f"N = {n}, M = {MANY}": roomy(n) for n in (16, 32)}),
+        studies(fewer({f"N = {n}, M = {MANY}": roomy(n) for n in (16, 32)})),
         "bands_and_policies",
         text="The coarse partitions of Figure 5.17 with as many ants as the finest one.",
         explains=("C19",),

@@ -13,6 +13,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from acl_gym import ACL, theory
+from acl_gym.agents.pheromone import Pheromone
+from acl_gym.agents.selection import choose_actions
 
 rates = st.floats(0.001, 0.999)
 ants = st.integers(1, 60)
@@ -291,3 +293,68 @@ def test_simulated_means_lie_within_the_bounds(m: int) -> None:
     if m == 1:
         limit = theory.one_ant_limit(TAU0, gamma, rho, deposit)
         assert late.mean() == pytest.approx(float(limit), abs=noise)
+
+
+@pytest.mark.parametrize(("gamma", "rho"), [(0.1, 0.1), (0.4, 0.2), (0.02, 0.7)])
+def test_between_the_special_cases_fewer_ants_are_allowed(
+    gamma: float, rho: float
+) -> None:
+    """For small tau0: M (1 - alpha_lower) / (1 - alpha_upper) below the ratio."""
+    m, tau0 = 2, 1e-12
+    low = theory.lower_coefficients(m, tau0, gamma, rho).alpha
+    high = theory.upper_coefficients(m, tau0, gamma, rho).alpha
+    needed = float(m * (1 - low) / (1 - high))
+    assert needed > m
+    for ratio, sign in ((needed * 1.001, 1.0), (needed * 0.999, -1.0)):
+        assert m < theory.most_ants(ratio, 1.0), "(3.32) allows so many"
+        gap = theory.policy_gap(m, tau0, gamma, rho, ratio, 1.0)
+        assert np.sign(gap) == sign
+
+
+def test_ants_choose_no_less_often_than_that() -> None:
+    """Proposition 3.1 and p_min of Theorem 2.4, against ants that choose."""
+    rng, count, epsilon = np.random.default_rng(6), 40_000, 0.2
+    pheromone = Pheromone(1, 4, 0.1, 2.0)
+    pheromone.set_levels(np.array([[0.1, 0.7, 0.7, 0.7]]))  # the worst case
+    index, degree = np.zeros((count, 1), dtype=np.int64), np.ones((count, 1))
+    for rule, bound in (
+        ("epsilon_greedy", theory.action_probability_bound(epsilon, 4)),
+        ("boltzmann", theory.least_probability(0.1, 0.7, 4, 2.0)),
+    ):
+        actions = choose_actions(rule, pheromone, index, degree, epsilon, rng)
+        found, expected = (actions == 0).mean(), float(bound)
+        noise = 4 * math.sqrt(expected / count)
+        assert found == pytest.approx(expected, abs=noise), "a bound that is met"
+
+
+def test_states_and_pairs_are_visited_no_less_often_than_that() -> None:
+    """Proposition 3.2 and Corollary 3.3, by one ant on the row of nine free cells."""
+    env = gym.make_vec("acl_gym/GridSearch1D-v0", num_envs=1)
+    settings = {"selection": "epsilon_greedy", "epsilon": 0.4, "max_steps": 30}
+    colony = ACL(env, seed=1, tau0=1e-3, local_decay=0.0, **settings)
+    seen, states_seen = np.zeros((10, 2)), np.zeros(10)
+
+    def count(agent: Any, row: Any) -> None:
+        for pair in set(visited):
+            seen[pair] += 1
+        for state in {state for state, _ in visited}:
+            states_seen[state] += 1
+        visited.clear()
+
+    visited: list[tuple[int, int]] = []
+    choose = colony._choose
+
+    def watch(index: Any, *rest: Any) -> Any:
+        actions = choose(index, *rest)
+        visited.append((int(index[0, 0]), int(actions[0])))
+        return actions
+
+    colony._choose = watch  # type: ignore[method-assign]
+    trials = 3000
+    colony.learn(trials=trials, callback=count)
+    pairs, states = seen[:9] / trials, states_seen[:9] / trials
+    for found, bound in (
+        (states.min(), theory.state_probability_bound(9)),
+        (pairs.min(), theory.pair_probability_bound(0.4, 2, 9)),
+    ):
+        assert found >= bound - 4 * math.sqrt(float(bound) / trials)

@@ -102,6 +102,7 @@ def reproduce(
 ) -> None:
     """Reproduce; see `HELP`."""
     from acl_gym.reproduction import reproduce as reproduction
+    from acl_gym.reproduction import resume
     from acl_gym.reproduction.catalogue import RUNS
 
     wanted = names or ["all"]
@@ -118,10 +119,16 @@ def reproduce(
         _list(experiments, as_json)
         return
     screen = console(stderr=as_json)
+    runs = runs or RUNS
+    outcome, made_from = reproduction.already(wanted, runs, out, seed, figures)
+    if outcome is not None:
+        screen.print(f"Nothing to do: all of it is in {out}, made by the same code.")
+        _tell(outcome, as_json, screen, out / "report.html" if figures else None)
+        return
     try:
         outcome, evidence = reproduction.reproduce(
             wanted,
-            runs or RUNS,
+            runs,
             out,
             first_seed=seed,
             workers=workers,
@@ -130,17 +137,15 @@ def reproduce(
         )
         if figures:
             reproduction.draw(experiments, evidence, out, screen)
-            path = reproduction.write_report(out)
+            reproduction.write_report(out)
+        resume.finish(out, made_from)
     except KeyboardInterrupt as error:
         raise InterruptedRunError(
             "interrupted; finished runs are kept, give the same command to go on."
         ) from error
-    if as_json:
-        typer.echo(json.dumps(reproduction.figures_only(outcome), indent=1))
-        return
-    _show(outcome, screen)
-    if figures:
-        screen.print(f"Report: {path}")
+    except OSError as error:
+        raise _cannot_write(out, error) from error
+    _tell(outcome, as_json, screen, out / "report.html" if figures else None)
 
 
 def report(
@@ -164,6 +169,8 @@ def report(
         path = page.write_page(directory)
     except (FileNotFoundError, ValueError) as error:
         raise BadArgumentError(str(error)) from error
+    except OSError as error:
+        raise _cannot_write(directory, error) from error
     if as_json:
         verdicts = {
             claim["claim"]: claim["verdict"]
@@ -182,6 +189,7 @@ def _list(experiments: Any, as_json: bool) -> None:
                 "title": each.title,
                 "section": each.section,
                 "claims": list(each.claims),
+                "explains": list(each.explains),
                 "settings": [study.label for study in each.studies],
             }
             for each in experiments
@@ -189,8 +197,31 @@ def _list(experiments: Any, as_json: bool) -> None:
         typer.echo(json.dumps(rows, indent=1))
         return
     for each in experiments:
-        claims = f" ({', '.join(each.claims)})" if each.claims else ""
-        typer.echo(f"{each.name:17} {each.title}{claims}")
+        words = [", ".join(each.claims)] if each.claims else []
+        words += [f"to understand {', '.join(each.explains)}"] if each.explains else []
+        told = f" ({'; '.join(words)})" if words else ""
+        typer.echo(f"{each.name:17} {each.title}{told}")
+
+
+def _cannot_write(directory: Path, error: OSError) -> RuntimeError:
+    """For instance of a disk that is full."""
+    return RuntimeError(
+        f"results, figures or report cannot be written to {directory}: "
+        f"{error.strerror or error}; runs that are finished are kept, mend it and give "
+        "the same command again."
+    )
+
+
+def _tell(outcome: Any, as_json: bool, screen: Any, page: Path | None) -> None:
+    """What came of it."""
+    if as_json:
+        from acl_gym.reproduction.outcome import figures_only
+
+        typer.echo(json.dumps(figures_only(outcome), indent=1))
+        return
+    _show(outcome, screen)
+    if page is not None:
+        screen.print(f"Report: {page}")
 
 
 def _show(outcome: Any, screen: Any) -> None:

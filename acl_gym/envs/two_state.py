@@ -76,9 +76,13 @@ class TwoState(ControlSystem):
                 f"{array.shape}."
             )
         array = array.reshape(-1, 1)
-        if not np.isin(array, (FIRST, SECOND, AT_GOAL)).all():
-            bad = array[~np.isin(array, (FIRST, SECOND, AT_GOAL))][0]
-            raise ValueError(f"states must be 0, 1 or 2 (the goal), got {bad:g}.")
+        known = np.isin(array[:, 0], (FIRST, SECOND, AT_GOAL))
+        if not known.all():
+            row = int(np.argmin(known))
+            raise ValueError(
+                f"states must be 0, 1 or 2 (the goal), got {array[row, 0]:g} in row "
+                f"{row}."
+            )
         return array + 0.0  # no -0
 
     def observe(self, states: FloatArray) -> IntArray:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import datetime
 import hashlib
 import json
+import logging
 import multiprocessing
 import os
 import platform
@@ -28,9 +29,13 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from filelock import FileLock, Timeout
+from tqdm.auto import tqdm
 
 import acl_gym
+from acl_gym.experiments.fingerprint import code_fingerprint
 from acl_gym.storage import write_atomically
+
+logger = logging.getLogger("acl_gym")
 
 Result = dict[str, Any]
 Progress = Callable[[str, float], None]
@@ -58,7 +63,12 @@ class Task:
     def key(self) -> str:
         """What must be equal for a kept result to be used: settings, code, versions."""
         text = json.dumps(
-            [self.name, self.settings, code_fingerprint(), versions()], sort_keys=True
+            [
+                *(self.name, self.settings),
+                code_fingerprint(self.function.__module__),
+                versions(),
+            ],
+            sort_keys=True,
         )
         return hashlib.sha256(text.encode()).hexdigest()
 
@@ -75,6 +85,9 @@ class Store(Protocol):
     """Where results are kept, one a task."""
 
     directory: Path
+
+    def path(self, task: Task) -> Path:
+        """The file of a task."""
 
     def read(self, task: Task) -> Result | None:
         """The kept result of a task; None if there is none that may be used."""
@@ -123,12 +136,21 @@ def run_tasks(
     tell = progress or (lambda name, fraction: None)
     results: dict[str, Result] = {}
     with _alone_in(directory):
+        for half in directory.glob(".*.tmp"):
+            half.unlink()  # of a runner that was killed while it wrote
         for task in tasks:
             found = kept.read(task)
             if found is not None:
                 results[task.name] = found
                 tell(task.name, 1.0)
         missing = [task for task in tasks if task.name not in results]
+        unusable = sum(kept.path(task).exists() for task in missing)
+        if unusable:
+            logger.warning(
+                "%d of %d results in %s are damaged, or were made by other code, with "
+                "other settings or other versions; they are made again.",
+                *(unusable, len(tasks), directory),
+            )
         if missing:
             with closing(execute(missing, tell)) as finished:
                 for task, result in finished:
@@ -216,6 +238,9 @@ def _start_worker(reports: Any) -> None:
     _reports = reports
     # Ctrl-C reaches every process of a terminal; the parent is the one to answer it.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    # The lock that tqdm makes otherwise is one for all processes: when this one is
+    # terminated, Python complains of a leak below the error that is the matter.
+    tqdm.set_lock(threading.RLock())
     threading.Thread(target=_end_with_parent, daemon=True).start()
 
 
@@ -258,10 +283,14 @@ class JsonStore:
     def __init__(self, directory: Path) -> None:
         self.directory = directory
 
+    def path(self, task: Task) -> Path:
+        """See `Store.path`."""
+        return self.directory / f"{task.name}.json"
+
     def read(self, task: Task) -> Result | None:
         """See `Store.read`."""
         try:
-            stored = json.loads(self._file(task).read_text())
+            stored = json.loads(self.path(task).read_text())
         except (FileNotFoundError, json.JSONDecodeError, UnicodeDecodeError):
             return None
         if not isinstance(stored, dict) or stored.get("key") != task.key:
@@ -274,49 +303,9 @@ class JsonStore:
         text = json.dumps(
             {"key": task.key, "settings": task.settings, "result": result}
         )
-        write_atomically(self._file(task), text.encode())
-
-    def _file(self, task: Task) -> Path:
-        return self.directory / f"{task.name}.json"
+        write_atomically(self.path(task), text.encode())
 
 
-# Modules and packages that draw and tell what has been run, and change nothing in it,
-# and those whose settings are in the keys of the runs that they are for.
-_LEFT_OUT = frozenset(
-    {
-        "aco_theory",
-        "captions",
-        "catalogue",
-        "claims",
-        "cli",
-        "cluster",
-        "comparison",
-        "compiling",
-        "courses",
-        "drawing",
-        "evidence",
-        "figures",
-        "findings",
-        "grid_drawing",
-        "intervals",
-        "navigation_picture",
-        "page",
-        "ranges",
-        "rendering",
-        "report",
-        "reproduce",
-        "runner",
-        "spaces",
-        "statistics",
-        "store",
-        "systems",
-        "theory",
-        "tuned",
-        "tuning",
-        "verdicts",
-        "wording",
-    }
-)
 _PACKAGES = ("numpy", "numba", "scipy", "gymnasium", "stable-baselines3", "torch")
 
 
@@ -357,7 +346,7 @@ def _commit() -> str | None:
                 # First, whether it is this package's checkout, and not one around it.
                 ("ls-files", "--error-unmatch", "__init__.py"),
                 ("rev-parse", "HEAD"),
-                ("status", "--porcelain", "--untracked-files=no", "."),
+                ("status", "--porcelain", "."),  # new files count as changes
             )
         )
     except (OSError, subprocess.SubprocessError):
@@ -373,17 +362,3 @@ def _cpu_name() -> str:
         return platform.processor() or "unknown"
     names = (line.split(":", 1)[1].strip() for line in lines if "model name" in line)
     return next(names, platform.processor() or "unknown")
-
-
-@cache
-def code_fingerprint() -> str:
-    """A hash over the source that results depend on: other code, other results."""
-    digest = hashlib.sha256()
-    package = Path(acl_gym.__file__).parent
-    for source in sorted(package.rglob("*.py")):
-        parts = source.relative_to(package).with_suffix("").parts
-        if not _LEFT_OUT.isdisjoint(parts):
-            continue
-        digest.update(source.relative_to(package).as_posix().encode())
-        digest.update(source.read_bytes())
-    return digest.hexdigest()

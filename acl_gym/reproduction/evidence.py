@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from functools import cache
 from typing import Any
 
@@ -31,6 +31,10 @@ class Evidence:
 
     def __init__(self, results: Mapping[str, list[dict[str, Any]]]) -> None:
         self._results = results
+
+    def of(self, keys: Collection[str]) -> Evidence:
+        """The same of the settings with these keys alone."""
+        return Evidence({k: v for k, v in self._results.items() if k in keys})
 
     def runs(self, setting: Runnable) -> list[dict[str, Any]]:
         """All results of a setting.

@@ -6,10 +6,11 @@ import base64
 import json
 from collections import Counter
 from pathlib import Path
+from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
-from acl_gym.reproduction.reproduce import Outcome
+from acl_gym.reproduction.outcome import Outcome
 from acl_gym.reproduction.verdicts import HOLDS, IN_PART, NOT, UNDECIDED
 from acl_gym.storage import write_atomically
 
@@ -17,6 +18,10 @@ FIGURES = "figures"
 RESULTS = "results.json"
 PAGE = "report.html"
 ANIMATION = "learning.gif"
+ANIMATED = "fig5.6"
+"""With this experiment the animation of its policy is drawn."""
+POINTS = 250
+"""So many points of a line are explored at most."""
 
 _CLASSES = {HOLDS: "yes", IN_PART: "part", NOT: "no", UNDECIDED: "open"}
 
@@ -36,12 +41,17 @@ def read_outcome(directory: Path) -> Outcome:
         )
     try:
         outcome = json.loads(path.read_text())
-        if not {"claims", "experiments", "runs"} <= outcome.keys():
+        whole = (
+            {"claims", "experiments", "runs", "made"} <= outcome.keys()
+            and all({"tried", "trials"} <= each.keys() for each in outcome["claims"])
+            and all("explains" in each for each in outcome["experiments"])
+        )
+        if not whole:
             raise KeyError
     except (ValueError, AttributeError, KeyError) as error:
         raise ValueError(
-            f"{path} is not the result of a reproduction; make it again with "
-            "`acl-gym reproduce`."
+            f"{path} is not the result of a reproduction by this version; make it again "
+            "with `acl-gym reproduce`, which takes the runs that are there."
         ) from error
     return dict(outcome)
 
@@ -79,17 +89,7 @@ def write_page(directory: Path) -> Path:
             for each in outcome["experiments"]
         },
         animation=_image(directory / FIGURES / ANIMATION),
-        curves={
-            each["name"]: [
-                {
-                    "label": study["label"],
-                    "positions": study["positions"],
-                    **study["curves"],
-                }
-                for study in each["studies"]
-            ]
-            for each in outcome["experiments"]
-        },
+        curves=_curves(outcome),
     )
     path = directory / PAGE
     write_atomically(path, text.encode())
@@ -110,7 +110,8 @@ def write_claims(directory: Path) -> Path:
         "| --- | --- | --- | --- | --- |",
     ]
     for claim in outcome["claims"]:
-        figures = ", ".join(name for name in claim["experiments"] if name in there)
+        names = [*claim["experiments"], *claim["trials"]]
+        figures = ", ".join(name for name in names if name in there)
         text = f"**{claim['text']}** {claim['section']}; {figures}"
         lines.append(f"| {claim['claim']} | {claim['verdict']} | {text} | | |")
         lines += [
@@ -118,11 +119,59 @@ def write_claims(directory: Path) -> Path:
             f"{'yes' if part['holds'] else 'no'} |"
             for part in claim["parts"]
         ]
+        lines += [
+            f"| | | tried: {each['what']} | {each['found']} | |"
+            for each in claim["tried"]
+        ]
         if claim["understanding"]:
             lines.append(f"| | | {claim['understanding']} | | |")
     path = directory / "claims.md"
     write_atomically(path, ("\n".join(lines) + "\n").encode())
     return path
+
+
+def _curves(outcome: Outcome) -> dict[str, Any]:
+    """What can be explored: curves by setting, and which of them experiments show."""
+    curves: dict[str, Any] = {}
+    experiments: dict[str, list[dict[str, str]]] = {}
+    for each in outcome["experiments"]:
+        shown = experiments.setdefault(each["name"], [])
+        for study in each["studies"]:
+            key = json.dumps(study["setting"], sort_keys=True)
+            shown.append({"label": study["label"], "key": key})
+            if key not in curves:
+                curves[key] = _thinned(study["curves"], study["positions"])
+    # Keys are long and repeated: numbers will do.
+    numbers = {key: str(number) for number, key in enumerate(curves)}
+    for shown in experiments.values():
+        for entry in shown:
+            entry["key"] = numbers[entry["key"]]
+    return {
+        "experiments": experiments,
+        "curves": {numbers[key]: curve for key, curve in curves.items()},
+    }
+
+
+def _thinned(curves: dict[str, Any], positions: list[int] | None) -> dict[str, Any]:
+    """At most `POINTS` points a line, four digits each; `every` so many trials one.
+
+    Args:
+        curves: lines by measure, see `outcome.curves`.
+        positions: the interactions at their points; None where these are trials.
+    """
+    trials = max(len(curve["mean"]) for curve in curves.values())
+    every = -(-trials // POINTS)
+    return {
+        "every": every,
+        "positions": positions and positions[::every],
+        **{
+            measure: {
+                name: [float(f"{value:.4g}") for value in line[::every]]
+                for name, line in curve.items()
+            }
+            for measure, curve in curves.items()
+        },
+    }
 
 
 def _image(path: Path) -> str:

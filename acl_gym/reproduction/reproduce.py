@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 from collections.abc import Iterable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from rich.console import Console
 from rich.progress import (
     BarColumn,
@@ -20,51 +20,25 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 
-from acl_gym.experiments.runner import Executor, Task, in_processes, run_tasks
+from acl_gym.experiments.runner import (
+    Executor,
+    Task,
+    circumstances,
+    in_processes,
+    run_tasks,
+)
+from acl_gym.reproduction import resume
 from acl_gym.reproduction.catalogue import BY_NAME, EXPERIMENTS, RUNS
 from acl_gym.reproduction.claims import CLAIMS
 from acl_gym.reproduction.evidence import Evidence
+from acl_gym.reproduction.outcome import Outcome, outcome_of, runs_made
+from acl_gym.reproduction.page import ANIMATED, ANIMATION
 from acl_gym.reproduction.settings import Experiment, Runnable
 from acl_gym.reproduction.store import ParquetStore
-from acl_gym.reproduction.verdicts import interval
-from acl_gym.reproduction.versus.findings import FINDINGS
 from acl_gym.storage import write_atomically
 
 EXECUTORS = ("local", "ray")
 TASKS = "tasks"  # the folder of the raw results
-
-CURVES = ("policy_cost", "ants_cost", "policy_variation", "sensitivity")
-"""The measures that are kept trial by trial for the report."""
-
-_BAND = "Black, the mean of the runs; grey, from the lowest to the highest of them"
-_LAST = "Cost of the last policies, and the interquartile mean with its interval"
-CAPTIONS = {
-    "bands": f"{_BAND}; dashed, the optimal cost where it is known.",
-    "measures": f"{_BAND}.",
-    "policies": "The last policy of the run whose last policy is the cheapest.",
-    "baseline": "Forces at rest, and ways to the goal.",
-    "bands_and_policies": f"{_BAND}; dashed, the optimal cost. Below, the last policy of "
-    "the run whose last policy is the cheapest: white is the full positive torque, black "
-    "the negative one, grey none.",
-    "swing": "Angle (the line is upright), velocity, torque and cost from hanging at "
-    "rest, by the last policy of the run whose last policy is the cheapest.",
-    "level_band": "The pheromone of the one pair in q: simulated runs between the bounds "
-    "on their expectation.",
-    "race": "Median of the runs, the middle half of them, and faintly all; the line is the "
-    "best cost that dynamic programming finds. Right, the last policy of each run, and "
-    "the interquartile mean with its interval.",
-    "harder": f"{_LAST}.",
-    "sweep": f"{_LAST}, faintly each run.",
-    "order": "On the line nothing depends on the order of the slots.",
-    "policy_gap": "Where the blue and the orange region do not overlap, Delta is "
-    "positive.",
-}
-
-ANIMATED = "fig5.6"
-"""With this experiment the animation of its policy is drawn."""
-
-Outcome = dict[str, Any]
-"""All that a report needs, JSON types: `experiments`, `claims`, `runs`, `made`."""
 
 
 def chosen(names: Sequence[str]) -> list[Experiment]:
@@ -72,7 +46,7 @@ def chosen(names: Sequence[str]) -> list[Experiment]:
 
     Args:
         names: of experiments; "all" are all of them, "claims" those that decide a
-            claim.
+            claim or were tried to understand one.
 
     Raises:
         ValueError: there is no experiment of a name.
@@ -87,18 +61,29 @@ def chosen(names: Sequence[str]) -> list[Experiment]:
     if "all" in wanted:
         wanted |= set(BY_NAME)
     if "claims" in wanted:
-        wanted |= {name for claim in CLAIMS for name in claim.experiments}
+        wanted |= {
+            name for claim in CLAIMS for name in (*claim.experiments, *claim.trials)
+        }
     return [experiment for experiment in EXPERIMENTS if experiment.name in wanted]
 
 
 def settings_of(experiments: Iterable[Experiment]) -> list[Runnable]:
-    """What is run for experiments: each setting once, whoever shares it."""
-    settings = {
-        study.setting.key: study.setting
-        for experiment in experiments
-        for study in experiment.studies
-    }
-    return list(settings.values())
+    """What is run for experiments: each setting once, whoever shares it.
+
+    Of those that share one, the most demanding says how many runs are made.
+    """
+    found: dict[str, Runnable] = {}
+    for experiment in experiments:
+        for study in experiment.studies:
+            setting: Runnable = study.setting
+            known = found.setdefault(setting.key, setting)
+            if _most(setting) > _most(known):
+                found[setting.key] = setting
+    return list(found.values())
+
+
+def _most(setting: Runnable) -> float:
+    return math.inf if setting.most_runs is None else setting.most_runs
 
 
 def tasks_for(settings: Iterable[Runnable], seeds: Iterable[int]) -> list[Task]:
@@ -148,102 +133,52 @@ def reproduce(
     """
     experiments = chosen(names)
     settings = settings_of(experiments)
-    seeds = range(first_seed, first_seed + runs)
     workers = workers or os.cpu_count() or 1
-    tasks = tasks_for(settings, seeds)
+    tasks = tasks_for(settings, range(first_seed, first_seed + runs))
     console = console or Console(quiet=True)
-    # Here once, not in every process: Numba's cache is no place for a race.
-    with console.status("Compiling the kernels (some 30 seconds, the first time)"):
-        _compile(settings)
+    resume.begin(directory)
+    store = ParquetStore(directory / TASKS)
+    if not all(store.has(task) for task in tasks):
+        # Here once, not in every process: Numba's cache is no place for a race.
+        with console.status("Compiling the kernels (some 30 seconds, the first time)"):
+            _compile(settings)
     execute = _executor(executor, workers)
     results = _run(tasks, directory / TASKS, workers, execute, console)
     by_setting: dict[str, list[dict[str, Any]]] = {each.key: [] for each in settings}
     for task, result in zip(tasks, results, strict=True):
         by_setting[task.arguments[0].key].append(result)
     evidence = Evidence(by_setting)
-    made = results[-1]["made"]
-    outcome = outcome_of(experiments, evidence, runs, first_seed, made)
+    outcome = outcome_of(
+        experiments, evidence, runs, first_seed, circumstances(workers)
+    )
+    outcome["runs_made"] = runs_made(results)
     text = json.dumps(outcome)
     write_atomically(directory / "results.json", text.encode())
     return outcome, evidence
 
 
-def outcome_of(
-    experiments: Sequence[Experiment],
-    evidence: Evidence,
-    runs: int,
-    first_seed: int,
-    made: dict[str, Any],
-) -> Outcome:
-    """What the runs say: each experiment summed up, each claim judged."""
-    return {
-        "runs": runs,
-        "first_seed": first_seed,
-        "experiments": [summary(each, evidence) for each in experiments],
-        "claims": [claim.judge(evidence) for claim in CLAIMS],
-        "made": made,
-    }
+def already(
+    names: Sequence[str], runs: int, directory: Path, first_seed: int, figures: bool
+) -> tuple[Outcome | None, str]:
+    """The outcome, if a call has nothing to do; and what it is made from, a stamp.
 
+    Args:
+        names: see `chosen`.
+        runs: see `reproduce`.
+        directory: see `reproduce`.
+        first_seed: see `reproduce`.
+        figures: whether figures and report are wanted.
 
-def summary(experiment: Experiment, evidence: Evidence) -> dict[str, Any]:
-    """What an experiment found, JSON types: each study with its last policies' cost."""
-    found = []
-    for study in experiment.studies:
-        costs = evidence.last(study.setting)
-        centre = interval(costs)
-        found.append(
-            {
-                "label": study.label,
-                "setting": study.setting.about,
-                "parameters": study.setting.text,
-                "positions": study.setting.positions(),
-                "runs": len(costs),
-                "policy_cost": {
-                    "interquartile_mean": centre.value,
-                    "low": centre.low,
-                    "high": centre.high,
-                    "min": float(costs.min()),
-                    "max": float(costs.max()),
-                },
-                "success_rate": float(
-                    evidence.last(study.setting, "success_rate").mean()
-                ),
-                "seconds": float(
-                    np.median([run["seconds"] for run in evidence.runs(study.setting)])
-                ),
-                "curves": curves(study.setting, evidence),
-            }
-        )
-    return {
-        "name": experiment.name,
-        "title": experiment.title,
-        "section": experiment.section,
-        "text": experiment.text,
-        "claims": list(experiment.claims),
-        "caption": CAPTIONS[experiment.drawing],
-        "studies": found,
-        "findings": None
-        if not experiment.findings
-        else FINDINGS[experiment.findings](experiment, evidence),
-    }
-
-
-def curves(setting: Runnable, evidence: Evidence) -> dict[str, Any]:
-    """Mean, least and largest value of each measure after each trial, 5 digits."""
-    found = {}
-    for measure in CURVES:
-        if measure not in evidence.runs(setting)[0]["rows"]:
-            continue
-        values = evidence.rows(setting, measure)
-        found[measure] = {
-            name: [float(f"{value:.5g}") for value in line]
-            for name, line in (
-                ("mean", values.mean(axis=0)),
-                ("low", values.min(axis=0)),
-                ("high", values.max(axis=0)),
-            )
-        }
-    return found
+    Raises:
+        ValueError: there is no experiment of a name.
+    """
+    experiments = chosen(names)
+    seeds = range(first_seed, first_seed + runs)
+    tasks = tasks_for(settings_of(experiments), seeds)
+    drawn = [each.name for each in experiments] if figures else []
+    store = ParquetStore(directory / TASKS)
+    found = resume.finished(directory, store, tasks, drawn)
+    return found, resume.stamp(tasks, drawn)
 
 
 def draw(
@@ -270,7 +205,7 @@ def draw(
             figures.save(experiment, evidence, folder)
         if any(experiment.name == ANIMATED for experiment in experiments):
             status.update("Drawing the animation")
-            figures.animation.animate(folder / "learning.gif")
+            figures.animation.animate(folder / ANIMATION)
 
 
 def write_report(directory: Path) -> Path:
@@ -283,23 +218,6 @@ def write_report(directory: Path) -> Path:
 
     write_claims(directory)
     return write_page(directory)
-
-
-def figures_only(outcome: Outcome) -> Outcome:
-    """An outcome without its curves, to be printed."""
-    return {
-        **outcome,
-        "experiments": [
-            {
-                **each,
-                "studies": [
-                    {name: value for name, value in study.items() if name != "curves"}
-                    for study in each["studies"]
-                ],
-            }
-            for each in outcome["experiments"]
-        ],
-    }
 
 
 def _compile(settings: list[Runnable]) -> None:

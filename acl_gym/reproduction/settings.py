@@ -11,7 +11,7 @@ import json
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
-from typing import Any, ClassVar, Protocol
+from typing import Any, Protocol
 
 import gymnasium as gym
 import numpy as np
@@ -90,6 +90,8 @@ class Setting:
             partition; None where the states are the cells.
         evaluation_steps: T of the evaluation after each trial; None takes that of the
             colony.
+        order: the reading of the local update, a key of `orders.ORDERS`.
+        most_runs: how many runs are made at most; not part of what results depend on.
     """
 
     env_id: str
@@ -100,18 +102,20 @@ class Setting:
     kind: str = "discrete"
     cells: Any = None
     evaluation_steps: int | None = None
-
-    most_runs: ClassVar[int | None] = None
+    order: str = "two phases"
+    most_runs: int | None = None
 
     @property
     def about(self) -> dict[str, Any]:
-        """All of it, JSON types."""
-        return asdict(self)
+        """All that a result depends on but the seed, JSON types."""
+        about = asdict(self)
+        del about["most_runs"]
+        return about
 
     @cached_property
     def key(self) -> str:
         """Names the setting by what is in it."""
-        text = json.dumps(asdict(self), sort_keys=True)
+        text = json.dumps(self.about, sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()[:12]
 
     @property
@@ -128,6 +132,8 @@ class Setting:
             parts.append(
                 cells if isinstance(cells, str) else " x ".join(map(str, cells))
             )
+        if self.order != "two phases":
+            parts.append(self.order)
         values = {**self.colony, **self.env}
         return ", ".join(parts + [f"{name} = {values[name]}" for name in values])
 
@@ -196,6 +202,7 @@ class Experiment:
         studies: its panels, in order.
         drawing: how it is drawn, a key of `figures.DRAWINGS`.
         claims: which claims it decides.
+        explains: for which claims it is tried why they do not hold.
         text: what the thesis says, what is decided here, in this project's words.
         options: more that the drawing needs.
         findings: how a table and sentences are made of its runs, a key of
@@ -210,4 +217,5 @@ class Experiment:
     claims: tuple[str, ...] = ()
     text: str = ""
     options: dict[str, Any] = field(default_factory=dict)
+    explains: tuple[str, ...] = ()
     findings: str = ""

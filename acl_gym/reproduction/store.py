@@ -17,6 +17,9 @@ from acl_gym.storage import write_atomically
 _ABOUT = b"acl_gym"
 _LEVELS = "levels"
 
+# A file that is not there, is cut short, or is somebody else's.
+_UNREADABLE = (OSError, KeyError, ValueError, TypeError, pa.ArrowException)
+
 
 class ParquetStore:
     """A Parquet file a task.
@@ -36,6 +39,14 @@ class ParquetStore:
         """The file of a task."""
         return self.directory / f"{task.name}.parquet"
 
+    def has(self, task: Task) -> bool:
+        """Whether the result of a task is there, as far as the end of its file says."""
+        try:
+            metadata = pq.read_schema(self.path(task)).metadata or {}
+            return bool(json.loads(metadata[_ABOUT])["key"] == task.key)
+        except _UNREADABLE:
+            return False
+
     def read(self, task: Task) -> Result | None:
         """See `Store.read`."""
         try:
@@ -44,7 +55,7 @@ class ParquetStore:
             if about["key"] != task.key:
                 return None
             return _result(table, about)
-        except (FileNotFoundError, KeyError, ValueError, TypeError, pa.ArrowException):
+        except _UNREADABLE:
             return None  # damaged, or somebody else's: it is made again
 
     def write(self, task: Task, result: Result) -> None:

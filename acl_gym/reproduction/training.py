@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from acl_gym.agents.acl import ACL, PheromoneBoundWarning
+from acl_gym.agents.acl import PheromoneBoundWarning
 from acl_gym.callbacks import PolicyEvaluation
+from acl_gym.reproduction import orders
 from acl_gym.reproduction.settings import TWO_STATE, Setting
 
 MEASURES = (
@@ -40,7 +41,9 @@ def learn(
     env = setting.make_env()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", PheromoneBoundWarning)  # the thesis's tau0
-        colony = ACL(env, setting.make_partition(), seed=seed, **setting.colony)
+        colony = orders.colony(
+            setting.order, env, setting.make_partition(), seed=seed, **setting.colony
+        )
     evaluation = PolicyEvaluation(
         env, max_steps=setting.evaluation_steps or colony.max_steps
     )

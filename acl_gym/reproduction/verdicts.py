@@ -25,6 +25,18 @@ RESAMPLES = 2_000
 _NEVER = 1e100  # stands for infinity, of which a ratio would be NaN
 
 
+class Tried(NamedTuple):
+    """What was tried to understand a claim that does not hold.
+
+    Attributes:
+        what: what was done otherwise, or looked at otherwise.
+        found: what came of it.
+    """
+
+    what: str
+    found: str
+
+
 class Part(NamedTuple):
     """One statement of a claim.
 
@@ -48,13 +60,15 @@ class Claim:
         text: in this project's words.
         section: of the thesis.
         decide: takes it apart.
-        understanding: what was tried where it does not hold; "" if nothing was.
+        tried: what is told where it does not hold, or holds in part.
+        understanding: what to know about it in any case; "" if nothing.
     """
 
     name: str
     text: str
     section: str
     decide: Callable[[Evidence], list[Part]]
+    tried: tuple[Callable[[Evidence], Tried], ...] = ()
     understanding: str = ""
 
     @property
@@ -62,19 +76,40 @@ class Claim:
         """The names of the experiments that decide it."""
         return [each.name for each in EXPERIMENTS if self.name in each.claims]
 
+    @property
+    def trials(self) -> list[str]:
+        """The names of the experiments that were tried to understand it."""
+        return [each.name for each in EXPERIMENTS if self.name in each.explains]
+
+    def attempts(self, evidence: Evidence) -> list[Tried]:
+        """What was tried, as far as its runs are there."""
+        found = []
+        for attempt in self.tried:
+            try:
+                found.append(attempt(evidence))
+            except MissingRunsError:
+                continue
+        return found
+
     def judge(self, evidence: Evidence) -> dict[str, Any]:
         """The verdict with all that led to it, JSON types."""
         try:
             parts = self.decide(evidence)
         except MissingRunsError:
             parts = []
+        decided = verdict(parts)
+        wanting = decided in (IN_PART, NOT)
         return {
             "claim": self.name,
             "text": self.text,
             "section": self.section,
             "experiments": self.experiments,
-            "verdict": verdict(parts),
+            "trials": self.trials,
+            "verdict": decided,
             "parts": [{**p._asdict(), "holds": bool(p.holds)} for p in parts],
+            "tried": [
+                each._asdict() for each in (self.attempts(evidence) if wanting else [])
+            ],
             "understanding": self.understanding,
         }
 
@@ -96,7 +131,12 @@ class Interval(NamedTuple):
 
     def __str__(self) -> str:
         """For instance 1.23 [1.1, 1.4]."""
-        return f"{self.value:.3g} [{self.low:.3g}, {self.high:.3g}]"
+        return f"{digits(self.value)} [{digits(self.low)}, {digits(self.high)}]"
+
+
+def digits(value: float) -> str:
+    """A number to three digits, without powers of ten: 2590, 44.7."""
+    return f"{float(f'{value:.3g}'):g}"
 
 
 def iqm(values: FloatArray, axis: int = -1) -> Any:

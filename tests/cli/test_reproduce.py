@@ -28,10 +28,20 @@ def test_a_figure_and_its_report(tmp_path: Path) -> None:
     assert len(files) == 6
     before = [path.stat().st_mtime_ns for path in files]
 
-    again = run(*SMALL, "--out", "r", "--no-figures", cwd=tmp_path)
+    everything = [path for path in folder.rglob("*") if path.is_file()]
+    times = [path.stat().st_mtime_ns for path in everything]
+    again = run(*SMALL, "--out", "r", cwd=tmp_path)
     assert again.returncode == 0, again.stderr
-    assert [path.stat().st_mtime_ns for path in files] == before
+    assert "Nothing to do" in again.stdout
     assert "C5" in again.stdout
+    assert [path.stat().st_mtime_ns for path in everything] == times
+
+    # What is missing is made, and nothing else.
+    (folder / "figures" / "fig3.9.png").unlink()
+    again = run(*SMALL, "--out", "r", cwd=tmp_path)
+    assert "Nothing to do" not in again.stdout
+    assert (folder / "figures" / "fig3.9.png").is_file()
+    assert [path.stat().st_mtime_ns for path in files] == before
 
     (folder / "report.html").unlink()
     told = figures("report", str(folder))

@@ -14,6 +14,7 @@ from acl_gym.envs.grid_search import (
 )
 from acl_gym.envs.navigation import NavigationEnv, NavigationVectorEnv
 from acl_gym.envs.pendulum import PendulumEnv, PendulumVectorEnv
+from acl_gym.envs.two_state import TwoStateEnv, TwoStateVectorEnv
 
 NAN, INF = float("nan"), float("inf")
 State = tuple[float, ...]
@@ -33,7 +34,11 @@ class SystemCase:
         narrow: parameters for `near` and `away`.
         near: a state from which `near_action` leads to the goal of `narrow`.
         near_action: that action.
-        away: a state from which no 100 actions lead to the goal of `narrow`.
+        away: a state from which no 100 actions lead to the goal of `narrow`; where
+            walks do not last, one from which no single action does.
+        lasting: whether there are long walks; False where each ends after an action
+            or two.
+        one_start: whether every ant begins in the same state.
         draws: parameters under which steps are random; None if there are none.
         bad_states: states that `reset` must refuse, each with a name.
     """
@@ -49,6 +54,8 @@ class SystemCase:
     away: State
     draws: dict[str, Any] | None = None
     bad_states: dict[str, Any] = field(default_factory=dict)
+    lasting: bool = True
+    one_start: bool = False
 
     @property
     def n_actions(self) -> int:
@@ -166,7 +173,24 @@ SYSTEMS = [
             "dict": {"c1": 0.0},
         },
     ),
+    SystemCase(
+        env_id="acl_gym/TwoState-v0",
+        single=TwoStateEnv,
+        vector=TwoStateVectorEnv,
+        easy={"costs": (0.5, 1.5, 6.0)},
+        variant={},
+        narrow={},
+        near=(1,),
+        near_action=0,
+        away=(0,),
+        bad_states=_GRID_BAD,
+        lasting=False,
+        one_start=True,
+    ),
 ]
+
+LASTING = [case for case in SYSTEMS if case.lasting]
+"""For tests of what happens on a long walk."""
 
 
 def by_id(case: SystemCase) -> str:

@@ -11,11 +11,12 @@ from gymnasium.wrappers import TimeLimit
 from gymnasium.wrappers.vector import RecordEpisodeStatistics
 
 from acl_gym.envs.control_env import ControlVectorEnv
-from tests.envs.systems import SYSTEMS, SystemCase
+from tests.envs.systems import LASTING, SYSTEMS, SystemCase, by_id
 from tests.envs.vector_helpers import (
     assert_same_bits,
     assert_same_infos,
     assert_same_step,
+    beside_masks,
     mask_of,
     random_states,
     step_and_reset,
@@ -99,7 +100,7 @@ def test_native_is_the_synchronous_one(
         seen["truncated"] += theirs[3].sum()
         seen["restarted"] += restarted.sum()
     assert seen["terminated"] > 10
-    assert seen["truncated"] > 10
+    assert seen["truncated"] > 10 or not case.lasting
     assert seen["restarted"] > 10 or mode == "Disabled"
 
 
@@ -131,12 +132,14 @@ def test_both_flags_on_the_last_step(case: SystemCase, mode: str) -> None:
     assert truncated.tolist() == [True, True, True]
 
 
+@pytest.mark.parametrize("case", LASTING, ids=by_id)
 def test_no_limit_unless_one_is_set(case: SystemCase, mode: str) -> None:
     env = gym.make_vec(case.env_id, num_envs=2, autoreset_mode=mode, **case.narrow)
     env.reset(options={"state": case.rows(case.away, case.away)})
     assert not any(env.step([0, 0])[3].any() for _ in range(1000))
 
 
+@pytest.mark.parametrize("case", LASTING, ids=by_id)
 def test_next_step_ignores_the_action_of_a_restart(case: SystemCase) -> None:
     near = case.near_action
     envs = [
@@ -176,9 +179,10 @@ def test_same_step_tells_how_the_episode_ended(case: SystemCase) -> None:
     assert env.single_observation_space.contains(last)
     assert np.any(observations[1] != last)
     env.reset(options={"state": case.rows(*[case.away] * 3)})
-    assert env.step([0, 0, 0])[4] == {}
+    assert beside_masks(env.step([0, 0, 0])[4]) == {}
 
 
+@pytest.mark.parametrize("case", LASTING, ids=by_id)
 def test_disabled_refuses_to_step_a_finished_slot(case: SystemCase) -> None:
     env, twin = (
         native_env(case, "Disabled", num_envs=3, **case.narrow) for _ in range(2)
@@ -228,12 +232,13 @@ def test_waiting_slots_stand_still_and_the_others_walk_on(
             assert_same_bits(observations[~was_walking], previous[~was_walking])
             assert not rewards[~was_walking].any()
             assert not (terminated | truncated)[~was_walking].any()
-            assert infos == {}
+            assert beside_masks(infos) == {}
             walking &= ~(terminated | truncated)
             ends["terminated"] += terminated.sum()
             ends["truncated"] += (truncated & ~terminated).sum()
         assert not walking.any()
-    assert min(ends.values()) > 0
+    assert ends["terminated"] > 0
+    assert ends["truncated"] > 0 or not case.lasting
     assert sum(ends.values()) == 5 * N
 
 
@@ -255,6 +260,7 @@ def test_waiting_ends_with_the_next_full_reset(case: SystemCase, mode: str) -> N
         assert_same_step(env.step([0, 1]), twin.step([0, 1]))
 
 
+@pytest.mark.parametrize("case", LASTING, ids=by_id)
 def test_waiting_slot_walks_again_after_a_masked_reset(
     case: SystemCase, mode: str
 ) -> None:
@@ -281,7 +287,7 @@ def test_waiting_can_begin_with_a_masked_reset(case: SystemCase, mode: str) -> N
     env.reset(options={"reset_mask": mask_of(2, 1), "state": states, **WAIT})
     observations, _, terminated, _, infos = env.step([case.near_action] * 2)
     assert terminated.all()
-    assert infos == {}
+    assert beside_masks(infos) == {}
     assert_same_bits(env.step([0, 1])[0], observations)
 
 
@@ -322,5 +328,5 @@ def test_statistics_of_episodes_are_recorded(case: SystemCase, mode: str) -> Non
     assert len(episodes) > 30
     assert env.episode_count == len(episodes)
     assert list(env.length_queue) == episodes[-100:]
-    assert max(episodes) == LIMIT
+    assert max(episodes) == LIMIT or not case.lasting
     assert min(episodes) < LIMIT

@@ -15,8 +15,8 @@ from gymnasium.wrappers import TimeLimit
 from acl_gym.envs.control_env import ControlEnv
 from acl_gym.envs.pendulum import PendulumEnv
 from acl_gym.registration import ENVIRONMENTS, register_environments
-from tests.envs.systems import SYSTEMS, SystemCase
-from tests.envs.vector_helpers import assert_same_bits
+from tests.envs.systems import LASTING, SYSTEMS, SystemCase, by_id
+from tests.envs.vector_helpers import assert_same_bits, beside_masks
 
 NAN = float("nan")
 COPIES = [copy.deepcopy, lambda env: pickle.loads(pickle.dumps(env))]
@@ -54,6 +54,7 @@ def test_registering_again_is_harmless() -> None:
     assert all(gym.spec(each).max_episode_steps is None for each in ENVIRONMENTS)
 
 
+@pytest.mark.parametrize("case", LASTING, ids=by_id)
 def test_time_limit_of_make(case: SystemCase) -> None:
     env = gym.make(case.env_id, max_episode_steps=3, **case.narrow)
     env.reset(options={"state": case.away})
@@ -92,7 +93,7 @@ def test_state_option_sets_the_state(case: SystemCase) -> None:
     env = case.single(**case.narrow)
     observation, info = env.reset(options={"state": list(case.near)})
     assert_same_bits(np.asarray(observation), case.observed(case.near)[0])
-    assert info == {}
+    assert beside_masks(info) == {}
 
 
 def test_no_state_means_a_random_one(case: SystemCase) -> None:
@@ -102,7 +103,7 @@ def test_no_state_means_a_random_one(case: SystemCase) -> None:
         for options in (None, {}, {"state": None})
     ]
     assert rows[0] == rows[1] == rows[2]
-    assert rows[0] != env.reset()[0].tolist()
+    assert case.one_start or rows[0] != env.reset()[0].tolist()
 
 
 def test_given_state_draws_no_random_numbers(case: SystemCase) -> None:
@@ -242,7 +243,8 @@ def test_same_seed_same_bits(case: SystemCase) -> None:
     walks = [walk(env, random_actions(case, 500, 3)) for env in envs]
     assert sum(row[2] for row in walks[0]) > 1
     assert walks[0] == walks[1]
-    assert walks[0] != walks[2]
+    # Without chance there is one start, and one way for each line of actions.
+    assert case.one_start or walks[0] != walks[2]
 
 
 @pytest.mark.parametrize("twin", COPIES)

@@ -21,6 +21,7 @@ from tests.envs.vector_helpers import (
     assert_same_bits,
     assert_same_step,
     assert_walk_alike,
+    beside_masks,
     pair,
     walk,
 )
@@ -41,7 +42,7 @@ def test_spaces(case: SystemCase, num_envs: int) -> None:
 def test_what_is_returned(case: SystemCase, mode: str) -> None:
     env = case.vector(5, autoreset_mode=mode, max_episode_steps=20, **case.easy)
     observations, infos = env.reset(seed=1)
-    assert infos == {}
+    assert beside_masks(infos) == {}
     assert env.observation_space.contains(observations)
     for observations, rewards, terminated, truncated, infos in walk(env, 400, 1):
         assert env.observation_space.contains(observations)
@@ -50,7 +51,7 @@ def test_what_is_returned(case: SystemCase, mode: str) -> None:
         for flags in (terminated, truncated):
             assert (flags.shape, flags.dtype) == ((5,), np.bool_)
         ended = mode == "SameStep" and (terminated | truncated).any()
-        assert bool(infos) == ended
+        assert bool(beside_masks(infos)) == ended
 
 
 def test_make_vec_takes_the_mode_as_a_string(case: SystemCase, mode: str) -> None:
@@ -163,8 +164,9 @@ def test_returned_arrays_belong_to_the_caller(
         finished = result[2] | result[3]
         if mode == "Disabled" and not wait and finished.any():
             mask = {"reset_mask": finished.copy()}
-            returned += arrays_in(env.reset(options=mask))
-            assert_same_bits(returned[-1], twin.reset(options=mask)[0])
+            new = arrays_in(env.reset(options=mask))
+            assert_same_bits(new[0], twin.reset(options=mask)[0])
+            returned += new
 
 
 def test_states_are_copies(case: SystemCase, mode: str) -> None:
@@ -201,13 +203,14 @@ def test_same_seed_same_bits(case: SystemCase, mode: str) -> None:
     other = pair(case, mode, num_envs=30, seed=7)[0]
     start = env.reset(seed=6)[0]
     assert_same_bits(start, twin.reset(seed=6)[0])
-    assert np.any(start != other.reset(seed=7)[0])
-    assert len(np.unique(start, axis=0)) >= 4
+    starts = len(np.unique(start, axis=0))
+    assert starts == 1 if case.one_start else starts >= 4
+    assert case.one_start or np.any(start != other.reset(seed=7)[0])
     assert_walk_alike(env, twin)
     # Without a seed the stream goes on instead of starting again.
     following = env.reset()[0]
     assert_same_bits(following, twin.reset()[0])
-    assert np.any(following != start)
+    assert case.one_start or np.any(following != start)
 
 
 @pytest.mark.parametrize(

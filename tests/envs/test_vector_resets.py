@@ -7,7 +7,7 @@ import pytest
 from gymnasium.error import Error
 
 from acl_gym.envs.pendulum import PendulumVectorEnv
-from tests.envs.systems import SystemCase
+from tests.envs.systems import LASTING, SystemCase, by_id
 from tests.envs.vector_helpers import (
     assert_same_bits,
     assert_walk_alike,
@@ -111,6 +111,7 @@ def test_options_stay_as_they_were(case: SystemCase, mode: str) -> None:
     assert not states.any()
 
 
+@pytest.mark.parametrize("case", LASTING, ids=by_id)
 @pytest.mark.parametrize("with_states", [False, True])
 def test_mask_leaves_the_other_slots_alone(
     case: SystemCase, with_states: bool, mode: str
@@ -155,6 +156,7 @@ def test_mask_of_all_slots_is_a_full_reset_that_keeps_waiting(
     assert_same_bits(env.step([0, 0])[0][0], observations[0])
 
 
+@pytest.mark.parametrize("case", LASTING, ids=by_id)
 def test_resets_of_one_slot_leave_the_others_alone(case: SystemCase, mode: str) -> None:
     env, free = (case.vector(5, autoreset_mode=mode, **case.narrow) for _ in range(2))
     rng = np.random.default_rng(3)

@@ -47,6 +47,11 @@ def assert_same_infos(ours: dict[str, Any], theirs: dict[str, Any]) -> None:
             assert_same_bits(mine, other)
 
 
+def beside_masks(infos: dict[str, Any]) -> dict[str, Any]:
+    """Infos without the mask of actions, which some systems always tell."""
+    return {key: infos[key] for key in infos if not key.endswith("action_mask")}
+
+
 def arrays_in(value: Any) -> list[np.ndarray]:
     """Every array of numbers in what `reset` or `step` returned."""
     if isinstance(value, dict):

@@ -94,7 +94,7 @@ def test_other_settings_or_other_code_run_again(
     run_tasks(tasks(calls, [1]), tmp_path / "runs", workers=1)
     run_tasks(tasks(calls, [1], trials=7), tmp_path / "runs", workers=1)
     assert calls_in(calls) == ["1", "1"]
-    monkeypatch.setattr(runner, "code_fingerprint", lambda: "other code")
+    monkeypatch.setattr(runner, "code_fingerprint", lambda module: "other code")
     run_tasks(tasks(calls, [1], trials=7), tmp_path / "runs", workers=1)
     assert calls_in(calls) == ["1", "1", "1"]
 
@@ -194,8 +194,12 @@ def test_killed_at_any_moment_it_goes_on(tmp_path: Path) -> None:
         time.sleep(0.05)
     while not (tmp_path / "worker").exists() and time.monotonic() < give_up:
         time.sleep(0.05)
+    # A second runner is refused while the first one lives, and loses nothing of it.
+    with pytest.raises(FolderInUseError, match="another run works on"):
+        run_tasks(tasks(tmp_path / "calls"), runs, workers=1)
     process.kill()
     process.wait()
+    (runs / ".square-1.json.77.tmp").write_text("{")
     worker = int((tmp_path / "worker").read_text())
     while _runs(worker) and time.monotonic() < give_up:
         time.sleep(0.05)
@@ -205,6 +209,7 @@ def test_killed_at_any_moment_it_goes_on(tmp_path: Path) -> None:
     results = run_tasks(tasks(tmp_path / "calls"), runs, workers=1)
     assert [result["square"] for result in results] == [0, 1, 4, 9]
     assert calls_in(tmp_path / "calls") == ["0", "1", "2", "3"]
+    assert not list(runs.glob(".*")), "nothing half written may stay"
 
 
 def _runs(pid: int) -> bool:
@@ -213,11 +218,6 @@ def _runs(pid: int) -> bool:
     except ProcessLookupError:
         return False
     return True
-
-
-def test_fingerprint_is_of_the_source() -> None:
-    assert runner.code_fingerprint() == runner.code_fingerprint()
-    assert len(runner.code_fingerprint()) == 64
 
 
 def test_ctrl_c_stops_at_once_and_leaves_nothing_running(tmp_path: Path) -> None:

@@ -10,8 +10,8 @@ import pytest
 from acl_gym.reproduction.catalogue import BY_NAME, EXPERIMENTS, RUNS
 from acl_gym.reproduction.claims import CLAIMS
 from acl_gym.reproduction.figures import DRAWINGS
+from acl_gym.reproduction.outcome import CAPTIONS
 from acl_gym.reproduction.reproduce import (
-    CAPTIONS,
     chosen,
     settings_of,
     tasks_for,

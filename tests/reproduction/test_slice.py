@@ -12,9 +12,11 @@ import pytest
 
 from acl_gym.reproduction import evidence as evidence_module
 from acl_gym.reproduction import figures, page, reproduce
-from acl_gym.reproduction.catalogue import EXPERIMENTS
+from acl_gym.reproduction import outcome as outcomes
+from acl_gym.reproduction.catalogue import BY_NAME, EXPERIMENTS
 from acl_gym.reproduction.claims import CLAIMS
 from acl_gym.reproduction.settings import Experiment
+from acl_gym.reproduction.systems import swing
 from tests.reproduction.slices import SEEDS, TRIALS, evidence, runs_of
 
 DRAWN = list(
@@ -46,7 +48,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     for experiment in DRAWN:
         figures.save(experiment, evidence(), path / "figures")
     figures.animation.animate(path / "figures" / "learning.gif", shown=(0, 1))
-    outcome = reproduce.outcome_of(list(EXPERIMENTS), evidence(), SEEDS, 0, {})
+    outcome = outcomes.outcome_of(list(EXPERIMENTS), evidence(), SEEDS, 0, {})
     patch.undo()
     (path / "results.json").write_text(json.dumps(outcome))
     page.write_page(path)
@@ -74,7 +76,7 @@ def test_every_kind_of_figure_is_drawn(folder: Path, experiment: Experiment) -> 
 
 @pytest.mark.parametrize("experiment", EXPERIMENTS, ids=lambda each: each.name)
 def test_every_summary_is_json_with_curves(experiment: Experiment) -> None:
-    text = json.dumps(reproduce.summary(experiment, evidence()), allow_nan=False)
+    text = json.dumps(outcomes.summary(experiment, evidence()), allow_nan=False)
     found = json.loads(text)
     for study, own in zip(found["studies"], experiment.studies, strict=True):
         assert study["runs"] == runs_of(own.setting.most_runs)
@@ -87,6 +89,27 @@ def test_every_summary_is_json_with_curves(experiment: Experiment) -> None:
             ):
                 assert low <= mean * (1 + 1e-4) + 1e-9
                 assert mean <= high * (1 + 1e-4) + 1e-9
+
+
+def keys_of(names: list[str]) -> set[str]:
+    return {
+        setting.key
+        for setting in reproduce.settings_of(BY_NAME[name] for name in names)
+    }
+
+
+@pytest.mark.parametrize("claim", CLAIMS, ids=lambda claim: claim.name)
+def test_a_claim_needs_its_own_experiments_alone(claim: Any) -> None:
+    own = evidence().of(keys_of(claim.experiments))
+    assert claim.judge(own)["verdict"] != "undecided"
+    # What was tried is all told once its experiments are there too.
+    tried = claim.attempts(evidence().of(keys_of([*claim.experiments, *claim.trials])))
+    assert len(tried) == len(claim.tried)
+    assert all(each.what and each.found for each in tried)
+    if claim.trials:
+        assert len(claim.attempts(own)) < len(tried), "they are not looked at"
+    decisive = {"C1", "C2", "C3", "C17", "C21"}
+    assert claim.tried or claim.name in decisive
 
 
 class Links(HTMLParser):
@@ -147,8 +170,8 @@ CHROMIUM = next(
 
 
 @pytest.mark.skipif(CHROMIUM is None, reason="needs chromium (apt install chromium)")
-@pytest.mark.parametrize("width", [1200, 390])
-def test_the_page_in_a_browser(folder: Path, width: int) -> None:
+@pytest.mark.parametrize(("width", "scheme"), [(1200, "dark"), (390, "light")])
+def test_the_page_in_a_browser(folder: Path, width: int, scheme: str) -> None:
     """No errors, no requests, every picture visible, links and hovering work."""
     sync = pytest.importorskip("playwright.sync_api")
     wrong: list[str] = []
@@ -157,7 +180,9 @@ def test_the_page_in_a_browser(folder: Path, width: int) -> None:
             executable_path=str(CHROMIUM),
             args=["--no-sandbox", "--disable-gpu", "--disable-background-networking"],
         )
-        tab = browser.new_page(viewport={"width": width, "height": 800})
+        tab = browser.new_page(
+            viewport={"width": width, "height": 800}, color_scheme=scheme
+        )
         tab.on("console", lambda m: m.type == "error" and wrong.append(m.text))
         tab.on("pageerror", lambda error: wrong.append(str(error)))
         tab.on(
@@ -177,9 +202,19 @@ def test_the_page_in_a_browser(folder: Path, width: int) -> None:
         tab.locator("tr#C14 a").first.click()
         assert tab.url.endswith("#fig5.4")
         box = tab.locator('.explore[data-name="fig5.4"]')
-        box.locator("select").first.select_option(label="rho = 0.1")
-        box.locator("svg").hover()
-        assert "mean" in box.locator("output").inner_text()
+        choice, measure = box.locator("select").all()
+        choice.select_option(label="rho = 0.1")
+        measure.select_option(label="sensitivity")
+        plot = box.locator("svg")
+        plot.hover(position={"x": plot.bounding_box()["width"] - 5, "y": 60})
+        curve = evidence().rows(swing("fuzzy"), "sensitivity")[:, -1]
+        told = box.locator("output").inner_text()
+        assert told.startswith(f"trial {TRIALS}: mean {curve.mean():.4g}, from ")
+        assert told.endswith(f"from {curve.min():.4g} to {curve.max():.4g}")
+        words = plot.locator("text").all_text_contents()
+        assert {"trial", "sensitivity", "1"} <= set(words)
+        paper = tab.evaluate("getComputedStyle(document.body).backgroundColor")
+        assert (paper == "rgb(255, 255, 255)") == (scheme == "light")
         browser.close()
     assert wrong == []
 

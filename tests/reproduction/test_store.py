@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import json
+import pickle
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from acl_gym.experiments.runner import Task
+from acl_gym.experiments.runner import Task, run_tasks
 from acl_gym.reproduction.reproduce import tasks_for
 from acl_gym.reproduction.store import ParquetStore
 from acl_gym.reproduction.systems import row
@@ -56,6 +59,57 @@ def test_a_damaged_file_counts_as_none(tmp_path: Path, task: Task, damage: str) 
         content = path.read_bytes()
         path.write_bytes({"cut": content[:-50], "text": b"hello", "empty": b""}[damage])
     assert store.read(task) is None
+    if damage != "foreign":
+        assert not store.has(task)
+
+
+def test_a_damaged_run_is_made_again_with_a_word(
+    tmp_path: Path, task: Task, caplog: pytest.LogCaptureFixture
+) -> None:
+    store = ParquetStore(tmp_path)
+
+    def run() -> dict[str, Any]:
+        caplog.clear()
+        (found,) = run_tasks([task], tmp_path, workers=1, store=store)
+        return found
+
+    first = run()
+    assert not caplog.messages
+    path = store.path(task)
+    path.write_bytes(path.read_bytes()[:-50])
+    again = run()
+    assert ["1 of 1 results" in text for text in caplog.messages] == [True]
+    assert "are made again" in caplog.text
+    assert again["rows"] == first["rows"]
+    assert store.has(task)
+    run()
+    assert not caplog.messages
+
+
+def test_nothing_in_a_file_is_code(tmp_path: Path, task: Task) -> None:
+    """A stranger's Parquet file with a pickle in every place that could hold one."""
+    trap, store = tmp_path / "trap", ParquetStore(tmp_path)
+    payload = pickle.dumps(_Trap(str(trap)))
+    about = {"key": task.key, "settings": task.settings, "result": {}}
+    table = pa.table({"levels": [payload], "policy_cost": [payload]})
+    table = table.replace_schema_metadata(
+        {b"acl_gym": json.dumps(about), b"pandas": payload, b"ARROW:schema": payload}
+    )
+    pq.write_table(table, store.path(task))
+    assert store.read(task) is None
+    store.path(task).write_bytes(payload)
+    assert store.read(task) is None
+    assert not trap.exists()
+    pickle.loads(payload)
+    assert trap.exists(), "it would have told"
+
+
+class _Trap:
+    def __init__(self, path: str) -> None:
+        self.path = path
+
+    def __reduce__(self) -> Any:
+        return (Path.touch, (Path(self.path),))
 
 
 def test_another_key_counts_as_none(tmp_path: Path, task: Task) -> None:

@@ -12,6 +12,7 @@ from acl_gym.reproduction.systems import row
 from acl_gym.reproduction.verdicts import (
     Claim,
     Part,
+    Tried,
     interval,
     iqm,
     ratio,
@@ -44,6 +45,19 @@ def test_a_claim_without_its_runs_is_undecided() -> None:
     assert (found["verdict"], found["parts"][0]["holds"]) == ("holds", True)
     with pytest.raises(MissingRunsError):
         Evidence({}).runs(row())
+
+
+def test_what_was_tried_is_told_where_a_claim_is_wanting() -> None:
+    def missing(evidence: Evidence) -> Tried:
+        evidence.runs(row())
+        return Tried("never", "told")
+
+    for holds, told in ((True, []), (False, [{"what": "more", "found": "less"}])):
+        claim = Claim(
+            *("C0", "text", "§0", lambda _, holds=holds: [part(holds)]),
+            (lambda _: Tried("more", "less"), missing),
+        )
+        assert claim.judge(Evidence({}))["tried"] == told
 
 
 @given(st.lists(st.floats(-1e6, 1e6), min_size=1, max_size=40))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from acl_gym.reproduction.settings import Setting, Study
 
 NEARLY_ONE = 0.999999
@@ -21,6 +23,17 @@ _NUMBER = {NEARLY_ONE: "1"}
 def number(value: float) -> str:
     """A parameter as a figure labels it."""
     return _NUMBER.get(value, f"{value:g}")
+
+
+FEWER = 10
+"""Runs of what is tried beside the thesis's experiments and takes long."""
+
+
+def fewer(settings: dict[str, Setting]) -> dict[str, Setting]:
+    """The same with `FEWER` runs."""
+    return {
+        label: replace(setting, most_runs=FEWER) for label, setting in settings.items()
+    }
 
 
 def studies(settings: dict[str, Setting]) -> tuple[Study, ...]:

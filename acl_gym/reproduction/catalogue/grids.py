@@ -39,7 +39,7 @@ EXPERIMENTS = (
         "§3.4.8",
         studies(_GAPS),
         "policy_gap",
-        ("C21", "C23"),
+        ("C21", "C22", "C23"),
         "Delta of (3.31) is positive for one ant and negative for more, with costs 1 "
         "and 2 of the two best actions. Drawn is how often the last policies of the "
         "runs are the optimal ones, and still change.",

@@ -111,7 +111,7 @@ def _of_rows(
         (),
         text,
         {"rows": rows, **options},
-        findings,
+        findings=findings,
     )
 
 

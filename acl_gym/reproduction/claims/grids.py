@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from acl_gym.agents.model import TabularModel
-from acl_gym.agents.value_iteration import policy_value, value_iteration
-from acl_gym.evaluation import control_env
 from acl_gym.reproduction.catalogue.common import GAMMAS_ROW, SIZES
+from acl_gym.reproduction.claims import grids_tried as tried
+from acl_gym.reproduction.claims.exact import optimal_grid_cost, policy_costs, solved
+from acl_gym.reproduction.claims.grids_tried import OPTIMUM_1D
 from acl_gym.reproduction.evidence import Evidence
 from acl_gym.reproduction.settings import Setting
 from acl_gym.reproduction.systems import row, world
@@ -22,9 +22,6 @@ from acl_gym.reproduction.verdicts import (
     ratio,
     trial_of,
 )
-
-OPTIMUM_1D = 5.0
-"""J of the optimal policy on the row of ten states."""
 
 LATE = 20
 """So many trials at the end count as late."""
@@ -135,34 +132,12 @@ def c5(evidence: Evidence) -> list[Part]:
     ]
 
 
-def _exact(setting: Setting) -> tuple[Any, Any, Any]:
-    """The model, its optimum, and the states that are no goals."""
-    env = setting.make_env(1)
-    model = TabularModel.of(env)
-    optimum = value_iteration(model)
-    goals = control_env(env).system.goal_states  # type: ignore[attr-defined]
-    return model, optimum, np.setdiff1d(np.arange(len(optimum.values)), goals)
-
-
-def optimal_grid_cost(setting: Setting) -> float:
-    """J* of a grid, the mean over the states that are no goals."""
-    _, optimum, free = _exact(setting)
-    return float(-optimum.values[free].mean())
-
-
 def c6(evidence: Evidence) -> list[Part]:
     """J is about (mean shortest path) / p."""
     parts = []
     shortest = optimal_grid_cost(world())
     for p in (0.5, 0.7, 0.9, 1.0):
-        model, _, free = _exact(world(p=p))
-        costs = np.array(
-            [
-                -policy_value(model, policy.best_actions())[free].mean()
-                for policy in evidence.policies(world(p=p))
-            ]
-        )
-        found = interval(costs)
+        found = interval(policy_costs(evidence, world(p=p)))
         parts.append(
             Part(
                 f"p = {p:g}: the last policy costs {shortest / p:.2f} within 10%",
@@ -175,7 +150,7 @@ def c6(evidence: Evidence) -> list[Part]:
 
 def c7(evidence: Evidence) -> list[Part]:
     """p = 0.5 and p = 0.9 give nearly the same policy."""
-    _, optimum, free = _exact(world())
+    _, optimum, free = solved(world())
     values = optimum.action_values[free]
     single = (values >= values.max(axis=1, keepdims=True) - 1e-6).sum(axis=1) == 1
     cells = free[single]
@@ -251,30 +226,35 @@ CLAIMS = (
         "gamma = 0 is best; the larger gamma, the worse.",
         "§3.6.4",
         c4,
+        tried.C4,
     ),
     Claim(
         "C5",
         "More ants need fewer trials; 1, 5 and 9 ants all reach the optimum.",
         "§3.6.5",
         c5,
+        tried.C5,
     ),
     Claim(
         "C6",
         "The policy costs about the mean shortest path divided by p.",
         "§3.6.7",
         c6,
+        tried.C6,
     ),
     Claim(
         "C7",
         "p = 0.5 and p = 0.9 give nearly the same policy.",
         "§3.6.7",
         c7,
+        tried.C7,
     ),
     Claim(
         "C8",
         "How many trials it takes depends on the coverage by ants, hardly on the size.",
         "§3.6.8",
         c8,
+        tried.C8,
         "At first the trial was taken from which on the cost stays within 5% of its end; "
         "single cells that lose their way for a trial made that infinite in many runs.",
     ),

@@ -7,7 +7,14 @@ from typing import Any
 import numpy as np
 
 from acl_gym.evaluation import evaluate_policy_cost
-from acl_gym.reproduction.evidence import Evidence, FloatArray, baseline
+from acl_gym.reproduction.claims import navigation_tried as tried
+from acl_gym.reproduction.claims.navigation_tried import (
+    KINDS,
+    LATE,
+    late_costs,
+    trials_of_fall,
+)
+from acl_gym.reproduction.evidence import Evidence, baseline
 from acl_gym.reproduction.systems import vehicle
 from acl_gym.reproduction.verdicts import (
     Claim,
@@ -17,29 +24,14 @@ from acl_gym.reproduction.verdicts import (
     ratio,
 )
 
-KINDS = ("fuzzy", "crisp")
-LATE = 20
-
-
-def _late(evidence: Evidence, cost: str, kind: str, rule: str) -> FloatArray:
-    """The mean cost of the policy over the last trials of each run."""
-    costs = evidence.rows(vehicle(cost, kind, rule))
-    return np.asarray(costs[:, -LATE:].mean(axis=1))
-
-
-def _trials(costs: FloatArray) -> int:
-    """The first trial at which the mean over runs has done 90% of its fall."""
-    mean = costs.mean(axis=0)
-    end = mean[-LATE:].mean()
-    return int(np.argmax(mean <= end + 0.1 * max(mean[0] - end, 0.0))) + 1
-
 
 def c9(evidence: Evidence) -> list[Part]:
     """Fuzzy converges faster, lower, with less spread."""
     rule, parts = "bounds", []
-    fuzzy, crisp = (_late(evidence, "quadratic", kind, rule) for kind in KINDS)
+    fuzzy, crisp = (late_costs(evidence, "quadratic", kind, rule) for kind in KINDS)
     fast, slow = (
-        _trials(evidence.rows(vehicle("quadratic", kind, rule))) for kind in KINDS
+        trials_of_fall(evidence.rows(vehicle("quadratic", kind, rule)))
+        for kind in KINDS
     )
     lower = ratio(fuzzy, crisp)
     parts += [
@@ -101,7 +93,7 @@ def c11(evidence: Evidence) -> list[Part]:
     """Fuzzy is close to fuzzy Q-iteration."""
     setting = vehicle("quadratic", "fuzzy")
     cost = baseline(setting)[1]
-    found = interval(_late(evidence, "quadratic", "fuzzy", "bounds") / cost.cost)
+    found = interval(late_costs(evidence, "quadratic", "fuzzy", "bounds") / cost.cost)
     return [
         Part(
             "the policy costs what that of fuzzy Q-iteration on the same cells costs, "
@@ -122,7 +114,7 @@ CORNERS = np.array([[a, 0.0, b, 0.0] for a in (-5.0, 5.0) for b in (-5.0, 5.0)])
 
 def c12(evidence: Evidence) -> list[Part]:
     """Time-spent cost: fuzzy lower and round the damping, crisp fails from corners."""
-    fuzzy, crisp = (_late(evidence, "time", kind, "bounds") for kind in KINDS)
+    fuzzy, crisp = (late_costs(evidence, "time", kind, "bounds") for kind in KINDS)
     lower = ratio(fuzzy, crisp)
     setting = vehicle("time", "fuzzy")
     best = evidence.policy(setting, evidence.best_run(setting))
@@ -183,6 +175,7 @@ CLAIMS = (
         "less spread than crisp.",
         "§4.5.2",
         c9,
+        tried.C9,
     ),
     Claim(
         "C10",
@@ -190,12 +183,14 @@ CLAIMS = (
         "with the lower one.",
         "§4.5.2",
         c10,
+        tried.C10,
     ),
     Claim(
         "C11",
         "The policy of fuzzy ACL is close to that of fuzzy Q-iteration.",
         "§4.5.2",
         c11,
+        tried.C11,
     ),
     Claim(
         "C12",
@@ -203,5 +198,6 @@ CLAIMS = (
         "round the damping; crisp fails from some corners.",
         "§4.5.3",
         c12,
+        tried.C12,
     ),
 )

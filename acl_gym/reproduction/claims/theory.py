@@ -12,7 +12,7 @@ from acl_gym.reproduction.catalogue import BY_NAME
 from acl_gym.reproduction.evidence import Evidence
 from acl_gym.reproduction.settings import Setting, Study
 from acl_gym.reproduction.systems import two_state
-from acl_gym.reproduction.verdicts import Claim, Part
+from acl_gym.reproduction.verdicts import Claim, Part, Tried
 
 DEPOSITS = 1.0 / np.array([1.0, 2.0, 4.0])
 """1 / J of the three actions in q'."""
@@ -97,6 +97,34 @@ def c22(evidence: Evidence) -> list[Part]:
     return parts
 
 
+def longer_mean(evidence: Evidence) -> Tried:
+    """More trials for the mean, which follow on one another: more of them, less noise."""
+    found = []
+    for gamma in (0.0, 0.1, 0.5):
+        setting = two_state(1, local_decay=gamma)
+        limit = float(
+            theory.one_ant_limit(*common(setting)[1:], expected_deposits(setting)[0])
+        )
+        levels = evidence.rows(setting, "level_q")
+        mean = levels[:, levels.shape[1] // 2 :].mean()
+        found.append(f"gamma = {gamma:g}: {mean:.4f} against {limit:.4f}")
+    return Tried(
+        "the mean over the second half of the trials of all runs", ", ".join(found)
+    )
+
+
+def by_ants(evidence: Evidence) -> Tried:
+    """How many runs settle under each setting, beside Delta."""
+    found = []
+    for study in BY_NAME["fig3.4"].studies:
+        setting = study.setting
+        gap = float(theory.policy_gap(*common(setting), *expected_deposits(setting)))
+        found.append(
+            f"{study.label}: Delta {gap:.3g}, {settled(evidence, setting):.0%}"
+        )
+    return Tried("Delta and the runs that keep u*, one by one", "; ".join(found))
+
+
 def c23(evidence: Evidence) -> list[Part]:
     """Delta > 0 predicts a settled policy."""
     positive: list[float] = []
@@ -145,11 +173,13 @@ CLAIMS = (
         "For one ant the mean level converges to the limit of §3.4.7.",
         "§3.4.7",
         c22,
+        (longer_mean,),
     ),
     Claim(
         "C23",
         "Delta > 0 predicts a settled policy on the two-state system of Figure 3.2.",
         "§3.4.8",
         c23,
+        (by_ants,),
     ),
 )

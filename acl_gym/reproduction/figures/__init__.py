@@ -57,6 +57,7 @@ def save(experiment: Experiment, evidence: Evidence, directory: Path) -> Files:
         directory: exists.
     """
     figure = DRAWINGS[experiment.drawing](experiment, evidence)
+    figure.suptitle(bands.in_greek(experiment.title), fontsize=9, x=0.01, ha="left")
     files = Files(*(directory / f"{experiment.name}.{kind}" for kind in Files._fields))
     for file in files:
         buffer = io.BytesIO()

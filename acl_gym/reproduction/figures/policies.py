@@ -35,7 +35,7 @@ def policies(experiment: Experiment, evidence: Evidence) -> Figure:
     for study in experiment.studies:
         run = evidence.best_run(study.setting)
         cost = wording.cost(float(evidence.last(study.setting)[run]))
-        title = f"{study.label} (seed {run})\ncost {cost}"
+        title = bands.in_greek(f"{study.label} (seed {run})\ncost {cost}")
         shown.append((title, study, evidence.policy(study.setting, run)))
     system = experiment.studies[0].setting.env_id
     if system == PENDULUM:
@@ -67,7 +67,7 @@ def bands_and_policies(experiment: Experiment, evidence: Evidence) -> Figure:
         if column:
             ax.sharey(axes[0, 0])
         bands.draw_band(ax, study, evidence)
-        ax.set_title(study.label, fontsize=SMALL, loc="left")
+        ax.set_title(bands.in_greek(study.label), fontsize=SMALL, loc="left")
         ax.set_xlabel("trial", fontsize=SMALL)
         run = evidence.best_run(study.setting)
         draw_map(axes[1, column], study, evidence.policy(study.setting, run))
@@ -75,7 +75,9 @@ def bands_and_policies(experiment: Experiment, evidence: Evidence) -> Figure:
     drawing.plain_log(axes[0, 0].yaxis, sparse=True)
     axes[0, 0].set_ylabel(bands.NAMES["policy_cost"], fontsize=SMALL)
     axes[1, 0].set_ylabel(r"$\omega$ (rad/s)", fontsize=SMALL)
-    drawing.legend(figure, torque_handles(), ncols=4, loc="outside lower center")
+    handles = bands.band_handles(evidence, experiment.studies, optimum=True)
+    handles += torque_handles()
+    drawing.legend(figure, handles, ncols=4, loc="outside lower center")
     return figure
 
 

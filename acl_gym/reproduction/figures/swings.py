@@ -9,8 +9,9 @@ from matplotlib.figure import Figure
 
 from acl_gym.experiments import drawing, wording
 from acl_gym.experiments.drawing import SMALL
-from acl_gym.reproduction.claims.pendulum import trajectory
+from acl_gym.reproduction.claims.swings import trajectory
 from acl_gym.reproduction.evidence import Evidence
+from acl_gym.reproduction.figures.bands import in_greek
 from acl_gym.reproduction.settings import Experiment
 
 TORQUES = np.array([-0.8, 0.0, 0.8])
@@ -52,6 +53,6 @@ def swing(experiment: Experiment, evidence: Evidence) -> Figure:
         if path.success
         else f"no goal in {time[-1]:.0f} s"
     )
-    label = experiment.studies[0].label
+    label = in_greek(experiment.studies[0].label)
     axes[0].set_title(f"{label} (seed {run}): {ending}", fontsize=SMALL, loc="left")
     return figure

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
 
 from acl_gym import theory
 from acl_gym.experiments import drawing
 from acl_gym.experiments.drawing import SMALL
 from acl_gym.reproduction.claims.theory import common, expected_deposits, settled
 from acl_gym.reproduction.evidence import Evidence
+from acl_gym.reproduction.figures.bands import in_greek
 from acl_gym.reproduction.settings import Experiment
 
 _BOUND, _SECOND, _MEAN = "#0072B2", "#D55E00", "black"
@@ -23,7 +28,7 @@ def level_band(experiment: Experiment, evidence: Evidence) -> Figure:
         drawing.prepare(ax)
         setting = study.setting
         levels = evidence.rows(setting, "level_q")
-        trials = np.arange(levels.shape[1] + 1)
+        trials = np.arange(levels.shape[1] + 1)  # levels rise in the first few
         tau0 = setting.colony["tau0"]
         levels = np.pad(levels, ((0, 0), (1, 0)), constant_values=tau0)
         low, high = theory.expected_band(
@@ -39,6 +44,9 @@ def level_band(experiment: Experiment, evidence: Evidence) -> Figure:
         ax.plot(trials, low, **look, linestyle=":", label="lower bound (3.28)")
         ax.set_title(study.label, fontsize=SMALL, loc="left")
         ax.set_xlabel("trial", fontsize=SMALL)
+        ax.set_xscale("symlog", linthresh=1.0)
+        ax.set_xlim(0, trials[-1])
+        drawing.plain_numbers(ax.xaxis)
         ax.set_ylim(bottom=0.0)
     axes[0].set_ylabel(r"level $\tau$ in q", fontsize=SMALL)
     handles, _ = axes[0].get_legend_handles_labels()
@@ -48,7 +56,7 @@ def level_band(experiment: Experiment, evidence: Evidence) -> Figure:
 
 def policy_gap(experiment: Experiment, evidence: Evidence) -> Figure:
     """Both regions of Figure 3.4 for each study, and how many runs have settled."""
-    figure = drawing.new_figure(1.0 + 0.32 * len(experiment.studies))
+    figure = drawing.new_figure(1.2 + 0.32 * len(experiment.studies))
     left, right = figure.subplots(1, 2, sharey=True, width_ratios=(2, 1))
     for ax in (left, right):
         drawing.prepare(ax)
@@ -71,15 +79,19 @@ def policy_gap(experiment: Experiment, evidence: Evidence) -> Figure:
             va="center", fontsize=drawing.TINY,
         )  # fmt: skip
     left.set_yticks(range(len(experiment.studies)),
-                    [study.label for study in experiment.studies])  # fmt: skip
+                    [in_greek(study.label) for study in experiment.studies])  # fmt: skip
     left.invert_yaxis()
     left.set_xscale("log")
-    left.set_xlabel(
-        "level in q: bounds while u* leads (blue) and\nwhile the second leads (orange); "
-        "runs (dots)",
-        fontsize=drawing.TINY,
-    )
+    left.set_xlabel(r"level $\tau$ in q", fontsize=SMALL)
     right.set_xlim(0.0, 1.2)
-    right.set_xlabel("runs that keep u* to the end\n(blue: gap > 0)",
-                     fontsize=drawing.TINY)  # fmt: skip
+    right.set_xlabel("share of runs that keep u* to the end", fontsize=SMALL)
+    wide: dict[str, Any] = {"linewidth": 4}
+    handles = [
+        Line2D([], [], color=_BOUND, **wide, label="bounds while u* leads"),
+        Line2D([], [], color=_SECOND, **wide, label="bounds while the second leads"),
+        Line2D([], [], color=_MEAN, marker=".", linestyle="", label="mean of a run"),
+        Patch(color=_BOUND, label=r"$\Delta$ > 0"),
+        Patch(color="0.6", label=r"$\Delta$ < 0"),
+    ]
+    drawing.legend(figure, handles, ncols=5, loc="outside lower center")
     return figure

@@ -1,0 +1,78 @@
+"""Whether a call has anything left to do."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+from acl_gym.experiments.fingerprint import ROOT
+from acl_gym.experiments.runner import Task
+from acl_gym.reproduction.page import (
+    ANIMATED,
+    ANIMATION,
+    FIGURES,
+    PAGE,
+    RESULTS,
+    read_outcome,
+)
+from acl_gym.reproduction.store import ParquetStore
+from acl_gym.storage import write_atomically
+
+FINISHED = "finished.json"
+
+
+def stamp(tasks: Iterable[Task], figures: Iterable[str]) -> str:
+    """A hash over all that a folder is made from: runs, figures, the package's files."""
+    digest = hashlib.sha256(json.dumps(sorted(figures)).encode())
+    for task in tasks:
+        digest.update(task.key.encode())
+    for path in sorted(ROOT.rglob("*")):
+        if path.suffix in (".py", ".j2"):
+            digest.update(path.relative_to(ROOT).as_posix().encode())
+            digest.update(path.read_bytes())
+    return digest.hexdigest()
+
+
+def begin(directory: Path) -> None:
+    """What is in the folder is about to change; what was half written goes."""
+    (directory / FINISHED).unlink(missing_ok=True)
+    for folder in (directory, directory / FIGURES):
+        for half in folder.glob(".*.tmp"):
+            half.unlink()
+
+
+def finish(directory: Path, made_from: str) -> None:
+    """All of the folder has been made from this."""
+    text = json.dumps({"stamp": made_from})
+    write_atomically(directory / FINISHED, text.encode())
+
+
+def finished(
+    directory: Path, store: ParquetStore, tasks: Sequence[Task], figures: Sequence[str]
+) -> dict[str, Any] | None:
+    """The outcome in a folder if all of it is there, made from this; None otherwise.
+
+    Args:
+        directory: of the outcome.
+        store: of the runs.
+        tasks: all runs.
+        figures: the names of the experiments that are drawn; none, and no page is
+            looked for either.
+    """
+    try:
+        said = json.loads((directory / FINISHED).read_text())["stamp"]
+        outcome = read_outcome(directory)
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
+    files = [directory / RESULTS]
+    if figures:
+        files += [directory / PAGE, directory / "claims.md"]
+        folder = directory / FIGURES
+        files += [folder / f"{n}.{kind}" for n in figures for kind in ("png", "svg")]
+        files += [folder / ANIMATION] if ANIMATED in figures else []
+    if said != stamp(tasks, figures) or not all(path.is_file() for path in files):
+        return None
+    return outcome if all(store.has(task) for task in tasks) else None

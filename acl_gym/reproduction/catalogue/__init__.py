@@ -9,6 +9,7 @@ from acl_gym.reproduction.catalogue import (
     grids,
     navigation,
     pendulum,
+    versus,
 )
 from acl_gym.reproduction.settings import Experiment
 
@@ -20,6 +21,7 @@ EXPERIMENTS: tuple[Experiment, ...] = (
     *navigation.EXPERIMENTS,
     *pendulum.EXPERIMENTS,
     *beside.EXPERIMENTS,
+    *versus.EXPERIMENTS,
 )
 
 BY_NAME = {experiment.name: experiment for experiment in EXPERIMENTS}

@@ -17,7 +17,8 @@ from acl_gym.reproduction import reproduce as reproduction
 from acl_gym.reproduction.catalogue import BY_NAME
 from acl_gym.reproduction.reproduce import tasks_for
 from acl_gym.reproduction.store import ParquetStore
-from acl_gym.reproduction.versus.arenas import ARENAS, LABELS, SYSTEMS, Arena
+from acl_gym.reproduction.versus.arena import Arena
+from acl_gym.reproduction.versus.arenas import ARENAS, LABELS, SYSTEMS
 from acl_gym.reproduction.versus.contest import (
     COLUMNS,
     Contest,

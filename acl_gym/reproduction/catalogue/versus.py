@@ -171,7 +171,7 @@ EXPERIMENTS = (
         "versus-cells",
         "Coarse partitions: pendulum",
         ("pendulum-10x11", "pendulum-16x17", "pendulum-24x25", "pendulum-40x41"),
-        "A million interactions with ever more cells.",
+        "As many interactions with ever more cells.",
         drawing="sweep",
         of="Cells",
         x=(110, 272, 600, 1640),

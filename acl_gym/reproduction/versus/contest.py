@@ -21,7 +21,7 @@ from acl_gym.agents.tabular import TabularAgent
 from acl_gym.callbacks import Callback, Row
 from acl_gym.evaluation import evaluate_policy_cost
 from acl_gym.reproduction.settings import Learner, Result
-from acl_gym.reproduction.versus.arenas import Arena
+from acl_gym.reproduction.versus.arena import Arena
 from acl_gym.reproduction.versus.spaces import METHODS
 from acl_gym.reproduction.versus.veils import Backwards, BackwardsLuck
 from acl_gym.reproduction.versus.wholes import WHOLES
@@ -30,9 +30,6 @@ Report = Callable[[float], None]
 
 COLUMNS = ("env_steps", "seconds", "policy_cost", "success_rate")
 """What is kept of each evaluation; seconds are those of learning, without it."""
-
-SPACING = 1.04
-"""A policy is evaluated when interactions have grown by this factor since the last."""
 
 POINTS = 120
 """Points of the curves that a report draws."""
@@ -237,7 +234,7 @@ class Evaluation(Callback):
             )
             found = {"policy_cost": result.cost, "success_rate": result.success_rate}
             self.rows.append({**row, **found})
-            self._due = SPACING * done
+            self._due = self._arena.spacing * done
         self._report(min(1.0, done / self._arena.steps))
         return True
 

@@ -16,7 +16,7 @@ from acl_gym.agents.q_iteration import fuzzy_q_iteration
 from acl_gym.agents.value_iteration import value_iteration
 from acl_gym.evaluation import evaluate_policy_cost
 from acl_gym.reproduction.settings import Learner, Result
-from acl_gym.reproduction.versus.arenas import Arena
+from acl_gym.reproduction.versus.arena import Arena
 
 
 @dataclass(frozen=True)

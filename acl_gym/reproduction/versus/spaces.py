@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from acl_gym.reproduction.versus.arenas import Arena
+from acl_gym.reproduction.versus.arena import Arena
 
 METHODS = {"acl": "ACL", "q": "Q-learning", "q-lambda": "Q(λ)", "dqn": "DQN"}
 """The methods and what they are called."""

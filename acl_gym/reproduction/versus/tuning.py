@@ -19,7 +19,8 @@ from typing import Any
 import numpy as np
 
 from acl_gym.experiments.runner import versions
-from acl_gym.reproduction.versus.arenas import ARENAS, Arena
+from acl_gym.reproduction.versus.arena import Arena
+from acl_gym.reproduction.versus.arenas import ARENAS
 from acl_gym.reproduction.versus.contest import Contest, learn
 from acl_gym.reproduction.versus.spaces import (
     Choice,

@@ -105,14 +105,12 @@ def evaluate_policy_cost(
     require_predictor(model)
     require_vector_env(env)
     base = env.unwrapped
-    wrapped = base is not env
     if isinstance(base, ControlVectorEnv):
         if states is None:
             states = base.system.evaluation_states()
         if max_steps is None:
             max_steps = base.system.evaluation_steps
-        if not wrapped and env.num_envs != len(states):
-            env = base.with_slots(len(states))
+        env = with_slots_for(env, states)
     elif states is not None:
         raise ValueError(
             "states can only be set in environments of acl_gym, got "
@@ -131,6 +129,30 @@ def evaluate_policy_cost(
         observation = walk.step(actions).observation
     costs = walk.cost if whole is None else solution_costs(whole, walk.episodes())
     return PolicyCost(costs, walk.success, walk.length)
+
+
+def with_slots_for(
+    env: VectorEnv[Any, Any, Any], states: FloatArray | None = None
+) -> VectorEnv[Any, Any, Any]:
+    """An environment that has a slot for each initial state of an evaluation.
+
+    Who evaluates often asks once, and hands it to `evaluate_policy_cost` each time.
+
+    Args:
+        env: where to evaluate.
+        states: initial states; None takes `evaluation_states()` of an environment of
+            this package.
+
+    Returns:
+        A new environment of the same system, or `env` itself where it has as many
+        slots already, is wrapped, or is of another package.
+    """
+    base = env.unwrapped
+    if base is not env or not isinstance(base, ControlVectorEnv):
+        return env
+    if states is None:
+        states = base.system.evaluation_states()
+    return env if env.num_envs == len(states) else base.with_slots(len(states))
 
 
 def _chosen(model: Predictor, observation: Any, walk: Walk) -> NDArray[np.int64]:

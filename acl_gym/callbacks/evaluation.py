@@ -15,7 +15,12 @@ from acl_gym import storage, validation
 from acl_gym.agents.policy import TablePolicy
 from acl_gym.agents.walk import require_vector_env
 from acl_gym.callbacks.base import Callback, Row
-from acl_gym.evaluation import PolicyCost, Predictor, evaluate_policy_cost
+from acl_gym.evaluation import (
+    PolicyCost,
+    Predictor,
+    evaluate_policy_cost,
+    with_slots_for,
+)
 
 if TYPE_CHECKING:
     from acl_gym.agents.tabular import TabularAgent
@@ -78,6 +83,7 @@ class PolicyEvaluation(Callback):
         self.seed = seed
         self.policy = policy
         self.env = env
+        self._env: VectorEnv[Any, Any, Any] | None = None  # with a slot a state
         self.states = states
         self.every = validation.integer("every", every, at_least=1)
         if max_steps is not None:
@@ -110,9 +116,11 @@ class PolicyEvaluation(Callback):
         policy = agent if self.policy is None else self.policy(agent)
         if policy is agent:
             policy = agent.policy
+        if self._env is None:
+            self._env = with_slots_for(self.env, self.states)
         result = evaluate_policy_cost(
             policy,
-            self.env,
+            self._env,
             self.states,
             max_steps=self.max_steps,
             seed=self.seed,

@@ -18,6 +18,7 @@ import queue
 import signal
 import subprocess
 import threading
+import time
 from collections.abc import Callable, Generator, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
@@ -25,6 +26,7 @@ from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from functools import cache, partial
 from importlib.metadata import version
+from itertools import islice
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -189,6 +191,10 @@ def _keep(store: Store, task: Task, result: Result) -> None:
         ) from error
 
 
+AHEAD = 4
+"""Tasks that wait or run for each worker."""
+
+
 def in_processes(tasks: list[Task], tell: Progress, *, workers: int) -> Finished:
     """Run tasks in processes of this machine; an `Executor` with so many workers."""
     # Spawned, not forked: a fork after torch or OpenMP has started may hang.
@@ -200,11 +206,15 @@ def in_processes(tasks: list[Task], tell: Progress, *, workers: int) -> Finished
         initializer=_start_worker,
         initargs=(reports,),
     ) as pool:
-        waiting: dict[Future[Result], Task] = {
-            pool.submit(_run_one, task): task for task in tasks
-        }
+        waiting: dict[Future[Result], Task] = {}
+        left = iter(tasks)
         try:
-            while waiting:
+            while True:
+                # A few ahead: to watch thousands at once would keep this process busy.
+                for task in islice(left, AHEAD * workers - len(waiting)):
+                    waiting[pool.submit(_run_one, task)] = task
+                if not waiting:
+                    return
                 done, _ = wait(waiting, timeout=0.2, return_when=FIRST_COMPLETED)
                 _pass_on(reports, tell)
                 for future in done:
@@ -230,6 +240,9 @@ def _outcome(task: Task, future: Future[Result]) -> Result:
         raise TaskFailedError(f"{task.name} failed: {error}") from error
 
 
+PAUSE = 0.2
+"""Seconds between two reports of a task."""
+
 _reports: Any = None  # the queue of this worker process
 
 
@@ -253,12 +266,12 @@ def _end_with_parent() -> None:
 
 
 def _run_one(task: Task) -> Result:
-    told = 0.0
+    heard = time.monotonic()
 
     def report(fraction: float) -> None:
-        nonlocal told
-        if fraction - told >= 0.01:  # not every step needs to be heard of
-            told = fraction
+        nonlocal heard
+        if time.monotonic() - heard >= PAUSE:  # not every step needs to be heard of
+            heard = time.monotonic()
             _reports.put((task.name, fraction))
 
     return task.function(*task.arguments, report)

@@ -111,8 +111,13 @@ def test_several_arenas(name: str) -> None:
     rows = experiment.options["rows"]
     assert [row[0] for row in found["rows"]] == list(rows)
     assert all(len(row) == len(found["headings"]) for row in found["rows"])
-    count = f"Of {2 * len(rows)} duels of ACL: {len(rows)} won, {len(rows)} lost."
-    assert count in found["sentences"]
+    names = ["ACL"] + ["ACL, 4 times the interactions"] * (name != "slots")
+    for each in names:
+        count = (
+            f"Of {2 * len(rows)} duels of {each}: {len(rows)} won, {len(rows)} lost."
+        )
+        assert count in found["sentences"]
+    assert len(found["duels"]) == 2 * len(rows) * len(names)
     json.dumps(found, allow_nan=False)
 
 

@@ -214,6 +214,12 @@ def test_experiments_are_those_of_the_issue() -> None:
     for name in names[4:]:
         assert {s.setting.method for s in BY_NAME[name].studies} == set(TABLES)
         assert {s.setting.most_runs for s in BY_NAME[name].studies} == {10}
+    for name in names[4:8]:
+        for row in BY_NAME[name].options["rows"].values():
+            short, long = row["acl"], row["acl-long"]
+            assert long.settings == short.settings
+            assert long.arena.steps == 4 * short.arena.steps
+            assert all(row[m].arena == short.arena for m in TABLES)
 
 
 def test_two_runs_of_an_experiment_from_its_name_to_its_findings(

@@ -11,17 +11,24 @@ from acl_gym.reproduction.settings import Experiment, Study
 from acl_gym.reproduction.versus.arenas import ARENAS, LABELS, SYSTEMS
 from acl_gym.reproduction.versus.contest import Contest
 from acl_gym.reproduction.versus.reference import Reference
-from acl_gym.reproduction.versus.spaces import METHODS, TABLES
+from acl_gym.reproduction.versus.spaces import LONG, METHODS, NAMES, TABLES
 from acl_gym.reproduction.versus.tuned import methods_in, settings_of
 
 FEWER_RUNS = 10
 """Of each contest outside of the four systems."""
+
+MORE = 4
+"""How many times the interactions of the others ACL gets in its long contests."""
 
 SLOTS = (25, 100, 400, 1600)
 
 _TUNED = (
     "Each method with the best of 16 settings that the same search found for it here, "
     "its defaults among them, with other seeds (docs/versus.md)."
+)
+_LONG = (
+    "The methods get the same number of interactions; ACL is run a second time with four "
+    "times as many and the same settings, to see whether it lacks no more than these."
 )
 _JUDGED = (
     "ACL wins or loses where the 95% bootstrap interval of the ratio of interquartile "
@@ -84,10 +91,20 @@ def _harder(
     name: str, title: str, arenas: tuple[str, ...], text: str, **options: object
 ) -> Experiment:
     rows = {
-        LABELS[arena]: {method: contest(arena, method) for method in TABLES}
+        LABELS[arena]: {
+            **{method: contest(arena, method) for method in TABLES},
+            LONG: _long(arena),
+        }
         for arena in arenas
     }
-    return _of_rows(name, title, rows, f"{text} {_TUNED} {_JUDGED}", **options)
+    text = f"{text} {_LONG} {_TUNED} {_JUDGED}"
+    return _of_rows(name, title, rows, text, **options)
+
+
+def _long(name: str) -> Contest:
+    """ACL with the same settings and `MORE` times the interactions."""
+    short = contest(name, "acl")
+    return replace(short, arena=replace(short.arena, steps=MORE * short.arena.steps))
 
 
 def _of_rows(
@@ -103,7 +120,7 @@ def _of_rows(
         title,
         "§7.3",
         tuple(
-            Study(f"{label}, {METHODS[method]}", setting)
+            Study(f"{label}, {NAMES[method]}", setting)
             for label, row in rows.items()
             for method, setting in row.items()
         ),

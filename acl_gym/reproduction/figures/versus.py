@@ -16,15 +16,17 @@ from acl_gym.reproduction.settings import Experiment
 from acl_gym.reproduction.verdicts import interval
 from acl_gym.reproduction.versus.contest import Contest
 from acl_gym.reproduction.versus.findings import contests, reference_of
-from acl_gym.reproduction.versus.spaces import METHODS
+from acl_gym.reproduction.versus.spaces import LONG, NAMES
 
 _STYLES = {
     "acl": STYLES["acl-fuzzy"],
     "q": STYLES["q-fuzzy"],
     "q-lambda": STYLES["q-lambda-fuzzy"],
     "dqn": STYLES["dqn"],
+    LONG: STYLES["acl-crisp"],
 }
-_MARKERS = {"acl": "o", "q": "s", "q-lambda": "^", "dqn": "D"}
+_MARKERS = {LONG: "P", "acl": "o", "q": "s", "q-lambda": "^", "dqn": "D"}
+_SHORT = {"acl": "ACL", "q": "Q", "q-lambda": "Q(λ)", "dqn": "DQN", LONG: "4 ACL"}
 _POINTS = 300
 
 
@@ -44,7 +46,7 @@ def race(experiment: Experiment, evidence: Evidence) -> Figure:
         ax.set_xlabel(label, fontsize=SMALL)
         ax.axhline(cost, **drawing.BOUND)
     drawing.prepare(last)
-    _strips(last, found.values(), evidence)
+    _strips(last, {each.method: each for each in found.values()}, evidence)
     last.axhline(cost, **drawing.BOUND)  # its own scale: they are close together
     last.set_xlabel("last policies", fontsize=SMALL)
     last.set_yscale("log")
@@ -86,7 +88,7 @@ def harder(experiment: Experiment, evidence: Evidence) -> Figure:
     axes = figure.subplots(1, len(rows), squeeze=False)[0]
     for ax, (label, row) in zip(axes, rows.items(), strict=True):
         drawing.prepare(ax)
-        _strips(ax, row.values(), evidence)
+        _strips(ax, row, evidence)
         ax.set_yscale("log")
         drawing.plain_log(ax.yaxis, sparse=True)
         first, _, rest = label.partition(", ")
@@ -153,12 +155,11 @@ def order(experiment: Experiment, evidence: Evidence) -> Figure:
     return figure
 
 
-def _strips(ax: Axes, found: Any, evidence: Evidence) -> None:
+def _strips(ax: Axes, row: dict[str, Contest], evidence: Evidence) -> None:
     """Every run's last cost beside the interquartile mean with its interval."""
-    found = list(found)
-    for place, contest in enumerate(found):
+    for place, (name, contest) in enumerate(row.items()):
         costs = evidence.last(contest)
-        color, marker = _STYLES[contest.method].color, _MARKERS[contest.method]
+        color, marker = _STYLES[name].color, _MARKERS[name]
         spread = np.linspace(-0.16, 0.16, len(costs)) if len(costs) > 1 else [0.0]
         ax.plot(
             place - 0.12 + np.asarray(spread), costs, linestyle="", marker=marker,
@@ -170,12 +171,8 @@ def _strips(ax: Axes, found: Any, evidence: Evidence) -> None:
             [[middle.value - middle.low], [middle.high - middle.value]],
             color=color, marker=marker, markersize=4, capsize=2, linewidth=1.2,
         )  # fmt: skip
-    ax.set_xlim(-0.6, len(found) - 0.4)
-    ax.set_xticks(range(len(found)), labels=[_initial(each) for each in found])
-
-
-def _initial(contest: Contest) -> str:
-    return {"q": "Q"}.get(contest.method, METHODS[contest.method])
+    ax.set_xlim(-0.6, len(row) - 0.4)
+    ax.set_xticks(range(len(row)), labels=[_SHORT.get(each, each) for each in row])
 
 
 def _line(method: str) -> dict[str, Any]:
@@ -186,7 +183,7 @@ def _line(method: str) -> dict[str, Any]:
 def _legend(figure: Figure, methods: list[str]) -> None:
     handles = [
         Line2D(
-            [], [], marker=_MARKERS[method], markersize=4, label=METHODS[method],
+            [], [], marker=_MARKERS[method], markersize=4, label=NAMES[method],
             **_line(method),
         )
         for method in methods

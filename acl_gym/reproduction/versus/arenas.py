@@ -60,8 +60,7 @@ HARDER = {
 }
 """Where ACL might win: coarse cells, noise, partial state, costs of whole solutions.
 
-Interactions are as many as colonies need on the pendulum to settle: how fast methods are is
-measured on the systems as they are, here it is how far they come.
+How fast methods are is measured on the systems as they are, here it is how far they come.
 """
 
 ARENAS = {**SYSTEMS, **HARDER}

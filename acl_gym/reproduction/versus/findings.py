@@ -18,7 +18,7 @@ from acl_gym.reproduction.settings import Experiment
 from acl_gym.reproduction.verdicts import Interval, interval, iqm, ratio
 from acl_gym.reproduction.versus.contest import Contest
 from acl_gym.reproduction.versus.reference import Reference
-from acl_gym.reproduction.versus.spaces import METHODS
+from acl_gym.reproduction.versus.spaces import LONG, METHODS, NAMES
 
 Findings = dict[str, Any]
 """`headings` and `rows` of a table, `sentences`, `duels`; JSON types."""
@@ -37,6 +37,7 @@ NEITHER = "neither"
 """Of times: neither gets there in more than half of its runs."""
 
 NEVER = "–"
+_LAST = "cost of the last policy"
 
 
 class Duel(NamedTuple):
@@ -48,6 +49,7 @@ class Duel(NamedTuple):
         rival: the other method's name.
         verdict: WINS, LOSES, EVEN, NEITHER or OPEN, of ACL.
         ratio: how many times the rival's that of ACL is.
+        who: ACL's name here.
     """
 
     where: str
@@ -55,6 +57,7 @@ class Duel(NamedTuple):
     rival: str
     verdict: str
     ratio: Interval
+    who: str = "ACL"
 
     def as_json(self) -> dict[str, Any]:
         """As JSON types; None is infinite."""
@@ -69,24 +72,29 @@ class Duel(NamedTuple):
         """A sentence."""
         at = f"{self.where}: " if self.where else ""
         if self.verdict == OPEN:
-            return f"{at}{self.measure}: too few runs to tell ACL from {self.rival}."
+            return f"{at}{self.measure}: too few runs to tell {self.who} from {self.rival}."
         if self.verdict == NEITHER:
             return (
-                f"{at}{self.measure}: neither ACL nor {self.rival} gets there in most "
-                "runs."
+                f"{at}{self.measure}: neither {self.who} nor {self.rival} gets there in "
+                "most runs."
             )
         if self.verdict == EVEN:
-            text = f"no difference between ACL and {self.rival}"
+            text = f"no difference between {self.who} and {self.rival}"
         else:
             end = "against" if self.verdict == WINS else "to"
-            text = f"ACL {self.verdict} {end} {self.rival}"
+            text = f"{self.who} {self.verdict} {end} {self.rival}"
         if _tellable(self.ratio.value):
             return f"{at}{self.measure}: {text}, {times(self.ratio)}."
         return f"{at}{self.measure}: {text}."
 
 
 def duel(
-    where: str, measure: str, rival: str, acl: FloatArray, other: FloatArray
+    where: str,
+    measure: str,
+    rival: str,
+    acl: FloatArray,
+    other: FloatArray,
+    who: str = "ACL",
 ) -> Duel:
     """Hold ACL against a rival.
 
@@ -96,6 +104,7 @@ def duel(
         rival: the name of the other method.
         acl: one value a run, > 0 or infinite.
         other: the same of the rival.
+        who: ACL's name here.
     """
     found = ratio(acl, other)
     if min(len(acl), len(other)) < FEW:
@@ -108,7 +117,7 @@ def duel(
         verdict = WINS
     else:
         verdict = EVEN
-    return Duel(where, measure, rival, verdict, found)
+    return Duel(where, measure, rival, verdict, found, who)
 
 
 def times(found: Interval) -> str:
@@ -164,7 +173,7 @@ def system(experiment: Experiment, evidence: Evidence) -> Findings:
         runs = evidence.runs(contest)
         last = evidence.last(contest)
         best = np.array([min(run["rows"]["policy_cost"]) for run in runs])
-        own = {"cost of the last policy": last, "cost of the best policy": best}
+        own = {_LAST: last, "cost of the best policy": best}
         cells = [
             label,
             str(interval(last)),
@@ -224,12 +233,15 @@ def _time(at: FloatArray, x: str) -> str:
 def harder(experiment: Experiment, evidence: Evidence) -> Findings:
     """Several arenas: the cost of the last policy, ACL against each rival."""
     rows, duels = [], []
-    for where, row in experiment.options["rows"].items():
-        last = {method: evidence.last(contest) for method, contest in row.items()}
+    table = experiment.options["rows"]
+    names = list(next(iter(table.values())))
+    colonies = [name for name in names if name in ("acl", LONG)]
+    pairs = [(one, m) for one in colonies for m in names if m not in colonies]
+    for where, row in table.items():
+        last = {name: evidence.last(contest) for name, contest in row.items()}
         own = [
-            duel(where, "cost of the last policy", METHODS[m], last["acl"], values)
-            for m, values in last.items()
-            if m != "acl"
+            duel(where, _LAST, NAMES[m], last[one], last[m], NAMES[one])
+            for one, m in pairs
         ]
         rows.append(
             [
@@ -239,15 +251,18 @@ def harder(experiment: Experiment, evidence: Evidence) -> Findings:
             ]
         )
         duels += own
-    methods = [METHODS[m] for m in next(iter(experiment.options["rows"].values()))]
+    counts = [
+        _count([each for each in duels if each.who == NAMES[one]], NAMES[one])
+        for one in colonies
+    ]
     return {
         "headings": [
             experiment.options.get("of", "Where"),
-            *methods,
-            *(f"ACL against {name}" for name in methods if name != "ACL"),
+            *(NAMES[name] for name in names),
+            *(f"{NAMES[one]}, against {NAMES[m]}" for one, m in pairs),
         ],
         "rows": rows,
-        "sentences": [_count(duels), *map(str, duels)],
+        "sentences": [*counts, *map(str, duels)],
         "duels": [each.as_json() for each in duels],
     }
 
@@ -280,7 +295,7 @@ def overview(experiment: Experiment, evidence: Evidence) -> Findings:
     return {
         **found,
         "sentences": [
-            f"cost of the last policy: {found['sentences'][0]}",
+            f"{_LAST}: {found['sentences'][0]}",
             *sentences,
             *found["sentences"][1:],
             *map(str, duels),
@@ -289,7 +304,7 @@ def overview(experiment: Experiment, evidence: Evidence) -> Findings:
     }
 
 
-def _count(duels: Iterable[Duel]) -> str:
+def _count(duels: Iterable[Duel], who: str = "ACL") -> str:
     """How often ACL wins and loses."""
     verdicts = [each.verdict for each in duels]
     parts = [
@@ -303,7 +318,7 @@ def _count(duels: Iterable[Duel]) -> str:
         )
         if verdicts.count(word)
     ]
-    return f"Of {len(verdicts)} duels of ACL: {', '.join(parts)}."
+    return f"Of {len(verdicts)} duels of {who}: {', '.join(parts)}."
 
 
 def slots(experiment: Experiment, evidence: Evidence) -> Findings:

@@ -13,6 +13,12 @@ from acl_gym.reproduction.versus.arena import Arena
 METHODS = {"acl": "ACL", "q": "Q-learning", "q-lambda": "Q(λ)", "dqn": "DQN"}
 """The methods and what they are called."""
 
+LONG = "acl-long"
+"""ACL with more interactions than the others: whether it is only these that it lacks."""
+
+NAMES = {**METHODS, LONG: "ACL, 4 times the interactions"}
+"""What there is in tables and figures, and what it is called."""
+
 TABLES = ("acl", "q", "q-lambda")
 """Those that keep a table over a partition."""
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import threading
 import time
 from typing import Any
 
@@ -28,6 +29,7 @@ class Announcer(Listener):
         self._depth = 0  # a kernel that calls another compiles it in between
         self._began = 0.0
         self._told = False
+        self._timer: threading.Timer | None = None
 
     def on_start(self, event: Event) -> None:
         """A kernel begins to be compiled."""
@@ -35,6 +37,12 @@ class Announcer(Listener):
             return
         if self._depth == 0:
             self._began = time.perf_counter()
+            if not self._told:
+                # A single kernel may take longer than the patience.
+                wait = max(0.0, PATIENCE - self.seconds)
+                self._timer = threading.Timer(wait, self._tell)
+                self._timer.daemon = True
+                self._timer.start()
         self._depth += 1
 
     def on_end(self, event: Event) -> None:
@@ -45,11 +53,16 @@ class Announcer(Listener):
         if self._depth:
             return
         self.seconds += time.perf_counter() - self._began
-        if self.seconds > PATIENCE and not self._told:
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
+
+    def _tell(self) -> None:
+        if not self._told:
             self._told = True
             logger.warning(
-                "acl-gym compiles its kernels when they are first used, some ten "
-                "seconds in all; they are kept on disk for the next time."
+                "acl-gym compiles its kernels when they are first used, which may take "
+                "half a minute in all; they are kept on disk for the next time."
             )
 
 

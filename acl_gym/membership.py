@@ -30,6 +30,7 @@ there are (a circular axis repeats its first centre at the end, one period on), 
 number of cells, its period (0: none), and 1 / spacing (0: irregular)."""
 
 MOST_WRITTEN_OUT = 16
+"""The longest loop that `written_out` writes out."""
 
 MOST_COUNTED = 32
 """Irregular centres up to which counting those that are passed, a vectorised loop for
@@ -250,7 +251,7 @@ def locate(
     """Fill rows of `index` and `degree`; return a slot that is not finite, or -1.
 
     `axes` holds tuples, so that the number of axes is known when the kernel is compiled
-    and the loops over the corners of a cell are written out.
+    and the loops over them are written out.
     """
     ends, reals = scratch_for(len(axes[0]))
     for block in range((slots.size + BLOCK - 1) // BLOCK):

@@ -40,9 +40,9 @@ def set_num_threads(count: int) -> None:
         most = int(getattr(config, "NUMBA_NUM_THREADS", 1))
         if count > most:
             raise ValueError(
-                f"count must be at most {most}, one thread a core, got {count}; set "
-                "the environment variable NUMBA_NUM_THREADS before Python starts to "
-                "allow more."
+                f"count must be at most {most}, got {count}: one thread a core, or what "
+                "the environment variable NUMBA_NUM_THREADS says; set it before Python "
+                "starts to allow more."
             )
         numba.set_num_threads(count)
     _Setting.count = count

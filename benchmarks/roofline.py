@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib.ticker import NullFormatter, ScalarFormatter
 from numba import njit
 from rich.console import Console
 from rich.table import Table
@@ -252,8 +253,9 @@ def draw_roofline(
         (19, arithmetic / 1e9 * 1.12), ha="right", fontsize=drawing.TINY,
     )  # fmt: skip
     ax.annotate(
-        f"cache: {bandwidth / 1e9:.0f} GB/s", (0.055, 0.055 * bandwidth / 1e9 * 1.35),
-        rotation=32, fontsize=drawing.TINY,
+        f"cache: {bandwidth / 1e9:.0f} GB/s", (0.06, 0.06 * bandwidth / 1e9),
+        xytext=(-4, 8), textcoords="offset points", rotation=45, va="bottom",
+        rotation_mode="anchor", transform_rotates_text=True, fontsize=drawing.TINY,
     )  # fmt: skip
     colors = ("#D55E00", "#0072B2", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
     for number, result in enumerate(results):
@@ -262,12 +264,19 @@ def draw_roofline(
         rate = kernel.operations / result.ns
         color = colors[number % len(colors)]
         ax.plot(intensity, rate, marker="o", markersize=5, color=color)
-        left = kernel.name in ("locate, 16 cells a state", "decay, 4 cells")
-        ax.annotate(  # beside its neighbour, not over it
+        # On the side on which its nearest neighbour is not.
+        others = [r for r in results if r is not result]
+        nearest = min(others, key=lambda r: _apart(r, result))
+        left = nearest.kernel.operations / nearest.kernel.nbytes > intensity
+        ax.annotate(
             str(number + 1), (intensity, rate), xytext=(-5 if left else 5, -3),
             ha="right" if left else "left", textcoords="offset points",
             fontsize=drawing.SMALL, color=color,
         )  # fmt: skip
+    for axis in (ax.xaxis, ax.yaxis):
+        axis.set_major_formatter(ScalarFormatter())
+        axis.set_minor_formatter(NullFormatter())
+    ax.tick_params(labelsize=drawing.TINY)
     names = [f"{n + 1}  {r.kernel.name}" for n, r in enumerate(results)]
     figure.text(1.01, 0.5, "\n".join(names), fontsize=drawing.TINY, va="center",
                 linespacing=1.7)  # fmt: skip
@@ -276,31 +285,39 @@ def draw_roofline(
     figure.savefig(path, dpi=200, bbox_inches="tight")
 
 
+def _apart(one: Result, other: Result) -> float:
+    """How far apart two points of the figure are, on its logarithmic axes."""
+    ratios = (
+        one.kernel.operations / one.kernel.nbytes * other.kernel.nbytes
+        / other.kernel.operations,
+        one.kernel.operations / one.ns * other.ns / other.kernel.operations,
+    )  # fmt: skip
+    return float(np.hypot(*np.log(ratios)))
+
+
 def draw_scaling(path: Path) -> None:
     """Cost over ants, actions, cells a state, and cells of the table."""
     figure = drawing.new_figure(4.6)
     axes = figure.subplots(2, 2)
     colors = {"locate": "#0072B2", "select": "#D55E00", "decay": "#009E73"}
 
-    def panel(
-        ax: Any, title: str, label: str, xs: Any, make: Any, scale: float
-    ) -> None:
+    def panel(ax: Any, unit: str, label: str, xs: Any, make: Any, scale: float) -> None:
         drawing.prepare(ax)
         made = [make(x) for x in xs]
         runs = [getattr(ants, name) for name in colors for ants in made]
         times = np.reshape(seconds(*runs), (len(colors), len(xs))) * scale
         for (name, color), ys in zip(colors.items(), times, strict=True):
             ax.plot(xs, ys, marker=".", color=color, linewidth=1.2, label=name)
-        ax.set_title(title, fontsize=drawing.SMALL, loc="left")
+        ax.set_ylabel(unit, fontsize=drawing.SMALL)
         ax.set_xlabel(label, fontsize=drawing.SMALL)
         ax.set_ylim(bottom=0)
         ax.set_xlim(left=0)
 
-    panel(axes[0, 0], "microseconds a step of all ants", "ants",
+    panel(axes[0, 0], "microseconds a step of all", "ants",
           [250, 1_000, 2_000, 4_000, 8_000], lambda n: Ants(2, 3, n), 1e6)  # fmt: skip
-    panel(axes[0, 1], "nanoseconds an ant-step", "actions",
+    panel(axes[0, 1], "ns an ant-step", "actions",
           [2, 4, 6, 8, 12, 16], lambda u: Ants(2, u), 1e9 / ANTS)  # fmt: skip
-    panel(axes[1, 0], "nanoseconds an ant-step", "cells a state, 2$^d$", [2, 4, 8, 16],
+    panel(axes[1, 0], "ns an ant-step", "cells a state, 2$^d$", [2, 4, 8, 16],
           lambda k: Ants(k.bit_length() - 1, 3), 1e9 / ANTS)  # fmt: skip
     ax = axes[1, 1]
     drawing.prepare(ax)
@@ -318,7 +335,7 @@ def draw_scaling(path: Path) -> None:
     ax.legend(title="ants walk", fontsize=drawing.TINY, title_fontsize=drawing.TINY,
               frameon=False)  # fmt: skip
     ax.set_ylim(bottom=0)
-    ax.set_title("deposit: nanoseconds an ant-step", fontsize=drawing.SMALL, loc="left")
+    ax.set_ylabel("deposit: ns an ant-step", fontsize=drawing.SMALL)
     ax.set_xlabel("cells of the table", fontsize=drawing.SMALL)
     handles, labels = axes[0, 0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper center", ncols=3, frameon=False,
@@ -331,10 +348,15 @@ def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--out", default=".", help="folder of the figures")
+    parser.add_argument(
+        "--out", default="docs/figures", help="folder of the figures  [%(default)s]"
+    )
     options = parser.parse_args(arguments)
     out = Path(options.out)
-    out.mkdir(parents=True, exist_ok=True)
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        parser.error(f"--out {out} cannot be made: {error.strerror}")
     arithmetic, bandwidth = roofs()
     results = measure(arithmetic, bandwidth)
     table = Table(

@@ -38,7 +38,6 @@ class Plan:
         n_ants: slots of the environment.
         make: builds the work; building is not measured.
         reference: the name of the case that the ratio is to; "" for none.
-        repetitions: at most so many; 0: as many as asked for.
         by_seconds: the ratio is that of the seconds of one repetition, not of steps.
     """
 
@@ -47,7 +46,6 @@ class Plan:
     n_ants: int
     make: Callable[[], Work]
     reference: str = ""
-    repetitions: int = 0
     by_seconds: bool = False
 
 
@@ -235,8 +233,13 @@ def plan(systems: list[str], sizes: list[int], dqn_steps: int) -> Iterator[Plan]
         ),
         alone("pendulum", 16) if 16 in sizes else "",
     )
-    dqn = f"DQN of Stable-Baselines3, {dqn_steps:,} steps"
-    yield Plan(dqn, "peers", 8, lambda: train_dqn(dqn_steps), repetitions=2)
+    from acl_gym.agents.dqn import DQNSettings
+
+    dqn, dqn_slots = (
+        f"DQN of Stable-Baselines3, {dqn_steps:,} steps",
+        DQNSettings().num_envs,
+    )
+    yield Plan(dqn, "peers", dqn_slots, lambda: train_dqn(dqn_steps))
     yield Plan(
         WHOLE_RUN,
         "pendulum",

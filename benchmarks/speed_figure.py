@@ -58,7 +58,7 @@ def draw(cases: list[dict[str, Any]], path: str) -> None:
     for ax in axes[:, 0]:
         ax.set_ylabel("slot-steps a second", fontsize=drawing.SMALL)
     for ax in axes[-1]:
-        ax.set_xlabel("ants", fontsize=drawing.SMALL)
+        ax.set_xlabel("ants, or slots", fontsize=drawing.SMALL)
     for ax in axes.flat[len(systems) :]:
         ax.set_visible(False)
     handles = [

@@ -1,9 +1,9 @@
 """How fast the colony walks and learns, beside others in the same run.
 
 Every figure is a median of several repetitions, on one thread unless its name says
-otherwise. A repetition goes through all cases before the next one begins, so that a
-slow moment of the machine hits them alike. Only the ratios mean something on another
-day or another machine.
+otherwise. A repetition goes through all cases, EnvPool's and gymnax's last, before the
+next one begins, so that a slow moment of the machine hits them alike. Only the ratios
+mean something on another day or another machine.
 """
 
 from __future__ import annotations
@@ -69,36 +69,44 @@ class Case:
     load: float
 
 
+Peers = dict[str, dict[str, Any]]
+"""By name of a case of another project: `n_ants`, and lists of `rates` and `loads`."""
+
+
 def measure(
-    plans: list[Plan], repetitions: int, progress: bool
-) -> dict[str, list[tuple[int, float, float]]]:
-    """Steps, seconds and load of each repetition of each case."""
+    plans: list[Plan], repetitions: int, progress: bool, with_peers: bool
+) -> tuple[dict[str, list[tuple[int, float, float]]], Peers]:
+    """Steps, seconds and load of each repetition of each case; and what peers do."""
     found: dict[str, list[tuple[int, float, float]]] = defaultdict(list)
-    works = {}
+    works, peers = {}, Peers()
     with tqdm(total=len(plans) * (repetitions + 1), disable=not progress) as bar:
         for one in plans:  # warm up: compile, fill caches
             works[one.name] = one.make()
             works[one.name]()
             bar.update()
-        for repetition in range(repetitions):
+        for _ in range(repetitions):
             for one in plans:
                 bar.update()
-                if one.repetitions and repetition >= one.repetitions:
-                    continue
                 start = time.perf_counter()
                 steps = works[one.name]()
                 seconds = time.perf_counter() - start
                 found[one.name].append((steps, seconds, os.getloadavg()[0]))
-    return found
+            for peer in measure_peers() if with_peers else []:
+                known = peers.setdefault(
+                    peer["name"], {"n_ants": peer["n_ants"], "rates": [], "loads": []}
+                )
+                known["rates"] += peer["rates"]
+                known["loads"].append(os.getloadavg()[0])
+    return found, peers
 
 
-def measure_peers(repetitions: int) -> list[dict[str, Any]]:
-    """What peers.py says, where `make bench-peers` has made its environment."""
+def measure_peers() -> list[dict[str, Any]]:
+    """One repetition of peers.py, where `make bench-peers` has made its environment."""
     if not PEERS_PYTHON.exists():
         return []
     script = Path(__file__).with_name("peers.py")
     done = subprocess.run(
-        [PEERS_PYTHON, script, str(PEER_SLOTS), str(repetitions)],
+        [PEERS_PYTHON, script, str(PEER_SLOTS), "1"],
         capture_output=True,
         text=True,
         check=False,
@@ -114,7 +122,7 @@ def measure_peers(repetitions: int) -> list[dict[str, Any]]:
 def as_cases(
     plans: list[Plan],
     found: dict[str, list[tuple[int, float, float]]],
-    peers: list[dict[str, Any]],
+    peers: Peers,
 ) -> list[Case]:
     """Medians, spread and ratios."""
     rates = {
@@ -150,20 +158,20 @@ def as_cases(
             )
         )
     ours = next((c for c in cases if c.name.startswith("pendulum alone, 2,048")), None)
-    for peer in peers:
+    for name, peer in peers.items():
         rate = statistics.median(peer["rates"])
         cases.append(
             Case(
-                peer["name"],
+                name,
                 "peers",
                 peer["n_ants"],
                 rate,
                 min(peer["rates"]),
                 max(peer["rates"]),
                 peer["n_ants"] / rate,
-                ours.name if ours else peer["name"],
+                ours.name if ours else name,
                 rate / ours.steps_per_second if ours else 1.0,
-                os.getloadavg()[0],
+                statistics.fmean(peer["loads"]),
             )
         )
     return cases
@@ -222,9 +230,13 @@ def measure_memory(n_ants: int) -> dict[str, float]:
 
 def as_table(cases: list[Case]) -> Table:
     """The cases for the terminal, one section a system."""
-    table = Table(title=f"acl-gym {acl_gym.__version__}: slot-steps a second, medians")
+    table = Table(
+        title=f"acl-gym {acl_gym.__version__}: slot-steps a second, medians",
+        caption="ratio: of steps a second; of a whole run, how often it fits into the "
+        "time of the other",
+    )
     table.add_column("case", no_wrap=True)
-    for heading in ("steps/s", "ns/step", "spread", "ratio"):
+    for heading in ("steps/s", "ns/step", "spread", "load", "ratio"):
         table.add_column(heading, justify="right", no_wrap=True)
     table.add_column("to", no_wrap=True)
     for system in (*SYSTEMS, "peers"):
@@ -236,6 +248,7 @@ def as_table(cases: list[Case]) -> Table:
                 f"{case.steps_per_second:,.0f}",
                 f"{1e9 / case.steps_per_second:,.0f}",
                 f"{spread:.0%}",
+                f"{case.load:.1f}",
                 "" if own else f"{case.ratio_to_reference:.2f}",
                 "" if own else case.reference,
             )
@@ -274,15 +287,30 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
     options = parser.parse_args(arguments)
     if options.ants is not None and min(options.ants) < 1:
         parser.error("--ants must be 1 or more")
-    if options.repetitions is not None and options.repetitions < 1:
-        parser.error("--repetitions must be 1 or more")
+    for name in ("repetitions", "memory"):
+        value = getattr(options, name)
+        if value is not None and value < 1:
+            parser.error(f"--{name} must be 1 or more, got {value}")
+    if options.only:
+        try:
+            re.compile(options.only)
+        except re.error as error:
+            parser.error(f"--only must be a regular expression, got {error}")
+    if options.figure:
+        # Now, and not after minutes of measuring.
+        path = Path(options.figure)
+        if path.suffix not in (".png", ".svg", ".pdf") or not path.parent.is_dir():
+            parser.error(
+                "--figure must be a .png, .svg or .pdf in a folder that is there, got "
+                f"{options.figure}"
+            )
     return options
 
 
 def main(arguments: list[str] | None = None) -> int:
     """Measure and print; returns the exit code."""
     options = parse(arguments)
-    if options.memory:
+    if options.memory is not None:
         print(json.dumps(measure_memory(options.memory), indent=1))
         return 0
     repetitions = options.repetitions or (1 if options.quick else 5)
@@ -292,8 +320,14 @@ def main(arguments: list[str] | None = None) -> int:
         wanted = {p.name for p in plans if re.search(options.only, p.name)}
         wanted |= {p.reference for p in plans if p.name in wanted}
         plans = [p for p in plans if p.name in wanted]
-    found = measure(plans, repetitions, progress=not options.json)
-    peers = [] if options.no_peers or options.quick else measure_peers(repetitions)
+        if not plans:
+            print(
+                f"throughput.py: error: --only {options.only}: no case matches",
+                file=sys.stderr,
+            )
+            return 2
+    with_peers = not (options.no_peers or options.quick)
+    found, peers = measure(plans, repetitions, not options.json, with_peers)
     cases = as_cases(plans, found, peers)
     rows = criteria({case.name: case.steps_per_second for case in cases})
     rows += [whole_run_row(case.seconds) for case in cases if case.name == WHOLE_RUN]

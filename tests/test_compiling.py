@@ -6,6 +6,8 @@ import logging
 import os
 import subprocess
 import sys
+import time
+from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -27,6 +29,12 @@ def event(module: str) -> SimpleNamespace:
     return SimpleNamespace(data={"dispatcher": kernel})
 
 
+def wait_until(condition: Callable[[], bool]) -> None:
+    end = time.monotonic() + 10.0
+    while not condition() and time.monotonic() < end:
+        time.sleep(0.005)
+
+
 def compile_for(
     announcer: compiling.Announcer,
     clock: list[float],
@@ -40,7 +48,7 @@ def compile_for(
     announcer.on_end(event(module))
 
 
-def test_a_long_compilation_is_announced_once(
+def test_many_short_compilations_are_announced_once(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     clock = [0.0]
@@ -54,10 +62,28 @@ def test_a_long_compilation_is_announced_once(
             compile_for(announcer, clock, 0.3)
         assert caplog.messages == []
         for _ in range(3):
-            compile_for(announcer, clock, 0.4)
+            announcer.on_start(event("acl_gym.membership"))
+            clock[0] += 0.4
+            if announcer.seconds > compiling.PATIENCE:  # no patience is left
+                wait_until(lambda: bool(caplog.messages))
+            announcer.on_end(event("acl_gym.membership"))
     assert len(caplog.messages) == 1
     assert "first used" in caplog.messages[0]
     assert announcer.seconds == pytest.approx(3 * 0.3 + 3 * 0.4)
+
+
+def test_one_long_compilation_is_announced_while_it_goes_on(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr(compiling, "PATIENCE", 0.05)
+    announcer = compiling.Announcer()
+    with caplog.at_level(logging.WARNING, logger="acl_gym"):
+        announcer.on_start(event("acl_gym.membership"))
+        wait_until(lambda: bool(caplog.messages))
+        assert len(caplog.messages) == 1
+        announcer.on_end(event("acl_gym.membership"))
+        compile_for(announcer, [0.0], 0.0)
+    assert len(caplog.messages) == 1
 
 
 @pytest.mark.slow

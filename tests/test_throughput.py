@@ -61,7 +61,18 @@ def test_memory_of_a_trial_is_told() -> None:
 
 
 @pytest.mark.parametrize(
-    "arguments", [("--ants", "0"), ("--repetitions", "0"), ("--systems", "car")]
+    "arguments",
+    [
+        ("--ants", "0"),
+        ("--repetitions", "0"),
+        ("--systems", "car"),
+        ("--memory", "0"),
+        ("--memory", "-5"),
+        ("--only", "["),
+        ("--only", "no such case"),
+        ("--figure", "speed.foo"),
+        ("--figure", "/no/such/folder/speed.png"),
+    ],
 )
 def test_bad_arguments_are_refused_in_a_line(arguments: tuple[str, ...]) -> None:
     done = run(*arguments)
@@ -82,3 +93,24 @@ def test_the_numpy_colony_is_the_colony(monkeypatch: pytest.MonkeyPatch) -> None
         plain.trial()
     assert plain.steps == colony.num_timesteps
     np.testing.assert_allclose(plain.levels, colony.table, rtol=1e-9)
+
+
+def test_every_criterion_is_judged(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A case that gets another name must not take its criterion away."""
+    monkeypatch.syspath_prepend(str(FOLDER))
+    from speed_cases import SYSTEMS, WHOLE_RUN, plan
+    from speed_criteria import criteria, whole_run_row
+
+    plans = list(plan(list(SYSTEMS), [250, 2_000], 5_000))
+    rates = {each.name: 1e6 * (1 + n) for n, each in enumerate(plans)}
+    rates |= {"pendulum of envpool 1, 2,048 slots": 2e6, "pendulum of gymnax 1": 3e6}
+    rows = [*criteria(rates), whole_run_row(1.9)]
+    assert len(rows) == 10
+    assert len({row["what"] for row in rows}) == 10
+    assert rows[0]["measured"] == (
+        rates["fuzzy pendulum learning, 2,000 ants"]
+        / rates["fuzzy pendulum learning in NumPy, 2,000 ants"]
+    )
+    assert rows[-1]["met"]
+    assert not whole_run_row(2.1)["met"]
+    assert WHOLE_RUN in rates

@@ -39,6 +39,7 @@ class Pheromone:
         # Scratch of the global update: by pair what `_lay` adds up.
         self._laid: FloatArray = np.zeros((self.levels.size, 4))
         self._touched: IntArray = np.empty(self.levels.size + 1, dtype=np.int64)
+        self._interrupted = False  # an update that did not end left the scratch dirty
 
     @property
     def alpha(self) -> float:
@@ -124,6 +125,9 @@ class Pheromone:
                 "deposits must be > 0 and their sum finite, got "
                 f"{deposits[ant]} for ant {ant}; scale the cost, or check the deposit."
             )
+        if self._interrupted:
+            self._laid[:] = 0.0
+        self._interrupted = True
         n_touched = 0
         for block in solutions.blocks():
             n_touched = _lay(
@@ -141,6 +145,7 @@ class Pheromone:
             )
         touched = self._touched[:n_touched]
         _reinforce(touched, self._laid, global_decay, self.levels, self.stale)
+        self._interrupted = False
 
 
 @njit(cache=True, error_model="numpy")

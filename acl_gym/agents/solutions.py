@@ -120,10 +120,31 @@ class Solutions:
             seen = observation if flat else observation.reshape(self.n_ants, -1)
         rows = self._rows
         if rows is None or rows.dtype != seen.dtype or rows.shape[1] != seen.shape[1]:
-            self._rows = rows = np.empty((self._size, seen.shape[1]), dtype=seen.dtype)
+            rows = self._rows_for(seen)
             self._state_shape = observation.shape[1:]
         by_slot = not self._one_cell
         _append(ants, seen, by_slot, actions, rows, self._action, self.length)
+
+    def _rows_for(self, seen: NDArray[Any]) -> NDArray[Any]:
+        """Memory for what is seen, when it is not of the kind seen before.
+
+        Within a trial, what is there is kept, in a type that holds both.
+
+        Raises:
+            ValueError: within a trial, the number of variables changes.
+        """
+        width, kept = seen.shape[1], self._rows
+        if kept is None or not self.length.any():
+            self._rows = np.empty((self._size, width), dtype=seen.dtype)
+        elif kept.shape[1] != width:
+            raise ValueError(
+                "observations must have as many variables throughout a trial, got "
+                f"{kept.shape[1]}, then {width}; check the environment's step and reset."
+            )
+        else:
+            kind = np.result_type(kept, seen)
+            self._rows = kept if kept.dtype == kind else kept.astype(kind)
+        return self._rows
 
     def untried(
         self, ants: IntArray, index: CellArray, allowed: BoolArray
@@ -188,7 +209,7 @@ class Solutions:
                 np.empty(most, dtype=np.int64),
                 np.empty(most, dtype=self._action.dtype),
                 np.empty((most, k), dtype=np.int32),
-                np.ones((most, k)),
+                np.ones((most, 1)) if k == 1 else np.empty((most, k)),
             )
         return self._room
 

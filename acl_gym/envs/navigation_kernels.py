@@ -17,8 +17,8 @@ Row = tuple[float, float, float, float]
 def damping_at(c1: float, c2: float, base: float, peaks: tuple[float, ...]) -> float:
     """The damping at one position; a peak is height, m1, m2, 1 / sigma1, 1 / sigma2.
 
-    The peaks, one after the other, are a tuple, so that their number is known when the kernel is compiled
-    and the loop over the slots is the innermost one that is left.
+    The peaks, one after the other, are a tuple, so that their number is known when the
+    kernel is compiled and the loop over the slots is the innermost one that is left.
     """
     total = base
     for k in range(len(peaks) // 5):

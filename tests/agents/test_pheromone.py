@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import chain
+from typing import Any
 
 import numpy as np
 import pytest
@@ -401,3 +403,32 @@ def test_deposits_whose_sum_overflows_are_refused() -> None:
     with pytest.raises(ValueError, match="their sum finite"):
         pheromone.global_update(solutions, np.full(50, 1e307), 0.5)
     assert (pheromone.levels == 1.0).all()
+
+
+@given(trials(), st.integers(0, 3))
+@settings(max_examples=30)
+def test_an_update_that_was_interrupted_leaves_no_trace(
+    trial: Trial, blocks: int
+) -> None:
+    class Cut(BaseException):
+        """As Ctrl-C, wherever it comes."""
+
+    solutions = trial.packed()
+    whole, rows = solutions.blocks, list(trial.packed().blocks())
+
+    def cut_short() -> Iterator[Any]:
+        yield from rows[:blocks]
+        raise Cut
+
+    clean, struck = trial.pheromone.levels.copy(), trial.pheromone
+    deposits = 1.0 / trial.costs
+    solutions.blocks = cut_short  # type: ignore[method-assign]
+    with pytest.raises(Cut):
+        struck.global_update(solutions, deposits, trial.rho)
+    np.testing.assert_array_equal(struck.levels, clean)
+    solutions.blocks = whole  # type: ignore[method-assign]
+    struck.global_update(solutions, deposits, trial.rho)
+    fresh = Pheromone(*clean.shape, struck.tau0, struck.alpha)
+    fresh.set_levels(clean)
+    fresh.global_update(trial.packed(), deposits, trial.rho)
+    np.testing.assert_array_equal(struck.levels, fresh.levels)

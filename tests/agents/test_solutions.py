@@ -75,6 +75,23 @@ def test_a_record_that_is_cleared_is_as_new() -> None:
     assert block.action.tolist() == [4]
 
 
+@pytest.mark.parametrize("kinds", [("f4", "f8"), ("f8", "f4"), ("f4", "f8", "f4")])
+def test_observations_may_change_their_type_within_a_trial(kinds: Any) -> None:
+    partition = Fuzzy.from_box(SQUARE, 3)
+    solutions, ants = Solutions(2, len(kinds), 3, partition), np.arange(2)
+    steps = [
+        np.array([[0.25, -0.5], [t / 8, 0.75]], kind) for t, kind in enumerate(kinds)
+    ]
+    for seen in steps:
+        solutions.append(ants, seen, partition(seen)[0], np.array([2, 1]))
+    (block,) = solutions.blocks()
+    index, degree = partition(np.stack(steps, axis=1).reshape(-1, 2))
+    np.testing.assert_array_equal(block.index, index)
+    np.testing.assert_array_equal(block.degree, degree)
+    with pytest.raises(ValueError, match=r"as many variables .* got 2, then 3"):
+        solutions.append(ants, np.zeros((2, 3)), index, np.array([0, 0]))
+
+
 def test_nothing_recorded_gives_no_blocks() -> None:
     assert list(Solutions(3, 2, 2, Fuzzy.from_box(SQUARE, 3)).blocks()) == []
 

@@ -111,7 +111,7 @@ def test_several_arenas(name: str) -> None:
     rows = experiment.options["rows"]
     assert [row[0] for row in found["rows"]] == list(rows)
     assert all(len(row) == len(found["headings"]) for row in found["rows"])
-    names = ["ACL"] + ["ACL, 4 times the interactions"] * (name != "slots")
+    names = ["ACL"] + ["ACL with 4 times the interactions"] * (name != "slots")
     for each in names:
         count = (
             f"Of {2 * len(rows)} duels of {each}: {len(rows)} won, {len(rows)} lost."

@@ -16,7 +16,7 @@ METHODS = {"acl": "ACL", "q": "Q-learning", "q-lambda": "Q(λ)", "dqn": "DQN"}
 LONG = "acl-long"
 """ACL with more interactions than the others: whether it is only these that it lacks."""
 
-NAMES = {**METHODS, LONG: "ACL, 4 times the interactions"}
+NAMES = {**METHODS, LONG: "ACL with 4 times the interactions"}
 """What there is in tables and figures, and what it is called."""
 
 TABLES = ("acl", "q", "q-lambda")

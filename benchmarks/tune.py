@@ -8,7 +8,7 @@ and method, after every evaluation: a search that was stopped goes on where it w
 ends as if it had not been stopped. One process, one thread; needs Optuna (extra `dev`).
 
 examples:
-  python benchmarks/tune.py                        everything, 50 minutes or so
+  python benchmarks/tune.py                        everything, an hour or so
   python benchmarks/tune.py --only pendulum-acl    one method in one arena
   python benchmarks/tune.py --only grid            every method in one arena
   python benchmarks/tune.py --table                what was found, as Markdown

@@ -28,6 +28,7 @@ _STYLES = {
 _MARKERS = {LONG: "P", "acl": "o", "q": "s", "q-lambda": "^", "dqn": "D"}
 _SHORT = {"acl": "ACL", "q": "Q", "q-lambda": "Q(λ)", "dqn": "DQN", LONG: "4 ACL"}
 _POINTS = 300
+_NARROW = 1.05
 
 
 def race(experiment: Experiment, evidence: Evidence) -> Figure:
@@ -46,10 +47,10 @@ def race(experiment: Experiment, evidence: Evidence) -> Figure:
         ax.set_xlabel(label, fontsize=SMALL)
         ax.axhline(cost, **drawing.BOUND)
     drawing.prepare(last)
+    last.set_yscale("log")
     _strips(last, {each.method: each for each in found.values()}, evidence)
     last.axhline(cost, **drawing.BOUND)  # its own scale: they are close together
     last.set_xlabel("last policies", fontsize=SMALL)
-    last.set_yscale("log")
     drawing.plain_log(last.yaxis, sparse=True)
     steps.set_yscale("log")
     seconds.tick_params(labelleft=False)
@@ -88,8 +89,8 @@ def harder(experiment: Experiment, evidence: Evidence) -> Figure:
     axes = figure.subplots(1, len(rows), squeeze=False)[0]
     for ax, (label, row) in zip(axes, rows.items(), strict=True):
         drawing.prepare(ax)
-        _strips(ax, row, evidence)
         ax.set_yscale("log")
+        _strips(ax, row, evidence)
         drawing.plain_log(ax.yaxis, sparse=True)
         first, _, rest = label.partition(", ")
         ax.set_title(f"{first}\n{rest}" if rest else label, fontsize=TINY, loc="left")
@@ -135,7 +136,7 @@ def sweep(experiment: Experiment, evidence: Evidence) -> Figure:
 def order(experiment: Experiment, evidence: Evidence) -> Figure:
     """Last costs with the slots in reverse order over those in order."""
     pairs = experiment.options["pairs"]
-    figure = drawing.new_figure(2.6)
+    figure = drawing.new_figure(2.9)
     axes = figure.subplots(1, len(pairs), squeeze=False)[0]
     for ax, (label, (forth, back)) in zip(axes, pairs.items(), strict=True):
         drawing.prepare(ax)
@@ -171,6 +172,10 @@ def _strips(ax: Axes, row: dict[str, Contest], evidence: Evidence) -> None:
             [[middle.value - middle.low], [middle.high - middle.value]],
             color=color, marker=marker, markersize=4, capsize=2, linewidth=1.2,
         )  # fmt: skip
+    values = np.concatenate([evidence.last(contest) for contest in row.values()])
+    low, high = float(values.min()), float(values.max())
+    if high < _NARROW * low:  # do not make much of what is nothing
+        ax.set_ylim(low / _NARROW, high * _NARROW)
     ax.set_xlim(-0.6, len(row) - 0.4)
     ax.set_xticks(range(len(row)), labels=[_SHORT.get(each, each) for each in row])
 
@@ -188,4 +193,4 @@ def _legend(figure: Figure, methods: list[str]) -> None:
         )
         for method in methods
     ]  # fmt: skip
-    drawing.legend(figure, handles, loc="outside upper center", ncols=len(handles))
+    drawing.legend(figure, handles, loc="outside lower center", ncols=len(handles))

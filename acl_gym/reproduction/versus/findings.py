@@ -259,7 +259,7 @@ def harder(experiment: Experiment, evidence: Evidence) -> Findings:
         "headings": [
             experiment.options.get("of", "Where"),
             *(NAMES[name] for name in names),
-            *(f"{NAMES[one]}, against {NAMES[m]}" for one, m in pairs),
+            *(f"{NAMES[one]} against {NAMES[m]}" for one, m in pairs),
         ],
         "rows": rows,
         "sentences": [*counts, *map(str, duels)],

@@ -55,6 +55,7 @@ def race(experiment: Experiment, evidence: Evidence) -> Figure:
     steps.set_yscale("log")
     seconds.tick_params(labelleft=False)
     steps.set_ylabel("policy cost $J^h$", fontsize=SMALL)
+    steps.set_ylim(bottom=cost / 1.4)  # room for the name of the line
     drawing.plain_log(steps.yaxis, sparse=True)
     drawing.optimal_cost_line(steps, cost, "J*" if name == "J*" else "best known")
     _legend(figure, [contest.method for contest in found.values()])

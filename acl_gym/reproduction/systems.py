@@ -17,7 +17,7 @@ from acl_gym.reproduction.settings import (
     Setting,
 )
 
-# Chapter 3 names no alpha, epsilon, tau_0, T, K: decided in docs/grid-search.md.
+# Chapter 3 names no alpha, epsilon, tau_0, T, K: decided in docs/reproduction.md.
 _GRID = {
     "tau0": 1e-3,
     "alpha": 3.0,

@@ -102,7 +102,7 @@ def longer_walks(evidence: Evidence) -> Tried:
     arrive = evidence.last(PATIENT, "success_rate")
     return Tried(
         f"T = 600 in learning, {OTHER_RULE}, fuzzy: cost of the last 20 trials, of the "
-        "best policies, and how many starts arrive (more in docs/navigation.md)",
+        "best policies, and how many starts arrive (more in docs/reproduction.md)",
         f"{interval(costs[:, -LATE:].mean(axis=1))}, {interval(costs.min(axis=1))}, "
         f"{arrive.mean():.0%}",
     )

@@ -58,7 +58,8 @@ def search(
         name: of the arena.
         method: of it.
         folder: where the file is, or is made.
-        evaluations: how many settings are tried, the first of them the defaults.
+        evaluations: how many settings are tried, the first of them the defaults, then
+            those of `others_of`.
         seeds: of the runs of each.
         tell: called after each evaluation, also after one that was there.
 
@@ -89,7 +90,8 @@ def search(
             seed=SAMPLER_SEED, n_startup_trials=STARTUP, multivariate=True
         )
     )
-    study.enqueue_trial({key: fixed[key] for key in distributions})
+    for known_settings in (fixed, *others_of(arena, method)):
+        study.enqueue_trial({key: known_settings[key] for key in distributions})
     for number in range(evaluations):
         trial = study.ask(distributions)
         if number < len(known):
@@ -112,6 +114,17 @@ def search(
         study.tell(trial, known[number]["value"])
         tell()
     return found
+
+
+def others_of(arena: Arena, method: str) -> list[dict[str, Any]]:
+    """Settings that are tried after the defaults, before the sampler proposes any.
+
+    On the grids those of Chapter 3, without a tabu list: under one, an action that failed
+    by chance may not be chosen again.
+    """
+    if method == "acl" and arena.finite:
+        return [{**defaults_of(arena, method), "tabu": False, "local_decay": 0.0}]
+    return []
 
 
 def evaluate(contest: Contest, seeds: tuple[int, ...]) -> dict[str, Any]:

@@ -65,7 +65,7 @@ def outcome_of(
         "runs": runs,
         "first_seed": first_seed,
         "experiments": [summary(each, evidence) for each in experiments],
-        "claims": [claim.judge(evidence) for claim in CLAIMS],
+        "claims": [claim.judge(evidence, runs) for claim in CLAIMS],
         "made": made,
     }
 

@@ -10,6 +10,7 @@ from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
+from acl_gym.reproduction.catalogue.common import FEWER
 from acl_gym.reproduction.outcome import Outcome
 from acl_gym.reproduction.verdicts import HOLDS, IN_PART, NOT, UNDECIDED
 from acl_gym.storage import write_atomically
@@ -90,6 +91,7 @@ def write_page(directory: Path) -> Path:
         },
         animation=_image(directory / FIGURES / ANIMATION),
         curves=_curves(outcome),
+        fewer=FEWER,
     )
     path = directory / PAGE
     write_atomically(path, text.encode())
@@ -103,7 +105,8 @@ def write_claims(directory: Path) -> Path:
     lines = [
         "# The claims of the thesis",
         "",
-        f"{outcome['runs']} runs of each setting. In brackets: 95% bootstrap intervals "
+        f"{outcome['runs']} runs of each setting ({FEWER} at most of what was tried "
+        "beside the thesis's experiments and takes long). In brackets: 95% bootstrap intervals "
         "of the interquartile mean. The page report.html has the figures.",
         "",
         "| claim | verdict | statement | measured | |",

@@ -22,6 +22,9 @@ FloatArray = NDArray[np.float64]
 
 HOLDS, IN_PART, NOT, UNDECIDED = "holds", "holds in part", "does not hold", "undecided"
 RESAMPLES = 2_000
+FEW = 5
+"""With fewer runs of a setting nothing is decided."""
+
 _NEVER = 1e100  # stands for infinity, of which a ratio would be NaN
 
 
@@ -91,14 +94,21 @@ class Claim:
                 continue
         return found
 
-    def judge(self, evidence: Evidence) -> dict[str, Any]:
-        """The verdict with all that led to it, JSON types."""
+    def judge(self, evidence: Evidence, runs: int = FEW) -> dict[str, Any]:
+        """The verdict with all that led to it, JSON types.
+
+        Args:
+            evidence: the runs.
+            runs: how many there are of each setting; with fewer than `FEW` the figures
+                are told, and nothing is decided.
+        """
         try:
             parts = self.decide(evidence)
         except MissingRunsError:
             parts = []
-        decided = verdict(parts)
+        decided = verdict(parts) if runs >= FEW else UNDECIDED
         wanting = decided in (IN_PART, NOT)
+        tried = self.attempts(evidence) if wanting else []
         return {
             "claim": self.name,
             "text": self.text,
@@ -107,10 +117,9 @@ class Claim:
             "trials": self.trials,
             "verdict": decided,
             "parts": [{**p._asdict(), "holds": bool(p.holds)} for p in parts],
-            "tried": [
-                each._asdict() for each in (self.attempts(evidence) if wanting else [])
-            ],
-            "understanding": self.understanding,
+            "tried": [each._asdict() for each in tried],
+            # What we make of all runs: not of a part of them.
+            "understanding": self.understanding if tried else "",
         }
 
 

@@ -101,6 +101,7 @@ def reproduce(
     debug: DebugOption = False,
 ) -> None:
     """Reproduce; see `HELP`."""
+    from acl_gym.experiments.runner import alone_in
     from acl_gym.reproduction import reproduce as reproduction
     from acl_gym.reproduction import resume
     from acl_gym.reproduction.catalogue import RUNS
@@ -126,19 +127,21 @@ def reproduce(
         _tell(outcome, as_json, screen, out / "report.html" if figures else None)
         return
     try:
-        outcome, evidence = reproduction.reproduce(
-            wanted,
-            runs,
-            out,
-            first_seed=seed,
-            workers=workers,
-            executor=executor,
-            console=screen,
-        )
-        if figures:
-            reproduction.draw(experiments, evidence, out, screen)
-            reproduction.write_report(out)
-        resume.finish(out, made_from)
+        out.mkdir(parents=True, exist_ok=True)
+        with alone_in(out):  # to the end: the page has to be that of these runs
+            outcome, evidence = reproduction.reproduce(
+                wanted,
+                runs,
+                out,
+                first_seed=seed,
+                workers=workers,
+                executor=executor,
+                console=screen,
+            )
+            if figures:
+                reproduction.draw(experiments, evidence, out, screen)
+                reproduction.write_report(out)
+            resume.finish(out, made_from)
     except KeyboardInterrupt as error:
         raise InterruptedRunError(
             "interrupted; finished runs are kept, give the same command to go on."

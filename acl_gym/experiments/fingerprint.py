@@ -27,7 +27,7 @@ def code_fingerprint(module: str, root: Path = ROOT) -> str:
     """A hash over the source that a function depends on.
 
     That is its module, all of this package that it imports, directly or not, wherever
-    in the file, and every environment, which is made by its id. A page, a figure or a
+    in the file, and every environment, which is made by its id, with the maps. A page, a figure or a
     claim is none of it, so mending one leaves what has been run as it is.
 
     Args:
@@ -35,7 +35,9 @@ def code_fingerprint(module: str, root: Path = ROOT) -> str:
         root: where the package lies.
     """
     digest = hashlib.sha256()
-    for name, path in sorted(sources_of(module, root).items()):
+    files = sources_of(module, root)
+    files |= {path.name: path for path in root.glob("envs/maps/*.txt")}
+    for name, path in sorted(files.items()):
         digest.update(name.encode())
         digest.update(path.read_bytes())
     return digest.hexdigest()

@@ -137,7 +137,7 @@ def run_tasks(
     execute = executor or partial(in_processes, workers=workers)
     tell = progress or (lambda name, fraction: None)
     results: dict[str, Result] = {}
-    with _alone_in(directory):
+    with alone_in(directory):
         for half in directory.glob(".*.tmp"):
             half.unlink()  # of a runner that was killed while it wrote
         for task in tasks:
@@ -164,8 +164,15 @@ def run_tasks(
 
 
 @contextmanager
-def _alone_in(directory: Path) -> Iterator[None]:
-    """Hold a lock that the system takes back when this process ends, however it does."""
+def alone_in(directory: Path) -> Iterator[None]:
+    """Hold a lock that the system takes back when this process ends, however it does.
+
+    Args:
+        directory: on which this process alone is to work.
+
+    Raises:
+        FolderInUseError: another one does.
+    """
     lock = FileLock(directory / "running.lock")
     try:
         lock.acquire(timeout=0)

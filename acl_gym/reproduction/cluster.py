@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import platform
 from typing import Any
 
 from acl_gym.experiments.runner import Finished, Progress, Result, Task, TaskFailedError
@@ -32,7 +33,7 @@ def in_ray(tasks: list[Task], tell: Progress) -> Finished:
             "machine, `ray start --address=...` joins one."
         ) from error
     run: Any = ray.remote(num_cpus=1, max_retries=0)(_run)
-    waiting = {run.remote(task): task for task in tasks}
+    waiting = {run.remote(task, task.key): task for task in tasks}
     try:
         while waiting:
             done, _ = ray.wait(list(waiting), num_returns=1)
@@ -53,5 +54,10 @@ def in_ray(tasks: list[Task], tell: Progress) -> Finished:
         ray.shutdown()
 
 
-def _run(task: Task) -> Result:
+def _run(task: Task, key: str) -> Result:
+    if task.key != key:  # it has the code and the versions of this node in it
+        raise RuntimeError(
+            f"node {platform.node()} must have the code and the package versions of the "
+            "caller, but they differ; install the same there"
+        )
     return task.function(*task.arguments, lambda fraction: None)

@@ -30,15 +30,23 @@ def stamp(tasks: Iterable[Task], figures: Iterable[str]) -> str:
     for task in tasks:
         digest.update(task.key.encode())
     for path in sorted(ROOT.rglob("*")):
-        if path.suffix in (".py", ".j2"):
+        if path.suffix in (".py", ".j2", ".txt"):
             digest.update(path.relative_to(ROOT).as_posix().encode())
             digest.update(path.read_bytes())
     return digest.hexdigest()
 
 
 def begin(directory: Path) -> None:
-    """What is in the folder is about to change; what was half written goes."""
-    (directory / FINISHED).unlink(missing_ok=True)
+    """What is in the folder is about to change.
+
+    Pages and figures of before go, so that they do not stand beside other results, and so
+    does what was half written. Runs stay.
+    """
+    for name in (FINISHED, PAGE, "claims.md"):
+        (directory / name).unlink(missing_ok=True)
+    for kind in ("*.png", "*.svg", "*.gif"):
+        for figure in (directory / FIGURES).glob(kind):
+            figure.unlink()
     for folder in (directory, directory / FIGURES):
         for half in folder.glob(".*.tmp"):
             half.unlink()

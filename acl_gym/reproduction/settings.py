@@ -140,7 +140,7 @@ class Setting:
     @property
     def kernels(self) -> tuple[Any, ...]:
         """See `Runnable`."""
-        return self.env_id, self.kind, len(self.env)
+        return self.env_id, self.kind, len(self.env), self.order
 
     def brief(self) -> Setting:
         """A short trial of two ants."""

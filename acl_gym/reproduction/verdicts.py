@@ -22,7 +22,7 @@ FloatArray = NDArray[np.float64]
 
 HOLDS, IN_PART, NOT, UNDECIDED = "holds", "holds in part", "does not hold", "undecided"
 RESAMPLES = 2_000
-FEW = 5
+FEW = 3
 """With fewer runs of a setting nothing is decided."""
 
 _NEVER = 1e100  # stands for infinity, of which a ratio would be NaN

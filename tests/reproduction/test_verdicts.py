@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -10,6 +12,7 @@ from hypothesis import strategies as st
 from acl_gym.reproduction.evidence import Evidence, MissingRunsError
 from acl_gym.reproduction.systems import row
 from acl_gym.reproduction.verdicts import (
+    FEW,
     Claim,
     Part,
     Tried,
@@ -43,6 +46,8 @@ def test_a_claim_without_its_runs_is_undecided() -> None:
     assert claim.judge(Evidence({}))["verdict"] == "undecided"
     found = claim.judge(Evidence({row().key: [{}]}))
     assert (found["verdict"], found["parts"][0]["holds"]) == ("holds", True)
+    few = claim.judge(Evidence({row().key: [{}]}), FEW - 1)
+    assert (few["verdict"], few["parts"][0]["holds"]) == ("undecided", True)
     with pytest.raises(MissingRunsError):
         Evidence({}).runs(row())
 
@@ -57,7 +62,11 @@ def test_what_was_tried_is_told_where_a_claim_is_wanting() -> None:
             *("C0", "text", "§0", lambda _, holds=holds: [part(holds)]),
             (lambda _: Tried("more", "less"), missing),
         )
-        assert claim.judge(Evidence({}))["tried"] == told
+        claim = replace(claim, understanding="so it is")
+        found = claim.judge(Evidence({}))
+        assert found["tried"] == told
+        # What is made of all runs is not said of none.
+        assert found["understanding"] == ("" if holds else "so it is")
 
 
 @given(st.lists(st.floats(-1e6, 1e6), min_size=1, max_size=40))

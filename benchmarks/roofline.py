@@ -273,6 +273,8 @@ def draw_roofline(
             ha="right" if left else "left", textcoords="offset points",
             fontsize=drawing.SMALL, color=color,
         )  # fmt: skip
+    ax.set_yticks([1, 2, 5, 10, 20, 50])
+    ax.set_ylim(1.0, 1.6 * arithmetic / 1e9)
     for axis in (ax.xaxis, ax.yaxis):
         axis.set_major_formatter(ScalarFormatter())
         axis.set_minor_formatter(NullFormatter())

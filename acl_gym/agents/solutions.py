@@ -43,8 +43,10 @@ class Block:
 
 @dataclass(frozen=True, slots=True)
 class _Room:
-    """Scratch for a block."""
+    """Scratch for a block; `all` is 0, 1, 2, ..., as many as there are rows."""
 
+    seen: NDArray[Any]
+    all: IntArray
     places: IntArray
     action: ActionArray
     index: CellArray
@@ -179,7 +181,7 @@ class Solutions:
         rows = self._rows
         if rows is None:
             return
-        room = self._room_for()
+        room = self._room_for(rows)
         ends = np.cumsum(self.length)
         first = done = 0
         while first < self.n_ants:
@@ -189,29 +191,37 @@ class Solutions:
             places, action = room.places[:size], room.action[:size]
             index, degree = room.index[:size], room.degree[:size]
             _collect(first, last, self.length, self._action, places, action)
-            if self._one_cell:
-                np.take(rows, places, axis=0, out=index)
-            else:
-                states = rows.reshape(self._size, *self._state_shape)
-                self.partition.locate(states, places, index, degree)
+            seen = index if self._one_cell else room.seen[:size]
+            np.take(rows, places, axis=0, out=seen, mode="clip")  # all are in range
+            if not self._one_cell:
+                # A copy: the rest of the memory may hold anything.
+                states = seen.reshape(size, *self._state_shape)
+                self.partition.locate(states, room.all[:size], index, degree)
                 if not self.partition.checked:
                     check_cells(index, self.partition)
             ants = slice(first, last)
             yield Block(ants, index, degree, action, ends[ants] - done)
             first, done = last, done + size
 
-    def _room_for(self) -> _Room:
+    def _room_for(self, rows: NDArray[Any]) -> _Room:
         """Scratch for a block, the same in every trial."""
-        if self._room is None:
+        room = self._room
+        if (
+            room is None
+            or room.seen.dtype != rows.dtype
+            or room.seen.shape[1:] != rows.shape[1:]
+        ):
             most = max(ROWS_PER_BLOCK, self.max_steps)
             k = self.partition.cells_per_state
-            self._room = _Room(
+            room = self._room = _Room(
+                np.empty((most, rows.shape[1]), dtype=rows.dtype),
+                np.arange(most),
                 np.empty(most, dtype=np.int64),
                 np.empty(most, dtype=self._action.dtype),
                 np.empty((most, k), dtype=np.int32),
                 np.ones((most, 1)) if k == 1 else np.empty((most, k)),
             )
-        return self._room
+        return room
 
 
 @njit(cache=True, inline="always")

@@ -158,7 +158,10 @@ class Walk:
             self.env.reset(options={"reset_mask": self._stale})
             self._stale = None
         _spread(ants, actions, self.first_action, self._actions)
-        observation, reward, terminated, truncated, infos = self.env.step(self._actions)
+        # A copy: an environment or a wrapper may keep what it is given.
+        observation, reward, terminated, truncated, infos = self.env.step(
+            self._actions.copy()
+        )
         observation = np.asarray(observation)
         self._read_mask(infos)
         self.steps += 1

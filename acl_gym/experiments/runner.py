@@ -219,12 +219,13 @@ def in_processes(tasks: list[Task], tell: Progress, *, workers: int) -> Finished
             while True:
                 # A few ahead: to watch thousands at once would keep this process busy.
                 for task in islice(left, AHEAD * workers - len(waiting)):
-                    waiting[pool.submit(_run_one, task)] = task
+                    waiting[_submit(pool, task)] = task
                 if not waiting:
                     return
                 done, _ = wait(waiting, timeout=0.2, return_when=FIRST_COMPLETED)
                 _pass_on(reports, tell)
-                for future in done:
+                # What succeeded first: an error ends this, and would lose it.
+                for future in sorted(done, key=_has_failed):
                     task = waiting.pop(future)
                     yield task, _outcome(task, future)
         except BaseException:
@@ -233,6 +234,21 @@ def in_processes(tasks: list[Task], tell: Progress, *, workers: int) -> Finished
             for process in multiprocessing.active_children():
                 process.terminate()
             raise
+
+
+def _submit(pool: ProcessPoolExecutor, task: Task) -> Future[Result]:
+    try:
+        return pool.submit(_run_one, task)
+    except BrokenProcessPool as error:
+        # A worker died while results were kept. It is one more failed task, so that
+        # those which had finished before are still handed over.
+        failed: Future[Result] = Future()
+        failed.set_exception(error)
+        return failed
+
+
+def _has_failed(done: Future[Result]) -> bool:
+    return done.exception() is not None
 
 
 def _outcome(task: Task, future: Future[Result]) -> Result:

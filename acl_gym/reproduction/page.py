@@ -18,6 +18,7 @@ from acl_gym.storage import write_atomically
 FIGURES = "figures"
 RESULTS = "results.json"
 PAGE = "report.html"
+CLAIMS_TABLE = "claims.md"
 ANIMATION = "learning.gif"
 ANIMATED = "fig5.6"
 """With this experiment the animation of its policy is drawn."""
@@ -115,7 +116,8 @@ def write_claims(directory: Path) -> Path:
     for claim in outcome["claims"]:
         names = [*claim["experiments"], *claim["trials"]]
         figures = ", ".join(name for name in names if name in there)
-        text = f"**{claim['text']}** {claim['section']}; {figures}"
+        source = f"{claim['section']}; {figures}" if figures else claim["section"]
+        text = f"**{claim['text']}** {source}"
         lines.append(f"| {claim['claim']} | {claim['verdict']} | {text} | | |")
         lines += [
             f"| | | {part['statement']} | {part['measured']} | "
@@ -128,7 +130,7 @@ def write_claims(directory: Path) -> Path:
         ]
         if claim["understanding"]:
             lines.append(f"| | | {claim['understanding']} | | |")
-    path = directory / "claims.md"
+    path = directory / CLAIMS_TABLE
     write_atomically(path, ("\n".join(lines) + "\n").encode())
     return path
 

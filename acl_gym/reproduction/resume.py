@@ -13,6 +13,7 @@ from acl_gym.experiments.runner import Task
 from acl_gym.reproduction.page import (
     ANIMATED,
     ANIMATION,
+    CLAIMS_TABLE,
     FIGURES,
     PAGE,
     RESULTS,
@@ -42,7 +43,7 @@ def begin(directory: Path) -> None:
     Pages and figures of before go, so that they do not stand beside other results, and so
     does what was half written. Runs stay.
     """
-    for name in (FINISHED, PAGE, "claims.md"):
+    for name in (FINISHED, PAGE, CLAIMS_TABLE):
         (directory / name).unlink(missing_ok=True)
     for kind in ("*.png", "*.svg", "*.gif"):
         for figure in (directory / FIGURES).glob(kind):
@@ -77,7 +78,7 @@ def finished(
         return None
     files = [directory / RESULTS]
     if figures:
-        files += [directory / PAGE, directory / "claims.md"]
+        files += [directory / PAGE, directory / CLAIMS_TABLE]
         folder = directory / FIGURES
         files += [folder / f"{n}.{kind}" for n in figures for kind in ("png", "svg")]
         files += [folder / ANIMATION] if ANIMATED in figures else []

@@ -7,7 +7,13 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 import pytest
-from gymnasium.vector import AsyncVectorEnv, AutoresetMode, SyncVectorEnv, VectorEnv
+from gymnasium.vector import (
+    AsyncVectorEnv,
+    AutoresetMode,
+    SyncVectorEnv,
+    VectorEnv,
+    VectorWrapper,
+)
 from gymnasium.wrappers.vector import RecordEpisodeStatistics
 
 import acl_gym  # noqa: F401
@@ -130,6 +136,27 @@ def test_a_wrapped_native_environment_walks_the_same(mode: str) -> None:
         results.append((last, walk.cost, walk.length, walk.success))
     for one, two in zip(*results, strict=True):
         np.testing.assert_array_equal(one, two)
+
+
+class KeepsActions(VectorWrapper):
+    """Keeps what it was given, as recorders do."""
+
+    def __init__(self, env: VectorEnv) -> None:
+        super().__init__(env)
+        self.kept: list[np.ndarray] = []
+
+    def step(self, actions: np.ndarray) -> Any:
+        self.kept.append(actions)
+        return super().step(actions)
+
+
+def test_actions_that_a_wrapper_keeps_stay_as_they_were() -> None:
+    env = KeepsActions(chains(3, "Disabled"))
+    walk = Walk(env, 5)
+    walk.start(seed=0)
+    walk.step(np.array([0, 1, 1]))
+    walk.step(np.array([1, 0, 1]))
+    assert [each.tolist() for each in env.kept] == [[0, 1, 1], [1, 0, 1]]
 
 
 @pytest.mark.parametrize("mode", MODES)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import multiprocessing
 import os
 import signal
 import subprocess
@@ -148,6 +149,26 @@ def test_a_failure_is_one_clear_error_and_loses_nothing(
         )
     run_tasks(tasks(calls, [1, 2]), runs, workers=1)
     assert calls_in(calls) == ["1", "2"]
+
+
+def test_a_worker_may_die_while_results_are_kept(tmp_path: Path) -> None:
+    """The pool then refuses the next task; what had finished before is kept all the same."""
+    calls, runs = tmp_path / "calls", tmp_path / "runs"
+    works = tasks(calls, [1, 2, 3, 4, 5])
+    works.insert(3, Task("bad", die, (), {}))
+
+    def keep_slowly(name: str, fraction: float) -> None:
+        while fraction == 1.0 and multiprocessing.active_children():
+            time.sleep(0.01)
+
+    with pytest.raises(TaskFailedError, match="a worker process died while"):
+        run_tasks(works, runs, workers=1, progress=keep_slowly)
+    assert {path.stem for path in runs.glob("*.json")} == {
+        "square-1",
+        "square-2",
+        "square-3",
+    }
+    assert calls_in(calls) == ["1", "2", "3"]
 
 
 KILLED = """

@@ -151,6 +151,7 @@ def test_the_claims_as_text(folder: Path) -> None:
         assert sum(line.startswith(f"| {claim.name} | ") for line in lines) == 1
     rows = [line for line in lines if line.startswith("|")]
     assert {line.count("|") for line in rows} == {6}
+    assert not any("; |" in line for line in rows)  # no figure, no separator
 
 
 def test_a_page_needs_results(tmp_path: Path) -> None:

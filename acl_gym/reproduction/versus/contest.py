@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
 import warnings
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -20,7 +18,7 @@ from acl_gym.agents.q_learning import QLearning
 from acl_gym.agents.tabular import TabularAgent
 from acl_gym.callbacks import Callback, Row
 from acl_gym.evaluation import evaluate_policy_cost
-from acl_gym.reproduction.settings import Learner, Result
+from acl_gym.reproduction.settings import Learner, Result, about_of, key_of
 from acl_gym.reproduction.versus.arena import Arena
 from acl_gym.reproduction.versus.spaces import METHODS
 from acl_gym.reproduction.versus.veils import Backwards, BackwardsLuck
@@ -59,15 +57,12 @@ class Contest:
     @property
     def about(self) -> dict[str, Any]:
         """All that a result depends on but the seed, JSON types."""
-        about = asdict(self)
-        del about["most_runs"]
-        return about
+        return about_of(self)
 
     @cached_property
     def key(self) -> str:
         """Names the contest by what is in it."""
-        text = json.dumps(self.about, sort_keys=True)
-        return hashlib.sha256(text.encode()).hexdigest()[:12]
+        return key_of(self.about)
 
     @property
     def system(self) -> str:

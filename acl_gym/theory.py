@@ -165,7 +165,9 @@ def policy_gap(
     expected_deposit: ArrayLike,
     expected_deposit_second: ArrayLike,
 ) -> FloatArray:
-    """Delta of (3.31): if it is positive, the policy in q' settles on the optimum.
+    """Delta of (3.31), of which §3.4.8 says: if positive, the policy in q' settles.
+
+    That does not follow from it (docs/theory.md); claim C23 tries it out.
 
     With annealed exploration it is this with 1 / J_min and 1 / J_second for the two
     expected deposits.
@@ -181,7 +183,7 @@ def policy_gap_of_one_ant(
     expected_deposit: ArrayLike,
     expected_deposit_second: ArrayLike,
 ) -> FloatArray:
-    """(3.31) for M = 1: never negative."""
+    """(3.31) for M = 1: never negative, as the first deposit is the larger one."""
     rho, gamma = (
         ranges.global_decay_checked(global_decay),
         ranges.local_decay_checked(local_decay),

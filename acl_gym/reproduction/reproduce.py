@@ -136,7 +136,6 @@ def reproduce(
     workers = workers or os.cpu_count() or 1
     tasks = tasks_for(settings, range(first_seed, first_seed + runs))
     console = console or Console(quiet=True)
-    resume.begin(directory)
     store = ParquetStore(directory / TASKS)
     if not all(store.has(task) for task in tasks):
         # Here once, not in every process: Numba's cache is no place for a race.
@@ -153,6 +152,7 @@ def reproduce(
     )
     outcome["runs_made"] = runs_made(results)
     text = json.dumps(outcome)
+    resume.begin(directory)
     write_atomically(directory / "results.json", text.encode())
     return outcome, evidence
 
@@ -175,9 +175,12 @@ def already(
     experiments = chosen(names)
     seeds = range(first_seed, first_seed + runs)
     tasks = tasks_for(settings_of(experiments), seeds)
-    drawn = [each.name for each in experiments] if figures else []
+    every = [each.name for each in experiments]
+    drawn = every if figures else []
     store = ParquetStore(directory / TASKS)
-    found = resume.finished(directory, store, tasks, drawn)
+    found = resume.finished(directory, store, tasks, every)
+    if found is None and not figures:
+        found = resume.finished(directory, store, tasks, [])
     return found, resume.stamp(tasks, drawn)
 
 

@@ -10,6 +10,7 @@ from typing import Any
 
 from acl_gym.experiments.fingerprint import ROOT
 from acl_gym.experiments.runner import Task
+from acl_gym.reproduction.catalogue import BY_NAME
 from acl_gym.reproduction.page import (
     ANIMATED,
     ANIMATION,
@@ -38,16 +39,16 @@ def stamp(tasks: Iterable[Task], figures: Iterable[str]) -> str:
 
 
 def begin(directory: Path) -> None:
-    """What is in the folder is about to change.
+    """Results are about to be written.
 
     Pages and figures of before go, so that they do not stand beside other results, and so
-    does what was half written. Runs stay.
+    does what was half written. Runs stay, and pictures that are not of an experiment.
     """
     for name in (FINISHED, PAGE, CLAIMS_TABLE):
         (directory / name).unlink(missing_ok=True)
-    for kind in ("*.png", "*.svg", "*.gif"):
-        for figure in (directory / FIGURES).glob(kind):
-            figure.unlink()
+    figures = [f"{name}.{kind}" for name in BY_NAME for kind in ("png", "svg")]
+    for name in (*figures, ANIMATION):
+        (directory / FIGURES / name).unlink(missing_ok=True)
     for folder in (directory, directory / FIGURES):
         for half in folder.glob(".*.tmp"):
             half.unlink()

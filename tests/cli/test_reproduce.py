@@ -46,11 +46,26 @@ def test_a_figure_and_its_report(tmp_path: Path) -> None:
     assert (folder / "figures" / "fig3.9.png").is_file()
     assert [path.stat().st_mtime_ns for path in files] == before
 
+    # Whoever wants no figures leaves those that are there, of these results.
+    again = run(*SMALL, "--out", "r", "--no-figures", cwd=tmp_path)
+    assert "Nothing to do" in again.stdout
+    assert (folder / "figures" / "fig3.9.png").is_file()
+
     (folder / "report.html").unlink()
     told = figures("report", str(folder))
     assert told["report"] == str(folder / "report.html")
     assert told["claims"] == verdicts
     assert (folder / "report.html").is_file()
+
+
+def test_results_replace_what_was_made_of_others_only(tmp_path: Path) -> None:
+    for name in ("fig3.9.svg", "fig5.4.png", "holiday.png"):
+        path = tmp_path / "r" / "figures" / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.touch()
+    again = run(*SMALL, "--out", "r", "--no-figures", cwd=tmp_path)
+    assert again.returncode == 0, again.stderr
+    assert [path.name for path in path.parent.iterdir()] == ["holiday.png"]
 
 
 def test_the_list() -> None:

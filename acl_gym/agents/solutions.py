@@ -136,6 +136,7 @@ class Solutions:
             ValueError: within a trial, the number of variables changes.
         """
         width, kept = seen.shape[1], self._rows
+        self._room = None  # has room for rows of the former kind
         if kept is None or not self.length.any():
             self._rows = np.empty((self._size, width), dtype=seen.dtype)
         elif kept.shape[1] != width:
@@ -206,11 +207,7 @@ class Solutions:
     def _room_for(self, rows: NDArray[Any]) -> _Room:
         """Scratch for a block, the same in every trial."""
         room = self._room
-        if (
-            room is None
-            or room.seen.dtype != rows.dtype
-            or room.seen.shape[1:] != rows.shape[1:]
-        ):
+        if room is None:
             most = max(ROWS_PER_BLOCK, self.max_steps)
             k = self.partition.cells_per_state
             room = self._room = _Room(

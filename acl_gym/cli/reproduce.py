@@ -105,6 +105,7 @@ def reproduce(
     from acl_gym.reproduction import reproduce as reproduction
     from acl_gym.reproduction import resume
     from acl_gym.reproduction.catalogue import RUNS
+    from acl_gym.reproduction.page import PAGE
 
     wanted = names or ["all"]
     try:
@@ -124,7 +125,7 @@ def reproduce(
     outcome, made_from = reproduction.already(wanted, runs, out, seed, figures)
     if outcome is not None:
         screen.print(f"Nothing to do: all of it is in {out}, made by the same code.")
-        _tell(outcome, as_json, screen, out / "report.html" if figures else None)
+        _tell(outcome, as_json, screen, out / PAGE if figures else None)
         return
     try:
         out.mkdir(parents=True, exist_ok=True)
@@ -148,7 +149,7 @@ def reproduce(
         ) from error
     except OSError as error:
         raise _cannot_write(out, error) from error
-    _tell(outcome, as_json, screen, out / "report.html" if figures else None)
+    _tell(outcome, as_json, screen, out / PAGE if figures else None)
 
 
 def report(

@@ -32,7 +32,14 @@ from acl_gym.reproduction.catalogue import BY_NAME, EXPERIMENTS, RUNS
 from acl_gym.reproduction.claims import CLAIMS
 from acl_gym.reproduction.evidence import Evidence
 from acl_gym.reproduction.outcome import Outcome, outcome_of, runs_made
-from acl_gym.reproduction.page import ANIMATED, ANIMATION
+from acl_gym.reproduction.page import (
+    ANIMATED,
+    ANIMATION,
+    FIGURES,
+    RESULTS,
+    write_claims,
+    write_page,
+)
 from acl_gym.reproduction.settings import Experiment, Runnable
 from acl_gym.reproduction.store import ParquetStore
 from acl_gym.storage import write_atomically
@@ -153,7 +160,7 @@ def reproduce(
     outcome["runs_made"] = runs_made(results)
     text = json.dumps(outcome)
     resume.begin(directory)
-    write_atomically(directory / "results.json", text.encode())
+    write_atomically(directory / RESULTS, text.encode())
     return outcome, evidence
 
 
@@ -200,7 +207,7 @@ def draw(
     """
     from acl_gym.reproduction import figures
 
-    folder = directory / "figures"
+    folder = directory / FIGURES
     folder.mkdir(parents=True, exist_ok=True)
     with console.status("Drawing") as status:
         for experiment in experiments:
@@ -217,8 +224,6 @@ def write_report(directory: Path) -> Path:
     Returns:
         The path of the page.
     """
-    from acl_gym.reproduction.page import write_claims, write_page
-
     write_claims(directory)
     return write_page(directory)
 

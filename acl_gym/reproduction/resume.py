@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -46,9 +46,8 @@ def begin(directory: Path) -> None:
     """
     for name in (FINISHED, PAGE, CLAIMS_TABLE):
         (directory / name).unlink(missing_ok=True)
-    figures = [f"{name}.{kind}" for name in BY_NAME for kind in ("png", "svg")]
-    for name in (*figures, ANIMATION):
-        (directory / FIGURES / name).unlink(missing_ok=True)
+    for figure in _figures(directory, BY_NAME):
+        figure.unlink(missing_ok=True)
     for folder in (directory, directory / FIGURES):
         for half in folder.glob(".*.tmp"):
             half.unlink()
@@ -80,9 +79,14 @@ def finished(
     files = [directory / RESULTS]
     if figures:
         files += [directory / PAGE, directory / CLAIMS_TABLE]
-        folder = directory / FIGURES
-        files += [folder / f"{n}.{kind}" for n in figures for kind in ("png", "svg")]
-        files += [folder / ANIMATION] if ANIMATED in figures else []
+        files += _figures(directory, figures)
     if said != stamp(tasks, figures) or not all(path.is_file() for path in files):
         return None
     return outcome if all(store.has(task) for task in tasks) else None
+
+
+def _figures(directory: Path, names: Collection[str]) -> list[Path]:
+    """Where the figures of these experiments are."""
+    files = [f"{name}.{kind}" for name in names for kind in ("png", "svg")]
+    files += [ANIMATION] if ANIMATED in names else []
+    return [directory / FIGURES / file for file in files]

@@ -75,21 +75,26 @@ class Runnable(Protocol):
         """The interactions at the points of `along`; None: they are trials 1, 2, ..."""
 
 
-def about_of(setting: Any) -> dict[str, Any]:
-    """All fields of a `Runnable` that its results depend on, JSON types."""
-    about = asdict(setting)
-    del about["most_runs"]
-    return about
+@dataclass(frozen=True)
+class Named:
+    """A dataclass that is named by its fields, but for `most_runs`."""
 
+    @property
+    def about(self) -> dict[str, Any]:
+        """All that a result depends on but the seed, JSON types."""
+        about = asdict(self)
+        del about["most_runs"]
+        return about
 
-def key_of(about: dict[str, Any]) -> str:
-    """A short name for what is in `about`."""
-    text = json.dumps(about, sort_keys=True)
-    return hashlib.sha256(text.encode()).hexdigest()[:12]
+    @cached_property
+    def key(self) -> str:
+        """A short name for what is in it."""
+        text = json.dumps(self.about, sort_keys=True)
+        return hashlib.sha256(text.encode()).hexdigest()[:12]
 
 
 @dataclass(frozen=True)
-class Setting:
+class Setting(Named):
     """A colony on a system, all but the seed.
 
     Attributes:
@@ -117,16 +122,6 @@ class Setting:
     evaluation_steps: int | None = None
     order: str = "two phases"
     most_runs: int | None = None
-
-    @property
-    def about(self) -> dict[str, Any]:
-        """All that a result depends on but the seed, JSON types."""
-        return about_of(self)
-
-    @cached_property
-    def key(self) -> str:
-        """Names the setting by what is in it."""
-        return key_of(self.about)
 
     @property
     def system(self) -> str:

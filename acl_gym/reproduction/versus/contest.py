@@ -5,7 +5,6 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -18,7 +17,7 @@ from acl_gym.agents.q_learning import QLearning
 from acl_gym.agents.tabular import TabularAgent
 from acl_gym.callbacks import Callback, Row
 from acl_gym.evaluation import evaluate_policy_cost
-from acl_gym.reproduction.settings import Learner, Result, about_of, key_of
+from acl_gym.reproduction.settings import Learner, Named, Result
 from acl_gym.reproduction.versus.arena import Arena
 from acl_gym.reproduction.versus.spaces import METHODS
 from acl_gym.reproduction.versus.veils import Backwards, BackwardsLuck
@@ -34,7 +33,7 @@ POINTS = 120
 
 
 @dataclass(frozen=True)
-class Contest:
+class Contest(Named):
     """A method with its settings in an arena, all but the seed.
 
     Attributes:
@@ -53,16 +52,6 @@ class Contest:
     settings: dict[str, Any]
     backwards: bool = False
     most_runs: int | None = None
-
-    @property
-    def about(self) -> dict[str, Any]:
-        """All that a result depends on but the seed, JSON types."""
-        return about_of(self)
-
-    @cached_property
-    def key(self) -> str:
-        """Names the contest by what is in it."""
-        return key_of(self.about)
 
     @property
     def system(self) -> str:

@@ -9,14 +9,11 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from acl_gym.registration import register_environments
+from acl_gym.envs import register_environments
 
 if TYPE_CHECKING:
     from acl_gym.agents.acl import ACL
-    from acl_gym.agents.q_iteration import fuzzy_q_iteration
     from acl_gym.agents.q_learning import QLearning
-    from acl_gym.agents.sb3 import VectorEnvAdapter
-    from acl_gym.agents.value_iteration import value_iteration
     from acl_gym.callbacks import (
         Callback,
         Checkpoint,
@@ -25,12 +22,15 @@ if TYPE_CHECKING:
         PolicyEvaluation,
         TensorBoardLog,
     )
-    from acl_gym.envs.waiting import WaitingVectorEnv
-    from acl_gym.envs.wrappers import ScaledObservation, ScaledVectorObservation
+    from acl_gym.envs.wrappers.scaling import ScaledObservation, ScaledVectorObservation
+    from acl_gym.envs.wrappers.waiting import WaitingVectorEnv
     from acl_gym.evaluation import PolicyCost, evaluate_policy_cost
-    from acl_gym.partition import Crisp, Discrete, Fuzzy, Partition
-    from acl_gym.partition.automatic import automatic_partition
-    from acl_gym.threads import get_num_threads, set_num_threads
+    from acl_gym.partitions import Crisp, Discrete, Fuzzy, Partition
+    from acl_gym.partitions.automatic import automatic_partition
+    from acl_gym.planning.q_iteration import fuzzy_q_iteration
+    from acl_gym.planning.value_iteration import value_iteration
+    from acl_gym.sb3.adapter import VectorEnvAdapter
+    from acl_gym.utils.threads import get_num_threads, set_num_threads
 
 __version__ = "0.1.0"
 
@@ -41,25 +41,25 @@ _PUBLIC = {
     "CSVLog": "acl_gym.callbacks",
     "Callback": "acl_gym.callbacks",
     "Checkpoint": "acl_gym.callbacks",
-    "Crisp": "acl_gym.partition",
-    "Discrete": "acl_gym.partition",
+    "Crisp": "acl_gym.partitions",
+    "Discrete": "acl_gym.partitions",
     "EarlyStop": "acl_gym.callbacks",
-    "Fuzzy": "acl_gym.partition",
-    "Partition": "acl_gym.partition",
+    "Fuzzy": "acl_gym.partitions",
+    "Partition": "acl_gym.partitions",
     "PolicyCost": "acl_gym.evaluation",
     "PolicyEvaluation": "acl_gym.callbacks",
     "QLearning": "acl_gym.agents.q_learning",
     "ScaledObservation": "acl_gym.envs.wrappers",
     "ScaledVectorObservation": "acl_gym.envs.wrappers",
     "TensorBoardLog": "acl_gym.callbacks",
-    "VectorEnvAdapter": "acl_gym.agents.sb3",
-    "WaitingVectorEnv": "acl_gym.envs.waiting",
-    "automatic_partition": "acl_gym.partition.automatic",
+    "VectorEnvAdapter": "acl_gym.sb3.adapter",
+    "WaitingVectorEnv": "acl_gym.envs.wrappers.waiting",
+    "automatic_partition": "acl_gym.partitions.automatic",
     "evaluate_policy_cost": "acl_gym.evaluation",
-    "fuzzy_q_iteration": "acl_gym.agents.q_iteration",
-    "get_num_threads": "acl_gym.threads",
-    "set_num_threads": "acl_gym.threads",
-    "value_iteration": "acl_gym.agents.value_iteration",
+    "fuzzy_q_iteration": "acl_gym.planning.q_iteration",
+    "get_num_threads": "acl_gym.utils.threads",
+    "set_num_threads": "acl_gym.utils.threads",
+    "value_iteration": "acl_gym.planning.value_iteration",
 }
 
 __all__ = [

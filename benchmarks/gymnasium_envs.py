@@ -25,11 +25,11 @@ from gymnasium_settings import ENVIRONMENTS, Candidate, Environment
 
 from acl_gym import ACL, Crisp, Fuzzy, PolicyEvaluation, QLearning, WaitingVectorEnv
 from acl_gym.agents.acl import PheromoneBoundWarning
-from acl_gym.costs import Episode
+from acl_gym.colony.episodes import Episode
 from acl_gym.evaluation import Predictor, evaluate_policy_cost
 from acl_gym.experiments.runner import Task, run_tasks
-from acl_gym.partition.automatic import automatic_partition
-from acl_gym.storage import write_atomically
+from acl_gym.partitions.automatic import automatic_partition
+from acl_gym.utils.files import write_atomically
 
 Report = Callable[[float], None]
 Run = dict[str, Any]
@@ -151,8 +151,8 @@ def train_dqn(
     from stable_baselines3 import DQN
     from stable_baselines3.common.callbacks import ConvertCallback
 
-    from acl_gym.agents.dqn import PolicyCostCallback
-    from acl_gym.agents.sb3 import VectorEnvAdapter
+    from acl_gym.sb3.adapter import VectorEnvAdapter
+    from acl_gym.sb3.dqn import PolicyCostCallback
 
     torch.set_num_threads(1)  # the fastest for such small networks
     slots, steps, every, net_arch = (

@@ -9,8 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
-from acl_gym.deposits import InverseCost, Rank
-from acl_gym.schedules import Linear
+from acl_gym.colony.deposits import InverseCost, Rank
+from acl_gym.colony.schedules import Linear
 
 Candidate = dict[str, Any]
 """Settings of one method. For "acl" and "q-learning": `slots`, `trials`, `every`

@@ -25,8 +25,8 @@ from matplotlib.patches import Rectangle
 from tqdm.auto import tqdm
 
 from acl_gym import ACL, Fuzzy, evaluate_policy_cost
-from acl_gym.agents.policy import TablePolicy
 from acl_gym.evaluation import actions_in, record_trajectory
+from acl_gym.policies import TablePolicy
 
 TRIALS = 100
 FIRST_TRIAL = 51

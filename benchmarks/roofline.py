@@ -23,13 +23,13 @@ from numba import njit
 from rich.console import Console
 from rich.table import Table
 
-from acl_gym.agents import selection
-from acl_gym.agents.pheromone import Pheromone
-from acl_gym.agents.solutions import Solutions
+from acl_gym.colony import selection
+from acl_gym.colony.pheromone import Pheromone
+from acl_gym.colony.solutions import Solutions
 from acl_gym.envs import navigation, pendulum
 from acl_gym.experiments import drawing
-from acl_gym.membership import written_out
-from acl_gym.partition import Fuzzy
+from acl_gym.partitions import Fuzzy
+from acl_gym.partitions.kernels import written_out
 
 ANTS = 2_000
 

@@ -17,14 +17,8 @@ from gymnasium.wrappers.vector import TransformReward
 from tqdm.auto import tqdm
 
 from acl_gym import ACL, QLearning, evaluate_policy_cost
-from acl_gym.costs import (
-    Cost,
-    Overshoot,
-    RiseTime,
-    SettlingTime,
-    Steps,
-)
-from acl_gym.partition import named
+from acl_gym.colony.costs import Cost, Overshoot, RiseTime, SettlingTime, Steps
+from acl_gym.partitions import named
 
 TURN = 2 * math.pi
 ANGLE = {"variable": 0, "target": math.pi, "period": TURN}

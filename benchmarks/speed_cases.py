@@ -12,7 +12,7 @@ import numpy as np
 from numpy_colony import NumpyColony
 
 from acl_gym.agents.acl import ACL
-from acl_gym.partition import Crisp, Discrete, Fuzzy, Partition, named
+from acl_gym.partitions import Crisp, Discrete, Fuzzy, Partition, named
 
 Work = Callable[[], int]
 """Does some steps of all slots together and returns their number."""
@@ -136,7 +136,7 @@ def train_dqn(steps: int) -> Work:
     """Train Stable-Baselines3's DQN with the comparison's settings, on one thread."""
     import torch
 
-    from acl_gym.agents.dqn import make_dqn
+    from acl_gym.sb3.dqn import make_dqn
 
     torch.set_num_threads(1)
 
@@ -233,7 +233,7 @@ def plan(systems: list[str], sizes: list[int], dqn_steps: int) -> Iterator[Plan]
         ),
         alone("pendulum", 16) if 16 in sizes else "",
     )
-    from acl_gym.agents.dqn import DQNSettings
+    from acl_gym.sb3.dqn import DQNSettings
 
     dqn, dqn_slots = (
         f"DQN of Stable-Baselines3, {dqn_steps:,} steps",

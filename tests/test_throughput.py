@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from acl_gym import ACL
-from acl_gym.partition import named
+from acl_gym.partitions import named
 
 FOLDER = Path(__file__).resolve().parents[1] / "benchmarks"
 

@@ -12,28 +12,28 @@ from gymnasium.vector import VectorEnv
 from numba import njit
 from numpy.typing import ArrayLike
 
-from acl_gym import validation
-from acl_gym.agents.pheromone import BoolArray, Pheromone
-from acl_gym.agents.policy import SoftPolicy
-from acl_gym.agents.selection import RULES, choose_actions
-from acl_gym.agents.solutions import Solutions
-from acl_gym.agents.tabular import TabularAgent
+from acl_gym.agents.base import TabularAgent
 from acl_gym.agents.training import Training
-from acl_gym.agents.walk import Walk
-from acl_gym.callbacks import Callbacks, Row
-from acl_gym.costs import (
-    Cost,
-    as_cost,
-    cost_from_settings,
-    solution_costs,
+from acl_gym.callbacks.base import Callbacks
+from acl_gym.colony.costs import Cost, as_cost, cost_from_settings, solution_costs
+from acl_gym.colony.deposits import (
+    Deposit,
+    InverseCost,
+    as_deposit,
+    deposit_from_settings,
 )
-from acl_gym.deposits import Deposit, InverseCost, as_deposit, deposit_from_settings
-from acl_gym.envs.control_env import ControlVectorEnv
-from acl_gym.episodes import Episode
-from acl_gym.membership import CellArray, FloatArray, IntArray
-from acl_gym.partition import Partition
-from acl_gym.savable import to_settings
-from acl_gym.schedules import Scheduled, Setting, schedule_from_settings
+from acl_gym.colony.episodes import Episode
+from acl_gym.colony.pheromone import Pheromone
+from acl_gym.colony.schedules import Scheduled, Setting, schedule_from_settings
+from acl_gym.colony.selection import RULES, choose_actions
+from acl_gym.colony.solutions import Solutions
+from acl_gym.envs.control.environments import ControlVectorEnv
+from acl_gym.evaluation.rollout import Rollout
+from acl_gym.partitions import Partition
+from acl_gym.policies import SoftPolicy
+from acl_gym.utils import validation
+from acl_gym.utils.serialization import to_settings
+from acl_gym.utils.typing import BoolArray, CellArray, FloatArray, IntArray, Row
 
 
 class PheromoneBoundWarning(UserWarning):
@@ -173,25 +173,25 @@ class ACL(TabularAgent):
         with Training(self, *budget) as training:
             while training.next_trial():  # 2, 22: repeat until k = K
                 # 3-6: every ant begins in a random state with an empty solution
-                walk, solutions = self.walk, self._empty_solutions()
+                rollout, solutions = self.rollout, self._empty_solutions()
                 pheromone.alpha, epsilon = self._now("alpha"), self._now("epsilon")
                 whole = self.cost is not None  # the cost looks at whole solutions
-                observation = walk.start(seed=self._next_seed(), record=whole)
-                while walk.ants.size:  # 7, 17: repeat until t = T or C is empty
-                    ants = walk.ants
+                observation = rollout.start(seed=self._next_seed(), record=whole)
+                while rollout.ants.size:  # 7, 17: repeat until t = T or C is empty
+                    ants = rollout.ants
                     # 8: fuzzify the states
                     index, degree = self._locate(observation, ants)
                     # 9: select actions, all on the same pheromone
-                    allowed = self._allowed(walk, solutions, index)
+                    allowed = self._allowed(rollout, solutions, index)
                     actions = self._choose(index, degree, epsilon, self.rng, allowed)
                     # 10: add the pairs to the partial solutions
                     solutions.append(ants, observation, index, actions)
                     # 11, 13-16: apply the actions; who is at the goal leaves C
-                    observation = walk.step(actions).observation
+                    observation = rollout.step(actions).observation
                     # 12: local pheromone update (4.12)
                     pheromone.local_update(index, degree, actions, self.local_decay)
                 # 18-20: global pheromone update with all solutions (4.15)
-                costs = self._costs(walk)
+                costs = self._costs(rollout)
                 deposits = self._deposit(costs, self.tau0)
                 pheromone.global_update(solutions, deposits, self.global_decay)
                 training.end_trial(costs)  # 21: k <- k + 1
@@ -331,22 +331,22 @@ class ACL(TabularAgent):
         setting: Scheduled = getattr(type(self), name)
         return setting.at(self, self.trials)
 
-    def _costs(self, walk: Walk) -> FloatArray:
+    def _costs(self, rollout: Rollout) -> FloatArray:
         """J of each ant."""
         if self.cost is None:
-            return walk.cost
-        return solution_costs(self.cost, walk.episodes())
+            return rollout.cost
+        return solution_costs(self.cost, rollout.episodes())
 
     def _allowed(
-        self, walk: Walk, solutions: Solutions, index: CellArray
+        self, rollout: Rollout, solutions: Solutions, index: CellArray
     ) -> BoolArray | None:
         """U_q of each walking ant, less what is tabu; None: all actions."""
-        allowed = walk.allowed()
+        allowed = rollout.allowed()
         if not self.tabu:
             return allowed
         if allowed is None:
-            allowed = np.ones((walk.ants.size, self.n_actions), dtype=np.bool_)
-        return solutions.untried(walk.ants, index, allowed)
+            allowed = np.ones((rollout.ants.size, self.n_actions), dtype=np.bool_)
+        return solutions.untried(rollout.ants, index, allowed)
 
     def _explore(
         self, index: CellArray, degree: FloatArray, allowed: BoolArray | None

@@ -9,20 +9,19 @@ from gymnasium.vector import VectorEnv
 from numba import njit
 from numpy.typing import ArrayLike
 
-from acl_gym import validation
-from acl_gym.agents.pheromone import BoolArray
-from acl_gym.agents.selection import (
+from acl_gym.agents.base import TabularAgent
+from acl_gym.agents.training import Training
+from acl_gym.callbacks.base import Callbacks
+from acl_gym.colony.selection import (
     ALL,
     best_value,
     epsilon_greedy_actions,
     mark_greedy,
 )
-from acl_gym.agents.tabular import TabularAgent
-from acl_gym.agents.training import Training
-from acl_gym.agents.walk import Step, Walk
-from acl_gym.callbacks import Callbacks
-from acl_gym.membership import CellArray, FloatArray, IntArray
-from acl_gym.partition import Partition
+from acl_gym.evaluation.rollout import Rollout, Step
+from acl_gym.partitions import Partition
+from acl_gym.utils import validation
+from acl_gym.utils.typing import BoolArray, CellArray, FloatArray, IntArray
 
 TRACES = ("replacing", "accumulating")
 
@@ -117,17 +116,17 @@ class QLearning(TabularAgent):
         budget = (total_timesteps, trials, callback, log_interval, progress_bar)
         with Training(self, *budget) as training:
             while training.next_trial():
-                walk, traces = self.walk, self._empty_traces()
-                observation = walk.start(seed=self._next_seed())
+                rollout, traces = self.rollout, self._empty_traces()
+                observation = rollout.start(seed=self._next_seed())
                 index, degree = self.partition(observation)
-                allowed = walk.allowed()
-                while walk.ants.size:
+                allowed = rollout.allowed()
+                while rollout.ants.size:
                     actions = epsilon_greedy_actions(
                         self._table, index, degree, self.epsilon, self.rng, allowed
                     )
-                    step = walk.step(actions)
+                    step = rollout.step(actions)
                     next_index, next_degree = self._locate(step.observation, step.ants)
-                    next_allowed = walk.allowed()
+                    next_allowed = rollout.allowed()
                     transition = (
                         self._table,
                         index,
@@ -137,7 +136,7 @@ class QLearning(TabularAgent):
                         step.terminated,
                         next_index,
                         next_degree,
-                        _next_allowed(walk, step),
+                        _next_allowed(rollout, step),
                         self.learning_rate,
                         self.discount,
                     )
@@ -249,14 +248,14 @@ class _Traces:
         self._count[:] = 0
 
 
-def _next_allowed(walk: Walk, step: Step) -> BoolArray:
+def _next_allowed(rollout: Rollout, step: Step) -> BoolArray:
     """U_q of the states that a step led to, `(m, n_actions)`; `ALL` if all is allowed.
 
-    `walk.allowed()` is for the slots that walk on; these are all that took the step.
+    `rollout.allowed()` is for the slots that walk on; these are all that took the step.
     """
-    if walk.action_mask is None:
+    if rollout.action_mask is None:
         return ALL
-    allowed = walk.action_mask[step.ants]
+    allowed = rollout.action_mask[step.ants]
     # Where an episode ends, an environment may allow nothing any more.
     allowed[~allowed.any(axis=1)] = True
     return allowed

@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import time
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 from tqdm.auto import tqdm
 
-from acl_gym import validation
-from acl_gym.callbacks import Callbacks, Row, as_callbacks, is_stop
-
-if TYPE_CHECKING:
-    from acl_gym.agents.tabular import TabularAgent
+from acl_gym.agents.base import TabularAgent
+from acl_gym.callbacks.base import Callbacks, as_callbacks, is_stop
+from acl_gym.utils import validation
+from acl_gym.utils.typing import Row
 
 DEFAULT_TRIALS = 100
 """K of Table 5.2."""
@@ -103,8 +102,8 @@ class Training:
         Args:
             costs: J of each ant; None takes the sums of the stage costs.
         """
-        agent, walk = self._agent, self._agent.walk
-        steps = int(walk.length.sum())
+        agent, rollout = self._agent, self._agent.rollout
+        steps = int(rollout.length.sum())
         agent.num_timesteps += steps
         agent.trials += 1
         agent.seconds += time.perf_counter() - self._clock
@@ -113,8 +112,8 @@ class Training:
             "trial": agent.trials,
             "env_steps": agent.num_timesteps,
             "seconds": agent.seconds,
-            "ants_cost": float((walk.cost if costs is None else costs).mean()),
-            "ants_success_rate": float(walk.success.mean()),
+            "ants_cost": float((rollout.cost if costs is None else costs).mean()),
+            "ants_success_rate": float(rollout.success.mean()),
             "policy_variation": float(np.mean(policy != self._policy)),
             **agent.measures(policy),
         }

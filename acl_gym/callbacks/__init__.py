@@ -1,18 +1,20 @@
 """What may happen between trials: your own function, or one of these objects."""
 
 from acl_gym.callbacks.base import (
+    Agent,
     Callback,
     Callbacks,
     Function,
-    Row,
     as_callbacks,
     is_stop,
 )
 from acl_gym.callbacks.evaluation import EarlyStop, PolicyEvaluation
 from acl_gym.callbacks.files import Checkpoint, CSVLog
 from acl_gym.callbacks.tensorboard import TensorBoardLog
+from acl_gym.utils.typing import Row
 
 __all__ = [
+    "Agent",
     "CSVLog",
     "Callback",
     "Callbacks",

@@ -3,24 +3,54 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any, Protocol
 
 import numpy as np
+from gymnasium.vector import VectorEnv
+from numpy.typing import ArrayLike
 
-if TYPE_CHECKING:
-    from acl_gym.agents.tabular import TabularAgent
+from acl_gym.evaluation import Predictor
+from acl_gym.utils.typing import FloatArray, Row
 
-Row = dict[str, float]
-"""The measures of one trial, see `TabularAgent.history`."""
+
+class Agent(Predictor, Protocol):
+    """What callbacks see of an agent; `TabularAgent` says what it means."""
+
+    env: VectorEnv[Any, Any, Any] | None
+    num_timesteps: int
+    trials: int
+    seconds: float
+    history: list[Row]
+    in_trial: bool
+    metadata: dict[str, Any]
+
+    @property
+    def table(self) -> FloatArray:
+        """The table as it is now, `(n_cells, n_actions)`."""
+
+    @property
+    def policy(self) -> Predictor:
+        """The policy as it is now."""
+
+    @property
+    def max_steps(self) -> int:
+        """T, the longest an episode may last."""
+
+    def set_table(self, table: ArrayLike) -> None:
+        """Replace the table."""
+
+    def save(self, path: str | Path) -> Path:
+        """Write the agent to one file, and return its path."""
 
 
 class Callback:
     """Base class: override what you need."""
 
-    def on_training_start(self, agent: TabularAgent) -> None:
+    def on_training_start(self, agent: Agent) -> None:
         """Called once before the first trial."""
 
-    def on_trial_end(self, agent: TabularAgent, row: Row) -> bool | None:
+    def on_trial_end(self, agent: Agent, row: Row) -> bool | None:
         """Called after every trial; it may add measures to `row`.
 
         Returns:
@@ -28,11 +58,11 @@ class Callback:
         """
         return True
 
-    def on_training_end(self, agent: TabularAgent) -> None:
+    def on_training_end(self, agent: Agent) -> None:
         """Called once after the last trial, also after an exception."""
 
 
-Function = Callable[["TabularAgent", Row], Any]
+Function = Callable[[Agent, Row], Any]
 Callbacks = None | Callback | Function | Iterable[Callback | Function]
 """What `learn` takes: nothing, one of these, or several."""
 
@@ -41,7 +71,7 @@ class _FunctionCallback(Callback):
     def __init__(self, function: Function) -> None:
         self._function = function
 
-    def on_trial_end(self, agent: TabularAgent, row: Row) -> bool | None:
+    def on_trial_end(self, agent: Agent, row: Row) -> bool | None:
         return not is_stop(self._function(agent, row))
 
 

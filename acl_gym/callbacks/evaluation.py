@@ -5,25 +5,23 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from gymnasium.vector import VectorEnv
 from numpy.typing import NDArray
 
-from acl_gym import storage, validation
-from acl_gym.agents.policy import TablePolicy
-from acl_gym.agents.walk import require_vector_env
-from acl_gym.callbacks.base import Callback, Row
+from acl_gym.callbacks.base import Agent, Callback
 from acl_gym.evaluation import (
     PolicyCost,
     Predictor,
     evaluate_policy_cost,
     with_slots_for,
 )
-
-if TYPE_CHECKING:
-    from acl_gym.agents.tabular import TabularAgent
+from acl_gym.evaluation.rollout import require_vector_env
+from acl_gym.policies import TablePolicy
+from acl_gym.utils import files, validation
+from acl_gym.utils.typing import Row
 
 
 class PolicyEvaluation(Callback):
@@ -78,7 +76,7 @@ class PolicyEvaluation(Callback):
             )
         self.save_best = None
         if save_best is not None:
-            self.save_best = storage.checked_target(storage.with_suffix(save_best))
+            self.save_best = files.checked_target(files.with_suffix(save_best))
         self._saved_cost = math.inf
         self.seed = seed
         self.policy = policy
@@ -92,27 +90,27 @@ class PolicyEvaluation(Callback):
         self.best: PolicyCost | None = None
         self.best_policy: Predictor | None = None
 
-    def on_training_start(self, agent: TabularAgent) -> None:
+    def on_training_start(self, agent: Agent) -> None:
         """Look up what the agent in the file has reached."""
         self._saved_cost = math.inf
         if self.save_best is not None and self.save_best.exists():
             costs = (row.get("policy_cost", math.inf) for row in agent.history)
             self._saved_cost = min(costs, default=math.inf)
 
-    def on_trial_end(self, agent: TabularAgent, row: Row) -> bool | None:
+    def on_trial_end(self, agent: Agent, row: Row) -> bool | None:
         """Evaluate if it is time to."""
         if row["trial"] % self.every == 0:
             self._evaluate(agent, row)
         return True
 
-    def on_training_end(self, agent: TabularAgent) -> None:
+    def on_training_end(self, agent: Agent) -> None:
         """Evaluate the last policy if the last trial was not, and is whole."""
         if agent.in_trial:
             return
         if agent.history and "policy_cost" not in agent.history[-1]:
             self._evaluate(agent, agent.history[-1])
 
-    def _evaluate(self, agent: TabularAgent, row: Row) -> None:
+    def _evaluate(self, agent: Agent, row: Row) -> None:
         policy = agent if self.policy is None else self.policy(agent)
         if policy is agent:
             policy = agent.policy
@@ -184,11 +182,11 @@ class EarlyStop(Callback):
         self.threshold = threshold
         self._begin(0)
 
-    def on_training_start(self, agent: TabularAgent) -> None:
+    def on_training_start(self, agent: Agent) -> None:
         """Begin to count."""
         self._begin(len(agent.history))
 
-    def on_trial_end(self, agent: TabularAgent, row: Row) -> bool | None:
+    def on_trial_end(self, agent: Agent, row: Row) -> bool | None:
         """Look at the measure, if the row has it."""
         value = row.get(self.measure)
         if value is None:
@@ -202,7 +200,7 @@ class EarlyStop(Callback):
         reached = self.threshold is not None and value <= self.threshold
         return not reached and self.waited < self.patience
 
-    def on_training_end(self, agent: TabularAgent) -> None:
+    def on_training_end(self, agent: Agent) -> None:
         """Refuse to have watched a measure that was never there."""
         rows = agent.history[self._first :]
         if self._seen or agent.in_trial or not rows:

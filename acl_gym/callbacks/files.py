@@ -7,13 +7,11 @@ import io
 import re
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from acl_gym import storage, validation
-from acl_gym.callbacks.base import Callback, Row
-
-if TYPE_CHECKING:
-    from acl_gym.agents.tabular import TabularAgent
+from acl_gym.callbacks.base import Agent, Callback
+from acl_gym.utils import files, validation
+from acl_gym.utils.typing import Row
 
 _CHECKPOINT = re.compile(r"trial_(\d{6,})\.npz")
 
@@ -46,22 +44,22 @@ class Checkpoint(Callback):
             keep = validation.integer("keep", keep, at_least=1)
         self.keep = keep
 
-    def on_training_start(self, agent: TabularAgent) -> None:
+    def on_training_start(self, agent: Agent) -> None:
         """Make the directory."""
         self.directory.mkdir(parents=True, exist_ok=True)
 
-    def on_trial_end(self, agent: TabularAgent, row: Row) -> bool | None:
+    def on_trial_end(self, agent: Agent, row: Row) -> bool | None:
         """Save if it is time to."""
         if row["trial"] % self.every == 0:
             self._save(agent)
         return True
 
-    def on_training_end(self, agent: TabularAgent) -> None:
+    def on_training_end(self, agent: Agent) -> None:
         """Save the last trial if it is whole, with what its row has gained since."""
         if not agent.in_trial and agent.trials:
             self._save(agent)
 
-    def _save(self, agent: TabularAgent) -> None:
+    def _save(self, agent: Agent) -> None:
         agent.save(self.directory / f"trial_{agent.trials:06d}.npz")
         if self.keep is None:
             return
@@ -93,7 +91,7 @@ class CSVLog(Callback):
     """
 
     def __init__(self, path: str | Path) -> None:
-        self.path = storage.checked_target(Path(path))
+        self.path = files.checked_target(Path(path))
         if self.path.exists() and not _is_log(self.path):
             raise ValueError(
                 f"{self.path} is there already and is not a log of acl-gym, whose "
@@ -102,12 +100,12 @@ class CSVLog(Callback):
         self._columns: list[str] = []
         self._last: Row = {}
 
-    def on_training_start(self, agent: TabularAgent) -> None:
+    def on_training_start(self, agent: Agent) -> None:
         """Write the rows that are there already, or an empty file."""
         self._columns = []
         self._write_all(agent.history)
 
-    def on_trial_end(self, agent: TabularAgent, row: Row) -> bool | None:
+    def on_trial_end(self, agent: Agent, row: Row) -> bool | None:
         """Append the row; a new column, which is rare, means writing all anew."""
         if any(name not in self._columns for name in row):
             self._write_all(agent.history)
@@ -117,7 +115,7 @@ class CSVLog(Callback):
             self._last = dict(row)
         return True
 
-    def on_training_end(self, agent: TabularAgent) -> None:
+    def on_training_end(self, agent: Agent) -> None:
         """Write the last row again if it has gained a measure since."""
         if agent.history and agent.history[-1] != self._last:
             self._write_all(agent.history)
@@ -127,7 +125,7 @@ class CSVLog(Callback):
         self._columns = list(dict.fromkeys(name for row in rows for name in row))
         header = [dict(zip(self._columns, self._columns, strict=True))] if rows else []
         text = self._lines([*header, *rows])
-        storage.write_atomically(self.path, text.encode())
+        files.write_atomically(self.path, text.encode())
         self._last = dict(rows[-1]) if rows else {}
 
     def _lines(self, rows: Iterable[Mapping[str, Any]]) -> str:

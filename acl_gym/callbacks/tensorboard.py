@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from acl_gym.callbacks.base import Callback, Row
-
-if TYPE_CHECKING:
-    from acl_gym.agents.tabular import TabularAgent
+from acl_gym.callbacks.base import Agent, Callback
+from acl_gym.utils.typing import Row
 
 # Column of a row -> tag; TensorBoard groups tags by what stands before the slash.
 _TAGS = {
@@ -44,7 +42,7 @@ class TensorBoardLog(Callback):
         self._writer: Any = None
         self._written: Row = {}
 
-    def on_training_start(self, agent: TabularAgent) -> None:
+    def on_training_start(self, agent: Agent) -> None:
         """Open an event file."""
         self._written = dict(agent.history[-1]) if agent.history else {}
         self._writer = self._writer_type(
@@ -53,12 +51,12 @@ class TensorBoardLog(Callback):
             flush_secs=10,
         )
 
-    def on_trial_end(self, agent: TabularAgent, row: Row) -> bool | None:
+    def on_trial_end(self, agent: Agent, row: Row) -> bool | None:
         """Write the row."""
         self._write(row, row)
         return True
 
-    def on_training_end(self, agent: TabularAgent) -> None:
+    def on_training_end(self, agent: Agent) -> None:
         """Write what the last row has gained since, and close the file."""
         if agent.history:
             row = agent.history[-1]

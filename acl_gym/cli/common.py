@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from gymnasium.vector import VectorEnv
     from rich.console import Console
 
-    from acl_gym.agents.tabular import TabularAgent
+    from acl_gym.agents.base import TabularAgent
 
 INTERRUPTED = 130
 """The exit code of a program that Ctrl-C has ended, as shells have it."""
@@ -195,8 +195,8 @@ def make_env(env_id: str, num_envs: int, env_args: dict[str, Any]) -> VectorEnv:
     """
     import gymnasium as gym
 
-    from acl_gym.envs.control_env import ControlVectorEnv
-    from acl_gym.envs.waiting import WaitingVectorEnv
+    from acl_gym.envs.control.environments import ControlVectorEnv
+    from acl_gym.envs.wrappers.waiting import WaitingVectorEnv
 
     module, _, name = env_id.rpartition(":")
     if module and os.getcwd() not in sys.path:
@@ -227,8 +227,8 @@ def _check_names(env_id: str, system: type, env_args: dict[str, Any]) -> None:
 
 def default_steps(env: VectorEnv) -> int:
     """T: that of the environment, 300 if it has none."""
-    from acl_gym.agents.tabular import DEFAULT_MAX_STEPS, time_limit
-    from acl_gym.envs.control_env import ControlVectorEnv
+    from acl_gym.agents.base import DEFAULT_MAX_STEPS, time_limit
+    from acl_gym.envs.control.environments import ControlVectorEnv
 
     base = env.unwrapped
     if isinstance(base, ControlVectorEnv):
@@ -243,10 +243,10 @@ def load_agent(path: str) -> TabularAgent:
         BadArgumentError: there is no such file, or it is not one of ours.
     """
     import acl_gym
-    from acl_gym import storage
+    from acl_gym.utils import files
 
     with bad_arguments():
-        name = str(storage.load(path)[0].get("agent"))
+        name = str(files.load(path)[0].get("agent"))
         if name not in AGENTS.values():
             raise ValueError(
                 f"{path} must hold one of {', '.join(AGENTS.values())}, got {name!r}."

@@ -24,7 +24,7 @@ from acl_gym.cli.common import (
     make_env,
     print_json,
 )
-from acl_gym.registration import ENVIRONMENTS
+from acl_gym.envs import ENVIRONMENTS
 
 HELP = """List the environments of acl-gym, or the parameters of one.
 
@@ -115,7 +115,9 @@ def _docstring(module: str, name: str) -> str:
     spec = importlib.util.find_spec(module)
     if spec is None or spec.origin is None:
         return ""
-    tree = ast.parse(Path(spec.origin).read_text(encoding="utf-8"))
+    # The package of a system only hands on what its module `env` defines.
+    source = Path(spec.origin).with_name("env.py")
+    tree = ast.parse(source.read_text(encoding="utf-8"))
     for node in tree.body:
         if isinstance(node, ast.ClassDef) and node.name == name:
             return ast.get_docstring(node) or ""

@@ -82,7 +82,7 @@ def evaluate(
     debug: DebugOption = False,
 ) -> None:
     """Evaluate; see `HELP`."""
-    from acl_gym.envs.control_env import ControlVectorEnv
+    from acl_gym.envs.control.environments import ControlVectorEnv
     from acl_gym.evaluation import evaluate_policy_cost
 
     agent = load_agent(file)

@@ -27,9 +27,9 @@ from acl_gym.cli.common import (
 if TYPE_CHECKING:
     from gymnasium.vector import VectorEnv
 
-    from acl_gym.agents.tabular import TabularAgent
+    from acl_gym.agents.base import TabularAgent
     from acl_gym.callbacks import Callback, PolicyEvaluation
-    from acl_gym.partition import Partition
+    from acl_gym.partitions import Partition
 
 HELP = """Learn on an environment, print how it went, and save the agent.
 
@@ -151,12 +151,13 @@ def train(
     debug: DebugOption = False,
 ) -> None:
     """Learn; see `HELP`."""
-    from acl_gym import set_num_threads, storage
+    from acl_gym import set_num_threads
+    from acl_gym.utils import files
 
     with bad_arguments():
         set_num_threads(threads)
-        out = storage.checked_target(
-            _free_name(env_id) if out is None else storage.with_suffix(out)
+        out = files.checked_target(
+            _free_name(env_id) if out is None else files.with_suffix(out)
         )
         kind = agent_class(agent)
         settings = parse_settings("--param", param or (), parameter_names(kind))
@@ -214,7 +215,7 @@ def _cells(text: str | None) -> list[int] | None:
 
 def _make_partition(env: VectorEnv, kind: str, cells: list[int] | None) -> Partition:
     from acl_gym import Crisp, Fuzzy
-    from acl_gym.partition.automatic import automatic_partition
+    from acl_gym.partitions.automatic import automatic_partition
 
     return automatic_partition(
         env,
@@ -229,7 +230,7 @@ def _make_evaluation(
 ) -> PolicyEvaluation:
     """From the environment's own initial states, else from random but fixed ones."""
     from acl_gym import PolicyEvaluation
-    from acl_gym.envs.control_env import ControlVectorEnv
+    from acl_gym.envs.control.environments import ControlVectorEnv
 
     if not isinstance(env.unwrapped, ControlVectorEnv):
         env = make_env(env_id, FOREIGN_EPISODES, env_args)

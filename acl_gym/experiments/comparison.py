@@ -27,7 +27,7 @@ from acl_gym.experiments.contestants import PRESETS
 from acl_gym.experiments.courses import COURSES, Course
 from acl_gym.experiments.pictures import PICTURES
 from acl_gym.experiments.runner import Task, run_tasks
-from acl_gym.storage import write_atomically
+from acl_gym.utils.files import write_atomically
 
 Comparison = dict[str, Any]
 """All that a report needs, JSON types only; see `_collect`."""

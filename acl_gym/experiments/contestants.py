@@ -15,22 +15,18 @@ import numpy as np
 from gymnasium.vector import VectorEnv
 
 from acl_gym.agents.acl import ACL, PheromoneBoundWarning
-from acl_gym.agents.q_iteration import fuzzy_q_iteration
+from acl_gym.agents.base import TabularAgent
 from acl_gym.agents.q_learning import QLearning
-from acl_gym.agents.tabular import TabularAgent
-from acl_gym.agents.value_iteration import value_iteration
-from acl_gym.callbacks import Callback, PolicyEvaluation, Row
-from acl_gym.envs.control_env import ControlVectorEnv
-from acl_gym.evaluation import (
-    PolicyCost,
-    Predictor,
-    control_env,
-    evaluate_policy_cost,
-)
+from acl_gym.callbacks import Agent, Callback, PolicyEvaluation
+from acl_gym.envs.control.environments import ControlVectorEnv
+from acl_gym.evaluation import PolicyCost, Predictor, control_env, evaluate_policy_cost
 from acl_gym.experiments.courses import CONTINUOUS, Budget, Course
 from acl_gym.experiments.pictures import PICTURES
-from acl_gym.partition import Partition
-from acl_gym.partition.grid import Grid
+from acl_gym.partitions import Partition
+from acl_gym.partitions.grid import Grid
+from acl_gym.planning.q_iteration import fuzzy_q_iteration
+from acl_gym.planning.value_iteration import value_iteration
+from acl_gym.utils.typing import Row
 
 Report = Callable[[float], None]
 """Told the fraction of a run that is done."""
@@ -99,12 +95,7 @@ def _train_dqn(
     import torch
     from stable_baselines3.common.callbacks import ConvertCallback
 
-    from acl_gym.agents.dqn import (
-        DQNSettings,
-        PolicyCostCallback,
-        make_dqn,
-        scaled_env,
-    )
+    from acl_gym.sb3.dqn import DQNSettings, PolicyCostCallback, make_dqn, scaled_env
 
     torch.set_num_threads(1)  # the fastest for such small networks
     chosen = DQNSettings(**course.settings(method, long_run=budget.long_run))
@@ -252,7 +243,7 @@ class _Progress(Callback):
         self._report = report
         self._trials = trials
 
-    def on_trial_end(self, agent: TabularAgent, row: Row) -> bool | None:
+    def on_trial_end(self, agent: Agent, row: Row) -> bool | None:
         self._report(row["trial"] / self._trials)
         return True
 

@@ -12,9 +12,9 @@ from typing import Any, Literal
 
 import numpy as np
 
-from acl_gym import validation
-from acl_gym.partition import Crisp, Discrete, Fuzzy, Partition, named
-from acl_gym.partition.grid import Grid
+from acl_gym.partitions import Crisp, Discrete, Fuzzy, Partition, named
+from acl_gym.partitions.grid import Grid
+from acl_gym.utils import validation
 
 Settings = Mapping[str, Any]
 """Keyword arguments of an agent."""

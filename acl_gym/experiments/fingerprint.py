@@ -14,10 +14,10 @@ ROOT = Path(acl_gym.__file__).parent
 # They draw or say something while a task runs, and change nothing in its result.
 _SILENT = frozenset(
     {
-        "acl_gym.compiling",
-        "acl_gym.envs.grid_drawing",
-        "acl_gym.envs.navigation_picture",
-        "acl_gym.envs.rendering",
+        "acl_gym.utils.compiling",
+        "acl_gym.envs.grid_search.painter",
+        "acl_gym.envs.navigation.painter",
+        "acl_gym.envs.control.rendering",
     }
 )
 
@@ -36,7 +36,7 @@ def code_fingerprint(module: str, root: Path = ROOT) -> str:
     """
     digest = hashlib.sha256()
     files = sources_of(module, root)
-    files |= {path.name: path for path in root.glob("envs/maps/*.txt")}
+    files |= {path.name: path for path in root.glob("envs/grid_search/layouts/*.txt")}
     for name, path in sorted(files.items()):
         digest.update(name.encode())
         digest.update(path.read_bytes())

@@ -13,20 +13,15 @@ from typing import Any, NamedTuple
 import numpy as np
 from gymnasium.vector import VectorEnv
 
-from acl_gym.agents.value_iteration import policy_value, value_iteration
-from acl_gym.envs.control_env import ControlVectorEnv
-from acl_gym.envs.grid_system import GridSearch
+from acl_gym.envs.control.environments import ControlVectorEnv
+from acl_gym.envs.grid_search.system import GridSearch
 from acl_gym.envs.navigation import Navigation
-from acl_gym.envs.navigation_picture import goal_outline
+from acl_gym.envs.navigation.painter import goal_outline
 from acl_gym.envs.pendulum import Pendulum
-from acl_gym.evaluation import (
-    FloatArray,
-    Predictor,
-    actions_in,
-    control_env,
-    record_trajectory,
-)
-from acl_gym.partition import named
+from acl_gym.evaluation import Predictor, actions_in, control_env, record_trajectory
+from acl_gym.partitions import named
+from acl_gym.planning.value_iteration import policy_value, value_iteration
+from acl_gym.utils.typing import FloatArray
 
 Make = Callable[[int], VectorEnv[Any, Any, Any]]
 """Makes the environment that a model sees, with so many slots."""

@@ -14,7 +14,7 @@ from rich.table import Table
 from rich.text import Text
 
 from acl_gym.experiments import captions, intervals, statistics, wording
-from acl_gym.storage import write_atomically
+from acl_gym.utils.files import write_atomically
 
 Comparison = dict[str, Any]
 

@@ -35,7 +35,7 @@ from tqdm.auto import tqdm
 
 import acl_gym
 from acl_gym.experiments.fingerprint import code_fingerprint
-from acl_gym.storage import write_atomically
+from acl_gym.utils.files import write_atomically
 
 logger = logging.getLogger("acl_gym")
 

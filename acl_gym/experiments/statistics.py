@@ -11,9 +11,7 @@ from collections.abc import Iterable, Sequence
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from acl_gym import validation
 from acl_gym.experiments import wording
 from acl_gym.experiments.intervals import (
     FEW_VALUES,
@@ -22,8 +20,9 @@ from acl_gym.experiments.intervals import (
     or_infinity,
     overlap,
 )
+from acl_gym.utils import validation
+from acl_gym.utils.typing import FloatArray
 
-FloatArray = NDArray[np.float64]
 Run = dict[str, Any]
 """One run as `comparison` holds it: agent, label, seed, rows, best, ..."""
 

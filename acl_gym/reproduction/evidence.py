@@ -7,15 +7,13 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from acl_gym.agents.policy import TablePolicy
-from acl_gym.agents.q_iteration import fuzzy_q_iteration
 from acl_gym.evaluation import PolicyCost, evaluate_policy_cost
-from acl_gym.partition import Discrete
+from acl_gym.partitions import Discrete
+from acl_gym.planning.q_iteration import fuzzy_q_iteration
+from acl_gym.policies import TablePolicy
 from acl_gym.reproduction.settings import Runnable, Setting
-
-FloatArray = NDArray[np.float64]
+from acl_gym.utils.typing import FloatArray
 
 
 class MissingRunsError(LookupError):

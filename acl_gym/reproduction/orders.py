@@ -13,9 +13,9 @@ import numpy as np
 from numba import njit
 
 from acl_gym.agents.acl import ACL
-from acl_gym.agents.pheromone import BoolArray, Pheromone
-from acl_gym.agents.solutions import Solutions
-from acl_gym.membership import CellArray, FloatArray, IntArray
+from acl_gym.colony.pheromone import Pheromone
+from acl_gym.colony.solutions import Solutions
+from acl_gym.utils.typing import BoolArray, CellArray, FloatArray, IntArray
 
 TWO_PHASES = "two phases"
 ONE_PHASE = "one phase"

@@ -13,7 +13,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from acl_gym.reproduction.catalogue.common import FEWER
 from acl_gym.reproduction.outcome import Outcome
 from acl_gym.reproduction.verdicts import HOLDS, IN_PART, NOT, UNDECIDED
-from acl_gym.storage import write_atomically
+from acl_gym.utils.files import write_atomically
 
 FIGURES = "figures"
 RESULTS = "results.json"

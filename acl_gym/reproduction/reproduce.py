@@ -42,7 +42,7 @@ from acl_gym.reproduction.page import (
 )
 from acl_gym.reproduction.settings import Experiment, Runnable
 from acl_gym.reproduction.store import ParquetStore
-from acl_gym.storage import write_atomically
+from acl_gym.utils.files import write_atomically
 
 EXECUTORS = ("local", "ray")
 TASKS = "tasks"  # the folder of the raw results

@@ -21,7 +21,7 @@ from acl_gym.reproduction.page import (
     read_outcome,
 )
 from acl_gym.reproduction.store import ParquetStore
-from acl_gym.storage import write_atomically
+from acl_gym.utils.files import write_atomically
 
 FINISHED = "finished.json"
 

@@ -17,7 +17,7 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
-from acl_gym.partition import Crisp, Fuzzy, Partition, named
+from acl_gym.partitions import Crisp, Fuzzy, Partition, named
 
 PENDULUM = "acl_gym/Pendulum-v0"
 NAVIGATION = "acl_gym/Navigation-v0"

@@ -12,7 +12,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from acl_gym.experiments.runner import Result, Task
-from acl_gym.storage import write_atomically
+from acl_gym.utils.files import write_atomically
 
 _ABOUT = b"acl_gym"
 _LEVELS = "levels"

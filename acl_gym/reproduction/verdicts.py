@@ -17,8 +17,7 @@ from scipy import stats
 
 from acl_gym.reproduction.catalogue import EXPERIMENTS
 from acl_gym.reproduction.evidence import Evidence, MissingRunsError
-
-FloatArray = NDArray[np.float64]
+from acl_gym.utils.typing import FloatArray
 
 HOLDS, IN_PART, NOT, UNDECIDED = "holds", "holds in part", "does not hold", "undecided"
 RESAMPLES = 2_000

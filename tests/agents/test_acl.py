@@ -13,7 +13,7 @@ from gymnasium.wrappers.vector import TransformReward
 
 from acl_gym import ACL, Crisp, Fuzzy
 from acl_gym.agents.acl import PheromoneBoundWarning
-from acl_gym.agents.selection import RULES
+from acl_gym.colony.selection import RULES
 from tests.agents import reference_colony as reference
 from tests.agents.reference_colony import Chain, chains
 

@@ -11,16 +11,11 @@ import pytest
 from gymnasium import spaces
 
 from acl_gym import ACL, Crisp, Fuzzy, PolicyEvaluation, evaluate_policy_cost
-from acl_gym.agents.walk import Walk
-from acl_gym.costs import (
-    Overshoot,
-    SettlingTime,
-    StageCosts,
-    Steps,
-)
-from acl_gym.deposits import InverseCost, Rank
-from acl_gym.episodes import Episode
-from acl_gym.schedules import Exponential, Harmonic, Linear
+from acl_gym.colony.costs import Overshoot, SettlingTime, StageCosts, Steps
+from acl_gym.colony.deposits import InverseCost, Rank
+from acl_gym.colony.episodes import Episode
+from acl_gym.colony.schedules import Exponential, Harmonic, Linear
+from acl_gym.evaluation.rollout import Rollout
 from tests.agents.reference_colony import Chain, chains
 
 ROW = Crisp([np.arange(6.0)])
@@ -65,13 +60,13 @@ def test_steps_are_counted_in_every_autoreset_mode(mode: str) -> None:
 
 def test_episodes_end_where_the_ants_do() -> None:
     for mode in ("NextStep", "SameStep", "Disabled"):
-        walk = Walk(chains(6, mode), max_steps=12)
+        rollout = Rollout(chains(6, mode), max_steps=12)
         rng = np.random.default_rng(0)
-        walk.start(seed=5, record=True)
-        while walk.ants.size:
-            walk.step(rng.integers(2, size=walk.ants.size))
-        episodes = walk.episodes()
-        np.testing.assert_array_equal(episodes.lengths, walk.length)
+        rollout.start(seed=5, record=True)
+        while rollout.ants.size:
+            rollout.step(rng.integers(2, size=rollout.ants.size))
+        episodes = rollout.episodes()
+        np.testing.assert_array_equal(episodes.lengths, rollout.length)
         for ant in range(6):
             episode = episodes[ant]
             assert (episode.observations[-1, 0] == 5.0) == episode.success
@@ -79,14 +74,14 @@ def test_episodes_end_where_the_ants_do() -> None:
             wall = episode.observations[:-1, 0] == 0.0
             expected = np.where(episode.actions == 1, 1.0, np.where(wall, 0.0, -1.0))
             np.testing.assert_array_equal(moves, expected)
-            assert episode.stage_costs.sum() == walk.cost[ant]
+            assert episode.stage_costs.sum() == rollout.cost[ant]
 
 
 def test_nothing_was_recorded() -> None:
-    walk = Walk(chains(2), max_steps=3)
-    walk.start()
+    rollout = Rollout(chains(2), max_steps=3)
+    rollout.start()
     with pytest.raises(ValueError, match=r"call start\(record=True\)"):
-        walk.episodes()
+        rollout.episodes()
 
 
 def test_the_pendulum_learns_to_settle_soon() -> None:

@@ -12,7 +12,7 @@ from gymnasium import spaces
 from gymnasium.vector import SyncVectorEnv
 
 from acl_gym import ACL, Crisp, Discrete, Fuzzy, Partition, QLearning
-from acl_gym.partition import named
+from acl_gym.partitions import named
 from tests.agents.reference_colony import Chain
 
 PENDULUM = "acl_gym/Pendulum-v0"

@@ -13,14 +13,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from acl_gym import Crisp, Fuzzy, QLearning
-from acl_gym.agents import q_learning, selection
-from acl_gym.agents.selection import ALL
-from acl_gym.agents.value_iteration import value_iteration
+from acl_gym.agents import q_learning
+from acl_gym.colony import selection
+from acl_gym.colony.selection import ALL
+from acl_gym.planning.value_iteration import value_iteration
 from tests.agents import reference_colony as reference
-from tests.agents.chains import Table, corridor, model, vector
 from tests.agents.reference_colony import chains
-from tests.agents.test_pheromone import degrees
 from tests.agents.test_q_learning import ROW, VALUES, masks
+from tests.colony.test_pheromone import degrees
+from tests.planning.chains import Table, corridor, model, vector
 
 KINDS = pytest.mark.parametrize("traces", q_learning.TRACES)
 WALL: Table = {0: {0: [(1.0, 0, -1.0, False)]}, 1: {0: [(1.0, 1, 0.0, True)]}}

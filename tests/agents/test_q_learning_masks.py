@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from acl_gym import Crisp, QLearning
-from tests.agents.chains import Table, vector
+from tests.planning.chains import Table, vector
 
 MODES = ("NextStep", "SameStep", "Disabled")
 

@@ -10,7 +10,7 @@ import pytest
 
 from acl_gym import ACL
 from acl_gym.agents.acl import PheromoneBoundWarning
-from acl_gym.partition import Crisp, Partition, named
+from acl_gym.partitions import Crisp, Partition, named
 
 # Ant-steps, and pheromone added up with weights that tell pairs apart, of six trials.
 KNOWN = {

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from acl_gym import ACL, Callback, Crisp, QLearning
-from acl_gym.agents.tabular import TabularAgent
+from acl_gym.agents.base import TabularAgent
 from tests.agents import reference_colony as reference
 from tests.agents.reference_colony import chains
 
@@ -119,12 +119,12 @@ def test_rows_hold_the_measures_of_their_trial(kind: type) -> None:
     seen: list[tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]] = []
 
     def note(agent: TabularAgent, row: dict[str, float]) -> None:
-        walk = agent.walk
+        rollout = agent.rollout
         seen.append(
             (
-                walk.cost.copy(),
-                walk.length.copy(),
-                walk.success.copy(),
+                rollout.cost.copy(),
+                rollout.length.copy(),
+                rollout.success.copy(),
                 agent.table.copy(),
             )
         )
@@ -253,13 +253,13 @@ def test_time_in_callbacks_is_not_counted(monkeypatch: pytest.MonkeyPatch) -> No
             clock[0] += 100.0
 
     agent = make()
-    start = agent.walk.start
+    start = agent.rollout.start
 
     def counted(**arguments: Any) -> np.ndarray:
         clock[0] += 1.0
         return start(**arguments)
 
-    monkeypatch.setattr(agent.walk, "start", counted)
+    monkeypatch.setattr(agent.rollout, "start", counted)
     agent.learn(trials=3, callback=Slow()).learn(trials=1, callback=Slow())
     assert [row["seconds"] for row in agent.history] == [1.0, 2.0, 3.0, 4.0]
 

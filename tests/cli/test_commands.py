@@ -20,8 +20,8 @@ from acl_gym import ACL, Crisp, Fuzzy, PolicyEvaluation, QLearning, evaluate_pol
 from acl_gym.cli.common import AGENTS, parse_settings
 from acl_gym.cli.envs import describe, parameters
 from acl_gym.cli.train import agent_class, parameter_names
+from acl_gym.envs import ENVIRONMENTS
 from acl_gym.envs.pendulum import Pendulum
-from acl_gym.registration import ENVIRONMENTS
 from tests.cli.runner import (
     COMMANDS,
     MODULE,

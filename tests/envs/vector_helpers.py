@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv
 
-from acl_gym.envs.control_env import ControlVectorEnv
+from acl_gym.envs.control.environments import ControlVectorEnv
 from tests.envs.systems import SystemCase
 
 MODES = [mode.value for mode in AutoresetMode]

@@ -7,7 +7,6 @@ import json
 import numpy as np
 import pytest
 
-from acl_gym.agents.dqn import LONG_RUN, DQNSettings
 from acl_gym.experiments import contestants
 from acl_gym.experiments.contestants import CONTESTANTS, PRESETS
 from acl_gym.experiments.courses import (
@@ -19,7 +18,8 @@ from acl_gym.experiments.courses import (
     Budget,
 )
 from acl_gym.experiments.pictures import PICTURES
-from acl_gym.partition import Crisp, Discrete, Fuzzy, named
+from acl_gym.partitions import Crisp, Discrete, Fuzzy, named
+from acl_gym.sb3.dqn import LONG_RUN, DQNSettings
 
 TINY = Budget(
     trials=2,

@@ -17,19 +17,23 @@ LEARN = "acl_gym.reproduction.training"
 COMPARE = "acl_gym.experiments.contestants"
 
 MATTERS = [
-    *("__init__", "agents/acl", "agents/pheromone", "agents/selection", "agents/walk"),
-    *("envs/pendulum", "envs/pendulum_kernels", "envs/navigation", "envs/grid_maps"),
-    *("envs/two_state", "envs/control_env", "partition/grid", "partition/named"),
-    *("membership", "in_threads", "costs", "deposits", "evaluation", "schedules"),
-    *("callbacks/evaluation", "registration"),
+    *("__init__", "agents/acl", "colony/pheromone", "colony/selection"),
+    *("evaluation/rollout", "evaluation/policy_cost", "callbacks/evaluation"),
+    *("envs/__init__", "envs/control/environments", "envs/control/stepping"),
+    *("envs/pendulum/system", "envs/pendulum/env", "envs/pendulum/kernels"),
+    *("envs/navigation/system", "envs/navigation/kernels", "envs/two_state/system"),
+    *("envs/grid_search/maps", "envs/grid_search/system"),
+    *("partitions/grid", "partitions/named", "partitions/kernels"),
+    *("colony/costs", "colony/deposits", "colony/schedules"),
 ]
 OF_ONE = {
     LEARN: ["reproduction/training", "reproduction/settings", "reproduction/orders"],
-    COMPARE: ["experiments/contestants", "agents/q_learning", "agents/dqn"],
+    COMPARE: ["experiments/contestants", "agents/q_learning", "sb3/dqn"],
 }
 NEITHER = [
-    *("cli/reproduce", "cli/app", "compiling", "theory", "aco_theory"),
-    *("envs/rendering", "envs/grid_drawing", "envs/navigation_picture"),
+    *("cli/reproduce", "cli/app", "utils/compiling"),
+    *("theory/__init__", "theory/convergence", "theory/aco"),
+    *("envs/control/rendering", "envs/grid_search/painter", "envs/navigation/painter"),
     *("experiments/runner", "experiments/fingerprint", "experiments/drawing"),
     *("experiments/report", "experiments/figures/grid", "experiments/comparison"),
     *("reproduction/page", "reproduction/verdicts", "reproduction/evidence"),
@@ -71,15 +75,19 @@ def test_what_matters_and_what_does_not(module: str) -> None:
     assert {*MATTERS, *OF_ONE[module]} <= files
     assert files.isdisjoint(NEITHER)
     other = LEARN if module == COMPARE else COMPARE
-    assert files.isdisjoint(name for name in OF_ONE[other] if "agents" not in name)
+    assert files.isdisjoint(
+        name
+        for name in OF_ONE[other]
+        if "reproduction" in name or "experiments" in name
+    )
 
 
 @pytest.mark.parametrize(
     ("file", "expected"),
     [
-        ("agents/pheromone.py", True),
-        ("envs/two_state.py", True),
-        ("partition/grid.py", True),
+        ("colony/pheromone.py", True),
+        ("envs/two_state/system.py", True),
+        ("partitions/grid.py", True),
         ("reproduction/training.py", True),
         ("reproduction/claims/grids.py", False),
         ("reproduction/figures/bands.py", False),
@@ -122,8 +130,8 @@ def test_nothing_that_runs_is_forgotten() -> None:
         timeout=120,
     )
     loaded = set(json.loads(done.stdout.splitlines()[-1]))
-    assert "acl_gym.agents.walk" in loaded
+    assert "acl_gym.evaluation.rollout" in loaded
     assert loaded - set(sources_of(LEARN)) <= {
-        *("acl_gym.compiling", "acl_gym.envs.rendering", "acl_gym.envs.grid_drawing"),
-        "acl_gym.envs.navigation_picture",
+        *("acl_gym.utils.compiling", "acl_gym.envs.control.rendering"),
+        *("acl_gym.envs.grid_search.painter", "acl_gym.envs.navigation.painter"),
     }

@@ -13,7 +13,7 @@ import pytest
 
 from acl_gym import ACL, WaitingVectorEnv, automatic_partition, evaluate_policy_cost
 from acl_gym.callbacks import PolicyEvaluation
-from acl_gym.deposits import Rank
+from acl_gym.colony.deposits import Rank
 
 ROOT = Path(__file__).resolve().parents[2]
 SCRIPT = ROOT / "benchmarks" / "gymnasium_envs.py"

@@ -11,11 +11,7 @@ from acl_gym.reproduction.catalogue import BY_NAME, EXPERIMENTS, RUNS
 from acl_gym.reproduction.claims import CLAIMS
 from acl_gym.reproduction.figures import DRAWINGS
 from acl_gym.reproduction.outcome import CAPTIONS
-from acl_gym.reproduction.reproduce import (
-    chosen,
-    settings_of,
-    tasks_for,
-)
+from acl_gym.reproduction.reproduce import chosen, settings_of, tasks_for
 from acl_gym.reproduction.systems import row, swing, vehicle, world
 
 FIGURES = [

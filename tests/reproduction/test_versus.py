@@ -12,23 +12,18 @@ import numpy as np
 import pytest
 
 from acl_gym.agents.q_learning import QLearning
-from acl_gym.episodes import Episodes
+from acl_gym.colony.episodes import Episodes
+from acl_gym.envs.wrappers.perturbations import Backwards, BackwardsLuck, perturbed
 from acl_gym.reproduction import reproduce as reproduction
 from acl_gym.reproduction.catalogue import BY_NAME
 from acl_gym.reproduction.reproduce import tasks_for
 from acl_gym.reproduction.store import ParquetStore
 from acl_gym.reproduction.versus.arena import Arena
 from acl_gym.reproduction.versus.arenas import ARENAS, LABELS, SYSTEMS
-from acl_gym.reproduction.versus.contest import (
-    COLUMNS,
-    Contest,
-    learn,
-    make_agent,
-)
+from acl_gym.reproduction.versus.contest import COLUMNS, Contest, learn, make_agent
 from acl_gym.reproduction.versus.reference import Reference
 from acl_gym.reproduction.versus.spaces import METHODS, TABLES, defaults_of
 from acl_gym.reproduction.versus.tuned import methods_in
-from acl_gym.reproduction.versus.veils import Backwards, BackwardsLuck, veiled
 from acl_gym.reproduction.versus.wholes import WHOLES, Peak, Switches
 from tests.reproduction.slices import silent
 
@@ -103,7 +98,7 @@ def test_a_run_that_breaks_down_costs_the_most(
 
 def test_a_veil_of_another_name_is_refused() -> None:
     with pytest.raises(ValueError, match=r"must be made of slips, .* got 'fog'"):
-        veiled(ARENAS["pendulum"].base(2), {"fog": 1})
+        perturbed(ARENAS["pendulum"].base(2), {"fog": 1})
 
 
 def test_noise_is_that_of_the_seed_and_stays_in_the_space() -> None:
@@ -122,7 +117,7 @@ def test_noise_is_that_of_the_seed_and_stays_in_the_space() -> None:
 
 
 def test_slips_replace_as_many_actions_as_they_say() -> None:
-    env = veiled(ARENAS["pendulum"].base(4_000), {"slips": 0.3})
+    env = perturbed(ARENAS["pendulum"].base(4_000), {"slips": 0.3})
     plain = ARENAS["pendulum"].base(4_000)
     env.reset(seed=1)
     plain.reset(seed=1)

@@ -13,7 +13,7 @@ from typing import Any
 from matplotlib.figure import Figure
 
 from acl_gym.experiments.figures import common, grid, navigation, pendulum
-from acl_gym.storage import write_atomically
+from acl_gym.utils.files import write_atomically
 
 Comparison = dict[str, Any]
 Draw = Callable[[Comparison], Figure]

@@ -15,11 +15,7 @@ from matplotlib.patches import Patch, Rectangle
 
 from acl_gym.experiments import drawing
 from acl_gym.experiments.drawing import SMALL, TINY
-from acl_gym.experiments.figures.policies import (
-    median_runs,
-    reference_title,
-    run_title,
-)
+from acl_gym.experiments.figures.policies import median_runs, reference_title, run_title
 
 Comparison = dict[str, Any]
 

@@ -16,11 +16,7 @@ from matplotlib.ticker import MultipleLocator
 
 from acl_gym.experiments import drawing, wording
 from acl_gym.experiments.drawing import SMALL, TINY
-from acl_gym.experiments.figures.policies import (
-    median_runs,
-    reference_title,
-    run_title,
-)
+from acl_gym.experiments.figures.policies import median_runs, reference_title, run_title
 
 Comparison = dict[str, Any]
 Picture = dict[str, Any]

@@ -4,13 +4,7 @@ Parameters are those of Tables 4.1 and 5.2; what the thesis leaves open is decid
 `systems`, and said in the text of the experiment.
 """
 
-from acl_gym.reproduction.catalogue import (
-    beside,
-    grids,
-    navigation,
-    pendulum,
-    versus,
-)
+from acl_gym.reproduction.catalogue import beside, grids, navigation, pendulum, versus
 from acl_gym.reproduction.settings import Experiment
 
 RUNS = 30

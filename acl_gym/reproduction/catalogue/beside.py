@@ -5,12 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from acl_gym.reproduction import orders
-from acl_gym.reproduction.catalogue.common import (
-    KINDS,
-    fewer,
-    number,
-    studies,
-)
+from acl_gym.reproduction.catalogue.common import KINDS, fewer, number, studies
 from acl_gym.reproduction.settings import Experiment, Setting
 from acl_gym.reproduction.systems import row, swing, vehicle, world
 

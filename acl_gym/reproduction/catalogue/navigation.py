@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-from acl_gym.reproduction.catalogue.common import (
-    KINDS,
-    studies,
-)
+from acl_gym.reproduction.catalogue.common import KINDS, studies
 from acl_gym.reproduction.settings import Experiment, Study
 from acl_gym.reproduction.systems import vehicle
 

@@ -6,11 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from acl_gym.agents.model import TabularModel
-from acl_gym.agents.value_iteration import policy_value, value_iteration
 from acl_gym.evaluation import control_env
-from acl_gym.reproduction.evidence import Evidence, FloatArray
+from acl_gym.planning.model import TabularModel
+from acl_gym.planning.value_iteration import policy_value, value_iteration
+from acl_gym.reproduction.evidence import Evidence
 from acl_gym.reproduction.settings import Setting
+from acl_gym.utils.typing import FloatArray
 
 
 def solved(setting: Setting) -> tuple[Any, Any, Any]:

@@ -16,13 +16,7 @@ from acl_gym.reproduction.claims.navigation_tried import (
 )
 from acl_gym.reproduction.evidence import Evidence, baseline
 from acl_gym.reproduction.systems import vehicle
-from acl_gym.reproduction.verdicts import (
-    Claim,
-    Part,
-    interval,
-    middle_half,
-    ratio,
-)
+from acl_gym.reproduction.verdicts import Claim, Part, interval, middle_half, ratio
 
 
 def c9(evidence: Evidence) -> list[Part]:
@@ -153,18 +147,18 @@ def c12(evidence: Evidence) -> list[Part]:
 
 def _damping(policy: Any, setting: Any) -> float:
     """The mean damping on the ways from the evaluation states, in kg/s."""
-    from acl_gym.agents.walk import Walk
     from acl_gym.evaluation import control_env
+    from acl_gym.evaluation.rollout import Rollout
 
     system = control_env(setting.make_env(1)).system
     states = system.evaluation_states()
     env = setting.make_env(len(states))
-    walk, met = Walk(env, 150), []
-    observation = walk.start(seed=0, states=states)
-    while walk.ants.size:
-        there = observation[walk.ants]
+    rollout, met = Rollout(env, 150), []
+    observation = rollout.start(seed=0, states=states)
+    while rollout.ants.size:
+        there = observation[rollout.ants]
         met.append(system.damping(there[:, 0], there[:, 2]))  # type: ignore[attr-defined]
-        observation = walk.step(policy.predict(there)[0]).observation
+        observation = rollout.step(policy.predict(there)[0]).observation
     return float(np.concatenate(met).mean())
 
 

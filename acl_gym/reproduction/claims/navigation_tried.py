@@ -8,9 +8,10 @@ from functools import partial
 import numpy as np
 
 from acl_gym.reproduction.catalogue.beside import PATIENT
-from acl_gym.reproduction.evidence import Evidence, FloatArray, baseline
+from acl_gym.reproduction.evidence import Evidence, baseline
 from acl_gym.reproduction.systems import vehicle
 from acl_gym.reproduction.verdicts import Tried, interval, middle_half, ratio
+from acl_gym.utils.typing import FloatArray
 
 Attempt = Callable[[Evidence], Tried]
 

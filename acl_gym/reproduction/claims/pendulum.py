@@ -4,13 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from acl_gym.reproduction.catalogue.common import (
-    ANTS,
-    GAMMAS,
-    NEARLY_ONE,
-    RHOS,
-    number,
-)
+from acl_gym.reproduction.catalogue.common import ANTS, GAMMAS, NEARLY_ONE, RHOS, number
 from acl_gym.reproduction.catalogue.pendulum import partitions
 from acl_gym.reproduction.claims import pendulum_tried as tried
 from acl_gym.reproduction.claims.swings import (

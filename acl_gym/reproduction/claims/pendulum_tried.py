@@ -30,10 +30,11 @@ from acl_gym.reproduction.claims.swings import (
     swing_up,
     trajectory,
 )
-from acl_gym.reproduction.evidence import Evidence, FloatArray
+from acl_gym.reproduction.evidence import Evidence
 from acl_gym.reproduction.settings import Setting
 from acl_gym.reproduction.systems import swing
 from acl_gym.reproduction.verdicts import Tried, interval
+from acl_gym.utils.typing import FloatArray
 
 Attempt = Callable[[Evidence], Tried]
 Change = Callable[[Setting], Setting]

@@ -9,10 +9,11 @@ import numpy as np
 
 from acl_gym.evaluation import record_trajectory
 from acl_gym.reproduction.catalogue.common import GAMMAS, number
-from acl_gym.reproduction.evidence import Evidence, FloatArray
+from acl_gym.reproduction.evidence import Evidence
 from acl_gym.reproduction.settings import Setting
 from acl_gym.reproduction.systems import swing
 from acl_gym.reproduction.verdicts import digits, interval, swing_at_the_end
+from acl_gym.utils.typing import FloatArray
 
 OPTIMUM = 38.5
 """J* on the evaluation set, by value iteration on fine cells (docs/comparison.md)."""

@@ -19,7 +19,7 @@ from acl_gym.reproduction.figures import (
     versus,
 )
 from acl_gym.reproduction.settings import Experiment
-from acl_gym.storage import write_atomically
+from acl_gym.utils.files import write_atomically
 
 __all__ = ["DRAWINGS", "Files", "animation", "save"]
 

@@ -14,14 +14,14 @@ from matplotlib.colors import LogNorm
 from PIL import Image, ImageDraw
 
 from acl_gym.agents.acl import ACL
-from acl_gym.agents.policy import TablePolicy
 from acl_gym.evaluation import evaluate_policy_cost, record_trajectory
 from acl_gym.experiments import drawing, wording
 from acl_gym.experiments.drawing import SMALL, TINY
+from acl_gym.policies import TablePolicy
 from acl_gym.reproduction.figures.policies import draw_map
 from acl_gym.reproduction.settings import Study
 from acl_gym.reproduction.systems import swing
-from acl_gym.storage import write_atomically
+from acl_gym.utils.files import write_atomically
 
 SHOWN = (0, 2, 4, 6, 8, 10, 12, 15, 20, 30, 60, 100)
 """After these trials the policy is shown and followed."""

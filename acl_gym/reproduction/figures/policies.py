@@ -14,13 +14,13 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
-from acl_gym.agents.policy import TablePolicy
 from acl_gym.evaluation import evaluate_policy_cost
 from acl_gym.experiments import drawing, wording
 from acl_gym.experiments.drawing import SMALL, TINY
 from acl_gym.experiments.figures import grid, navigation
 from acl_gym.experiments.figures.pendulum import GOAL
 from acl_gym.experiments.pictures import PICTURES, Picture
+from acl_gym.policies import TablePolicy
 from acl_gym.reproduction.evidence import Evidence, baseline
 from acl_gym.reproduction.figures import bands
 from acl_gym.reproduction.settings import NAVIGATION, PENDULUM, Experiment, Study

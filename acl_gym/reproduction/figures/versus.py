@@ -11,12 +11,13 @@ from matplotlib.lines import Line2D
 
 from acl_gym.experiments import drawing
 from acl_gym.experiments.drawing import SMALL, STYLES, TINY
-from acl_gym.reproduction.evidence import Evidence, FloatArray
+from acl_gym.reproduction.evidence import Evidence
 from acl_gym.reproduction.settings import Experiment
 from acl_gym.reproduction.verdicts import interval
 from acl_gym.reproduction.versus.contest import Contest
 from acl_gym.reproduction.versus.findings import contests, reference_of
 from acl_gym.reproduction.versus.spaces import LONG, NAMES
+from acl_gym.utils.typing import FloatArray
 
 _STYLES = {
     "acl": STYLES["acl-fuzzy"],

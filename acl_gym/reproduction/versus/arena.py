@@ -13,12 +13,12 @@ import numpy as np
 from gymnasium.vector import VectorEnv
 from numpy.typing import NDArray
 
-from acl_gym.envs.control_env import ControlVectorEnv
+from acl_gym.envs.control.environments import ControlVectorEnv
+from acl_gym.envs.wrappers.perturbations import perturbed
 from acl_gym.evaluation import control_env
 from acl_gym.experiments.courses import COURSES, Course
-from acl_gym.partition import Crisp, Discrete, Fuzzy, Partition, named
+from acl_gym.partitions import Crisp, Discrete, Fuzzy, Partition, named
 from acl_gym.reproduction.settings import GRID_1D, GRID_2D, PENDULUM
-from acl_gym.reproduction.versus.veils import veiled
 from acl_gym.reproduction.versus.wholes import WHOLES
 
 KINDS = {"crisp": Crisp, "fuzzy": Fuzzy}
@@ -34,7 +34,7 @@ class Arena:
         max_steps: T, the longest episode.
         cells: of the pendulum N_theta and N_omega; None takes the course's partition.
         env: keyword arguments of the environment.
-        veil: what lies between system and learner, see `veils.veiled`.
+        veil: what lies between system and learner, see `perturbations.perturbed`.
         judged_by: a key of `wholes.WHOLES`; None: the sum of the stage costs.
         dqn_steps: interactions of DQN; 0: it does not take part.
         dqn_every: interactions between two evaluations of DQN.
@@ -71,7 +71,7 @@ class Arena:
 
     def make_env(self, slots: int) -> VectorEnv[Any, Any, Any]:
         """The environment that learners see."""
-        return veiled(self.base(slots), self.veil)
+        return perturbed(self.base(slots), self.veil)
 
     def partition(self, kind: str) -> Partition:
         """The partition of a table-based method.

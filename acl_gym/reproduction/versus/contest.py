@@ -13,15 +13,16 @@ from gymnasium.wrappers.vector import TransformReward
 from numpy.typing import NDArray
 
 from acl_gym.agents.acl import ACL, PheromoneBoundWarning
+from acl_gym.agents.base import TabularAgent
 from acl_gym.agents.q_learning import QLearning
-from acl_gym.agents.tabular import TabularAgent
-from acl_gym.callbacks import Callback, Row
+from acl_gym.callbacks import Agent, Callback
+from acl_gym.envs.wrappers.perturbations import Backwards, BackwardsLuck
 from acl_gym.evaluation import evaluate_policy_cost
 from acl_gym.reproduction.settings import Learner, Named, Result
 from acl_gym.reproduction.versus.arena import Arena
 from acl_gym.reproduction.versus.spaces import METHODS
-from acl_gym.reproduction.versus.veils import Backwards, BackwardsLuck
 from acl_gym.reproduction.versus.wholes import WHOLES
+from acl_gym.utils.typing import Row
 
 Report = Callable[[float], None]
 
@@ -204,7 +205,7 @@ class Evaluation(Callback):
         self._whole = arena.judged_by and WHOLES[arena.judged_by].cost
         self._due = 0.0
 
-    def on_trial_end(self, agent: TabularAgent, row: Row) -> bool | None:
+    def on_trial_end(self, agent: Agent, row: Row) -> bool | None:
         """Evaluate if it is time to, and after the last trial."""
         done = row["env_steps"]
         if done >= self._due or done >= self._arena.steps:
@@ -228,12 +229,7 @@ def _learn_dqn(contest: Contest, seed: int, report: Report) -> Result:
     import torch
     from stable_baselines3.common.callbacks import ConvertCallback
 
-    from acl_gym.agents.dqn import (
-        DQNSettings,
-        PolicyCostCallback,
-        make_dqn,
-        scaled_env,
-    )
+    from acl_gym.sb3.dqn import DQNSettings, PolicyCostCallback, make_dqn, scaled_env
 
     torch.set_num_threads(1)  # the fastest for such small networks
     arena = contest.arena

@@ -13,12 +13,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from acl_gym.reproduction.evidence import Evidence, FloatArray
+from acl_gym.reproduction.evidence import Evidence
 from acl_gym.reproduction.settings import Experiment
 from acl_gym.reproduction.verdicts import Interval, interval, iqm, ratio
 from acl_gym.reproduction.versus.contest import Contest
 from acl_gym.reproduction.versus.reference import Reference
 from acl_gym.reproduction.versus.spaces import LONG, METHODS, NAMES
+from acl_gym.utils.typing import FloatArray
 
 Findings = dict[str, Any]
 """`headings` and `rows` of a table, `sentences`, `duels`; JSON types."""

@@ -12,9 +12,9 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from acl_gym.agents.q_iteration import fuzzy_q_iteration
-from acl_gym.agents.value_iteration import value_iteration
 from acl_gym.evaluation import evaluate_policy_cost
+from acl_gym.planning.q_iteration import fuzzy_q_iteration
+from acl_gym.planning.value_iteration import value_iteration
 from acl_gym.reproduction.settings import Learner, Result
 from acl_gym.reproduction.versus.arena import Arena
 

@@ -125,7 +125,7 @@ def defaults_of(arena: Arena, method: str) -> dict[str, Any]:
     """The method's settings before any search, those that are not searched included."""
     course = arena.course
     if method == "dqn":
-        from acl_gym.agents.dqn import DQNSettings
+        from acl_gym.sb3.dqn import DQNSettings
 
         known = asdict(DQNSettings(**course.dqn_short))
         return {name: known[name] for name in space_of(arena, method)}

@@ -6,10 +6,10 @@ import json
 from pathlib import Path
 from typing import Any
 
-from acl_gym import validation
 from acl_gym.reproduction.versus.arena import Arena
 from acl_gym.reproduction.versus.arenas import ARENAS
 from acl_gym.reproduction.versus.spaces import METHODS, TABLES, defaults_of
+from acl_gym.utils import validation
 
 FOLDER = Path(__file__).parents[1] / "tuned"
 

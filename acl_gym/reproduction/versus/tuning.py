@@ -31,7 +31,7 @@ from acl_gym.reproduction.versus.spaces import (
     space_of,
 )
 from acl_gym.reproduction.versus.tuned import FOLDER, Search, path_of, read_search
-from acl_gym.storage import write_atomically
+from acl_gym.utils.files import write_atomically
 
 EVALUATIONS = 16
 SEEDS = (1000, 1001)

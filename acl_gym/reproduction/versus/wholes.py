@@ -8,8 +8,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from acl_gym.costs import Cost, FloatArray, Overshoot, SettlingTime, Steps
-from acl_gym.episodes import Episodes
+from acl_gym.colony.costs import Cost, Overshoot, SettlingTime, Steps
+from acl_gym.colony.episodes import Episodes
+from acl_gym.utils.typing import FloatArray
 
 _ANGLE = {"variable": 0, "target": math.pi, "period": 2 * math.pi}
 _STEP = 0.1  # s, T_s of Table 5.1

@@ -1,0 +1,377 @@
+"""What the colony and Q-learning share: a table over a partition, and its policy."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+from gymnasium.vector import VectorEnv
+from numpy.typing import ArrayLike, NDArray
+
+from acl_gym.callbacks.base import Callbacks
+from acl_gym.colony.selection import greedy_actions
+from acl_gym.evaluation.rollout import Rollout, require_vector_env
+from acl_gym.partitions import Partition, check_cells, partition_from_settings
+from acl_gym.partitions.automatic import automatic_partition
+from acl_gym.policies import PartitionPolicy, TablePolicy, random_ranks
+from acl_gym.utils import files, validation
+from acl_gym.utils.typing import (
+    BoolArray,
+    CellArray,
+    FloatArray,
+    IntArray,
+    RankArray,
+    Row,
+)
+
+DEFAULT_MAX_STEPS = 300
+"""T of Table 5.2, where neither agent nor environment sets a limit."""
+
+
+class TabularAgent(PartitionPolicy):
+    """An agent whose policy is the best entry of a (cell, action) table.
+
+    Args:
+        env: a vector environment with `Discrete` actions; each slot is one ant.
+        partition: turns observations into cells and degrees; None takes
+            `automatic_partition(env)`.
+        max_steps: T, the longest an episode may last, >= 1. None takes the limit that
+            the environment is registered with, and 300 where it has none.
+        seed: a run is a function of it; None draws one from the system.
+
+    Attributes:
+        num_timesteps: steps that all slots have taken together.
+        trials: trials finished, k.
+        seconds: wall-clock time spent learning, without callbacks.
+        history: one row a trial: `trial`, `env_steps`, `seconds` (all three
+            cumulated), `ants_cost` (mean J of the ants), `ants_success_rate`,
+            `policy_variation` (§3.6.1), what the agent adds in `measures`, and,
+            where a `PolicyEvaluation` ran, `policy_cost` (3.47) and `success_rate`.
+        in_trial: whether a trial is under way, or was when an exception ended it: the
+            table is then that of no whole trial.
+        metadata: your own notes, JSON values under string keys, empty at first; they
+            are saved with the agent and loaded with it.
+    """
+
+    def __init__(
+        self,
+        env: VectorEnv[Any, Any, Any] | None,
+        partition: Partition | None = None,
+        *,
+        max_steps: int | None,
+        seed: int | None,
+        n_actions: int | None = None,
+    ) -> None:
+        if partition is None:
+            if env is None:
+                raise ValueError(
+                    "an agent needs a partition, or env to choose one for; got neither."
+                )
+            require_vector_env(env)
+            partition = automatic_partition(env)
+        if not isinstance(partition, Partition):
+            raise TypeError(
+                "partition must be a Partition such as Crisp or Fuzzy, got "
+                f"{type(partition).__name__}; build one with Fuzzy.from_box("
+                "env.single_observation_space, cells), or leave it out."
+            )
+        self.partition = partition
+        if max_steps is None:
+            max_steps = time_limit(env) or DEFAULT_MAX_STEPS
+        self._max_steps = validation.integer("max_steps", max_steps, at_least=1)
+        self.env: VectorEnv[Any, Any, Any] | None = None
+        self._rollout: Rollout | None = None
+        self.first_action = 0
+        if n_actions is not None:
+            n_actions = validation.integer("n_actions", n_actions, at_least=1)
+        elif env is None:
+            raise ValueError(
+                "an agent needs env, or n_actions if it is only to predict; got neither."
+            )
+        self._n_actions = n_actions
+        if env is not None:
+            self._attach(Rollout(env, self.max_steps))
+        self.num_timesteps = 0
+        self.trials = 0
+        self.seconds = 0.0
+        self.history: list[Row] = []
+        self.in_trial = False
+        self.metadata: dict[str, Any] = {}
+        self.set_random_seed(seed)
+
+    @property
+    @abstractmethod
+    def _table(self) -> FloatArray:
+        """The values the policy maximises, `(n_cells, n_actions)`."""
+
+    @abstractmethod
+    def set_table(self, table: ArrayLike) -> None:
+        """Replace the table, for instance by a better one kept from an earlier trial.
+
+        Raises:
+            ValueError: the shape differs or an entry is not valid.
+        """
+
+    @abstractmethod
+    def learn(
+        self,
+        total_timesteps: int | None = None,
+        trials: int | None = None,
+        callback: Callbacks = None,
+        log_interval: int | None = None,
+        progress_bar: bool = False,
+    ) -> Self:
+        """Learn; see the agent's own docstring."""
+
+    @abstractmethod
+    def parameters(self) -> dict[str, Any]:
+        """The keyword arguments of the constructor, as saved in a file."""
+
+    def measures(self, policy: IntArray) -> Row:
+        """More columns for the row of a trial, given the policy `(n_cells,)`."""
+        return {}
+
+    @abstractmethod
+    def _explore(
+        self, index: CellArray, degree: FloatArray, allowed: BoolArray | None
+    ) -> IntArray:
+        """Choose actions as in learning, with `self._predict_rng`."""
+
+    @property
+    def table(self) -> FloatArray:
+        """The table as it is now, `(n_cells, n_actions)`.
+
+        It follows learning, and cannot be written to: see `set_table`.
+        """
+        view = self._table.view()
+        view.flags.writeable = False
+        return view
+
+    @property
+    def max_steps(self) -> int:
+        """T, the longest an episode may last; fixed once the agent is made."""
+        return self._max_steps
+
+    @property
+    def n_actions(self) -> int:
+        """The number of actions, the columns of the table."""
+        if self._n_actions is None:  # pragma: no cover - the constructor sees to it
+            raise ValueError("the agent has no environment; call set_env(env) first.")
+        return self._n_actions
+
+    @property
+    def rollout(self) -> Rollout:
+        """The slots of the environment, ready to walk."""
+        if self._rollout is None:
+            raise ValueError("the agent has no environment; call set_env(env) first.")
+        return self._rollout
+
+    @property
+    def num_envs(self) -> int:
+        """The number of slots: M, the number of ants."""
+        return int(self.rollout.env.num_envs)
+
+    def set_env(self, env: VectorEnv[Any, Any, Any]) -> None:
+        """Learn on another environment from now on, also with other slots.
+
+        Raises:
+            TypeError: `env` is not a vector environment.
+            ValueError: its actions are not those of the table, or its observations
+                not those of the partition.
+        """
+        rollout = Rollout(env, self.max_steps)
+        if rollout.first_action != self.first_action:
+            raise ValueError(
+                f"env's actions must begin at {self.first_action} as the table's do, "
+                f"got {rollout.first_action}."
+            )
+        self._attach(rollout)
+
+    def _attach(self, rollout: Rollout) -> None:
+        if self._n_actions not in (None, rollout.n_actions):
+            raise ValueError(
+                f"env must have {self._n_actions} actions as the table has, got "
+                f"{rollout.n_actions}."
+            )
+        self.partition.check_space(rollout.env.single_observation_space)
+        self._n_actions = rollout.n_actions
+        self.first_action = rollout.first_action
+        self.env = env = rollout.env
+        self._rollout = rollout
+        k = self.partition.cells_per_state
+        self._index: CellArray = np.zeros((env.num_envs, k), dtype=np.int32)
+        self._degree: FloatArray = np.zeros((env.num_envs, k))
+
+    def set_random_seed(self, seed: int | None) -> None:
+        """Begin the agent's random numbers anew.
+
+        Three independent streams: learning, exploring predictions, and the ranks by
+        which ties of the policy are broken, so that asking the agent for an action
+        never changes what it learns.
+
+        Args:
+            seed: >= 0; None draws one from the system.
+
+        Raises:
+            TypeError: `seed` is not an integer.
+            ValueError: it is negative.
+        """
+        if seed is not None:
+            seed = validation.integer("seed", seed, at_least=0)
+        self.seed = seed
+        learning, predicting, ties = np.random.SeedSequence(seed).spawn(3)
+        self.rng = np.random.default_rng(learning)
+        self._predict_rng = np.random.default_rng(predicting)
+        self._ranks: RankArray = random_ranks(
+            self.partition.n_cells, self.n_actions, np.random.default_rng(ties)
+        )
+
+    @property
+    def policy(self) -> TablePolicy:
+        """The policy as it is now; it follows the table until you `copy()` it."""
+        return TablePolicy(self.partition, self._table, self._ranks, self.first_action)
+
+    def _act(
+        self,
+        index: CellArray,
+        degree: FloatArray,
+        deterministic: bool,
+        allowed: BoolArray | None,
+    ) -> IntArray:
+        if deterministic:
+            return greedy_actions(self._table, self._ranks, index, degree, allowed)
+        return self._explore(index, degree, allowed)
+
+    def _locate(
+        self, observation: NDArray[Any], ants: IntArray
+    ) -> tuple[CellArray, FloatArray]:
+        """`(index, degree)` of the walking ants, valid until the next call."""
+        index, degree = self._index[: ants.size], self._degree[: ants.size]
+        self.partition.locate(observation, ants, index, degree)
+        if not self.partition.checked:
+            check_cells(index, self.partition)
+        return index, degree
+
+    def _next_seed(self) -> int:
+        """The seed of the next trial: environments follow the agent's own stream."""
+        return int(self.rng.integers(2**31))
+
+    def _checked_table(self, table: ArrayLike) -> FloatArray:
+        values = validation.real_array("table", table, ndim=2)
+        if values.shape != self._table.shape:
+            raise ValueError(
+                f"table must have shape {self._table.shape}, got {values.shape}."
+            )
+        return values
+
+    def save(self, path: str | Path) -> Path:
+        """Write the agent to one `.npz` file, without pickle, in one piece.
+
+        Returns:
+            The path written, with `.npz` added where it was missing.
+
+        Raises:
+            ValueError: the partition is of a kind that `load` could not build again.
+        """
+        partition = self.partition.settings()
+        partition_from_settings(partition)
+        header = {
+            "agent": type(self).__name__,
+            "parameters": self.parameters(),
+            "partition": partition,
+            "n_actions": self.n_actions,
+            "first_action": self.first_action,
+            "num_timesteps": self.num_timesteps,
+            "trials": self.trials,
+            "seconds": self.seconds,
+            "history": self.history,
+            "metadata": self.metadata,
+            "generators": [
+                rng.bit_generator.state for rng in (self.rng, self._predict_rng)
+            ],
+        }
+        arrays: dict[str, NDArray[Any]] = {"table": self._table, "ranks": self._ranks}
+        return files.save(path, header, arrays)
+
+    @classmethod
+    def load(
+        cls, path: str | Path, env: VectorEnv[Any, Any, Any] | None = None
+    ) -> Self:
+        """Read an agent that `save` wrote; learning goes on where it stopped.
+
+        Args:
+            path: the file, with or without `.npz`.
+            env: the environment to learn on; not needed to predict.
+
+        Raises:
+            FileNotFoundError: there is no such file.
+            ValueError: the file is not one of ours, is damaged, or holds another
+                kind of agent.
+        """
+        header, arrays = files.load(path)
+        if header.get("agent") != cls.__name__:
+            raise ValueError(
+                f"{path} must hold a {cls.__name__}, got {header.get('agent')!r}; "
+                "load it with that class."
+            )
+        try:
+            partition = partition_from_settings(header["partition"])
+            shape = partition.n_cells, int(header["n_actions"])
+            if arrays["table"].shape != shape or arrays["ranks"].shape != shape:
+                raise ValueError(f"its arrays must have shape {shape}")
+            parameters = cls._restored_parameters(header["parameters"])
+            agent = cls(None, partition, n_actions=shape[1], **parameters)
+            agent._restore(header, arrays)
+        except (KeyError, OverflowError, TypeError, ValueError) as error:
+            raise ValueError(f"{path} is damaged: {error}.") from error
+        if env is not None:
+            agent.set_env(env)
+        return agent
+
+    @classmethod
+    def _restored_parameters(cls, saved: dict[str, Any]) -> dict[str, Any]:
+        """Keyword arguments of the constructor from what `parameters` gave."""
+        return dict(saved)
+
+    def _restore(self, header: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> None:
+        """Take over what a file holds beside the constructor's arguments."""
+        self.set_table(arrays["table"])
+        ranks = arrays["ranks"]
+        if (np.sort(ranks, axis=1) != np.arange(self.n_actions)).any():
+            raise ValueError("ranks must be permutations of the actions")
+        self._ranks = ranks.astype(np.int32)
+        first_action = header["first_action"]
+        if not isinstance(first_action, int):
+            raise TypeError(f"first_action must be an integer, got {first_action!r}")
+        self.first_action = first_action
+        for name in ("num_timesteps", "trials"):
+            count = validation.integer(name, header[name], at_least=0)
+            setattr(self, name, count)
+        self.seconds = validation.number("seconds", header["seconds"], at_least=0)
+        history = header["history"]
+        if not isinstance(history, list) or not all(
+            isinstance(row, dict)
+            and all(isinstance(value, (int, float)) for value in row.values())
+            for row in history
+        ):
+            raise TypeError("history must be a list of rows of numbers")
+        self.history = history
+        metadata = header.get("metadata", {})  # files of before it have none
+        if not isinstance(metadata, dict):
+            raise TypeError(f"metadata must be a dict, got {metadata!r}")
+        self.metadata = metadata
+        generators = (self.rng, self._predict_rng)
+        for rng, state in zip(generators, header["generators"], strict=True):
+            rng.bit_generator.state = state
+
+
+def time_limit(env: Any) -> int | None:
+    """The time limit that an environment was made or registered with; None: none."""
+    base = getattr(env, "unwrapped", None)
+    limit = getattr(base, "max_episode_steps", None)
+    # A vector of single environments may know its limit by those only.
+    for each in (env, *getattr(base, "envs", ())[:1]):
+        limit = limit or getattr(getattr(each, "spec", None), "max_episode_steps", None)
+    return int(limit) if limit and limit > 0 else None

@@ -1,0 +1,1 @@
+"""What a colony is made of: pheromone, choices, solutions, costs and deposits."""

@@ -1,0 +1,182 @@
+"""How much pheromone an ant lays for a solution of a given cost.
+
+The thesis deposits 1 / J, which needs costs above 0. Most environments that were made
+for reinforcement learning reward, so J = -(return) is negative or mixed there; the
+other deposits are for those, and are this package's own.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from acl_gym.utils import validation
+from acl_gym.utils.serialization import Savable, from_settings
+from acl_gym.utils.typing import FloatArray
+
+Function = Callable[[FloatArray], FloatArray]
+
+
+class Deposit(Savable, ABC):
+    """A function from the costs of a trial's solutions to their deposits."""
+
+    @abstractmethod
+    def __call__(self, costs: FloatArray, tau0: float) -> FloatArray:
+        """Return the deposits, `(n_ants,)`.
+
+        Args:
+            costs: J of each ant, `(n_ants,)`, finite.
+            tau0: the initial pheromone level, below which no deposit should be.
+
+        Raises:
+            ValueError: a cost is not one that this deposit is defined for.
+        """
+
+
+@dataclass(frozen=True)
+class InverseCost(Deposit):
+    """1 / (J + offset), the thesis's deposit (3.8) with its offset of 0.
+
+    §3.2.1 notes that a constant may be added to any cost.
+
+    Attributes:
+        offset: added to every cost, such that all are above 0.
+    """
+
+    offset: float = 0.0
+
+    def __post_init__(self) -> None:
+        validation.number("offset", self.offset)
+
+    def __call__(self, costs: FloatArray, tau0: float) -> FloatArray:
+        """See `Deposit`."""
+        shifted = costs + self.offset
+        with np.errstate(divide="ignore", over="ignore"):
+            deposits = 1.0 / shifted
+        valid = (shifted > 0.0) & np.isfinite(deposits) & (deposits > 0.0)
+        if not valid.all():
+            ant = int(np.argmin(valid))
+            raise ValueError(
+                "the cost of a solution must be > 0 and finite, because ants deposit "
+                f"1 / cost; got {shifted[ant]:g} for ant {ant}. Where returns are never negative pass "
+                'deposit="return", elsewhere deposit="rank" or '
+                "deposit=InverseCost(offset=...) with an offset above the highest "
+                "return; or add a constant to a cost of your own."
+            )
+        return deposits
+
+
+@dataclass(frozen=True)
+class Return(Deposit):
+    """tau0 + the return, for environments whose returns are never negative.
+
+    Twice the return lays twice the pheromone; a solution without any return lays
+    tau0, so that levels stay at or above it.
+    """
+
+    def __call__(self, costs: FloatArray, tau0: float) -> FloatArray:
+        """See `Deposit`."""
+        if (costs > 0.0).any():
+            ant = int(np.argmax(costs))
+            raise ValueError(
+                'deposit="return" needs returns that are never negative, got '
+                f'{-costs[ant]:g} for ant {ant}; pass deposit="rank", or '
+                '"inverse_cost" where all returns are negative.'
+            )
+        return tau0 - costs
+
+
+@dataclass(frozen=True)
+class Rank(Deposit):
+    """tau0 + the share of the other ants that an ant outdoes; ties count half.
+
+    Only the order of the returns of a trial matters: any reward will do. A colony of
+    one ant learns nothing from it, and ants that began in hard states are held
+    against those that began in easy ones.
+
+    Attributes:
+        exponent: > 0; the share is raised to it, so that large ones leave the
+            deposits to the few best ants.
+    """
+
+    exponent: float = 1.0
+
+    def __post_init__(self) -> None:
+        validation.number("exponent", self.exponent, above=0)
+
+    def __call__(self, costs: FloatArray, tau0: float) -> FloatArray:
+        """See `Deposit`."""
+        ordered = np.sort(costs)
+        not_worse = np.searchsorted(ordered, costs, side="right") - 1
+        better = np.searchsorted(ordered, costs, side="left")
+        others = max(costs.size - 1, 1)
+        outdone = 1.0 - 0.5 * (better + not_worse) / others
+        return np.asarray(tau0 + outdone**self.exponent)
+
+
+NAMED: dict[str, Deposit] = {
+    "inverse_cost": InverseCost(),
+    "return": Return(),
+    "rank": Rank(),
+}
+"""The deposits that can be asked for by name."""
+
+
+@dataclass(frozen=True)
+class OwnDeposit(Deposit):
+    """A user's function of the costs of a trial.
+
+    Attributes:
+        function: takes the costs `(n_ants,)`, returns the deposits, > 0 each.
+    """
+
+    function: Function
+
+    def __call__(self, costs: FloatArray, tau0: float) -> FloatArray:
+        """See `Deposit`."""
+        deposits = np.asarray(self.function(costs), dtype=np.float64)
+        valid = deposits.shape == costs.shape and (
+            np.isfinite(deposits).all() and (deposits > 0.0).all()
+        )
+        if not valid:
+            raise ValueError(
+                "deposit must return a finite number > 0 for each of the "
+                f"{costs.size} ants, got {deposits.tolist()!r:.200}."
+            )
+        return deposits
+
+
+def as_deposit(deposit: str | Deposit | Function) -> Deposit:
+    """Bring every accepted form of `deposit` into an object.
+
+    Raises:
+        ValueError: there is no deposit of that name.
+        TypeError: it is neither a name, a `Deposit` nor a function.
+    """
+    if isinstance(deposit, str):
+        return NAMED[validation.one_of("deposit", deposit, NAMED)]
+    if isinstance(deposit, Deposit):
+        return deposit
+    if callable(deposit) and not isinstance(deposit, type):
+        return OwnDeposit(deposit)
+    raise TypeError(
+        f"deposit must be one of {', '.join(map(repr, NAMED))}, a Deposit such as "
+        f"InverseCost(offset=20), or a function of the costs, got {deposit!r}."
+    )
+
+
+def deposit_from_settings(settings: Any) -> Deposit:
+    """A deposit from what a file holds of it.
+
+    Raises:
+        ValueError: it is none.
+    """
+    kinds = (InverseCost, Return, Rank, OwnDeposit)
+    deposit = from_settings("deposit", settings, kinds)
+    if not isinstance(deposit, Deposit):
+        raise ValueError(f"deposit must be a Deposit, got {settings!r:.200}.")
+    return deposit

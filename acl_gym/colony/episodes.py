@@ -1,0 +1,94 @@
+"""What ants did in a trial, step by step: what a cost of whole solutions looks at."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acl_gym.utils.typing import BoolArray, FloatArray, IntArray
+
+
+@dataclass(frozen=True)
+class Episode:
+    """One episode of one ant, of L steps.
+
+    Attributes:
+        observations: from the first to the last, `(L + 1, ...)`.
+        actions: indices, `(L,)`.
+        stage_costs: what the environment charged, -(reward), `(L,)`.
+        success: whether it ended in a terminal state.
+    """
+
+    observations: NDArray[Any]
+    actions: IntArray
+    stage_costs: FloatArray
+    success: bool
+
+
+@dataclass(frozen=True)
+class Episodes:
+    """The episodes of all n ants of a trial, time first.
+
+    An ant that has finished after L steps stands still in `observations` or walks
+    as a dummy: rows beyond its length mean nothing.
+
+    Attributes:
+        observations: `(longest + 1, n, ...)`.
+        actions: indices, `(longest, n)`.
+        stage_costs: `(longest, n)`.
+        lengths: L of each ant, `(n,)`.
+        success: whether each ended in a terminal state, `(n,)`.
+    """
+
+    observations: NDArray[Any]
+    actions: IntArray
+    stage_costs: FloatArray
+    lengths: IntArray
+    success: BoolArray
+
+    def __len__(self) -> int:
+        """How many ants there are."""
+        return int(self.lengths.size)
+
+    def __getitem__(self, ant: int) -> Episode:
+        """The solution of one ant, copied."""
+        length = int(self.lengths[ant])
+        return Episode(
+            self.observations[: length + 1, ant].copy(),
+            self.actions[:length, ant].copy(),
+            self.stage_costs[:length, ant].copy(),
+            bool(self.success[ant]),
+        )
+
+    def taken(self) -> BoolArray:
+        """Which steps were taken, `(longest, n)`."""
+        steps = np.arange(len(self.actions))[:, None]
+        return np.asarray(steps < self.lengths)
+
+    def variable(self, index: int, period: float | None = None) -> FloatArray:
+        """One state variable over time, `(longest + 1, n)`, its last value kept on.
+
+        Args:
+            index: of the variable.
+            period: of a circular one: jumps from one end to the other are undone.
+
+        Raises:
+            ValueError: there is no such variable.
+        """
+        observations = self.observations
+        if observations.ndim == 2:
+            observations = observations[:, :, None]
+        if observations.ndim != 3 or not 0 <= index < observations.shape[2]:
+            raise ValueError(
+                "variable must be one of the observation's, got "
+                f"{index} for observations of shape {self.observations.shape[2:]}."
+            )
+        times = np.arange(len(observations))[:, None]
+        last = np.minimum(times, self.lengths)
+        values = np.take_along_axis(
+            observations[:, :, index].astype(np.float64), last, axis=0
+        )
+        return values if period is None else np.unwrap(values, period=period, axis=0)

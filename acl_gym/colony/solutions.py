@@ -1,0 +1,293 @@
+"""What the ants of a trial did: S_trial of Algorithm 4.2, in little memory."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from acl_gym.partitions import Partition
+from acl_gym.partitions.base import check_cells
+from acl_gym.utils.typing import ActionArray, BoolArray, CellArray, FloatArray, IntArray
+
+ROWS_PER_BLOCK = 4_096
+"""State-action pairs that `Solutions.blocks` takes at a time, about 200 kilobytes."""
+
+RUN = 5
+"""Steps of an ant that lie side by side, then come as many of the next ant: a step of all
+ants is written at once, but the deposit goes through ant by ant."""
+
+
+@dataclass(frozen=True, slots=True)
+class Block:
+    """The solutions of some ants, one after the other, `r` pairs in all."""
+
+    ants: slice
+    """Whose they are."""
+    index: CellArray
+    """Cells of the states, `(r, k)`."""
+    degree: FloatArray
+    """Their degrees, `(r, k)`."""
+    action: ActionArray
+    """Actions, `(r,)`."""
+    ends: IntArray
+    """Where the pairs of each ant end."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Room:
+    """Scratch for a block; `all` is 0, 1, 2, ..., as many as there are rows."""
+
+    seen: NDArray[Any]
+    all: IntArray
+    places: IntArray
+    action: ActionArray
+    index: CellArray
+    degree: FloatArray
+
+
+class Solutions:
+    """The multiset S_trial: what every ant did in one trial.
+
+    Where a state has one cell, its cell is kept, 4 bytes. Where it has more, cells
+    and degrees would take 12 bytes for each of the 2^d; the observation is kept
+    instead, and located once more when it is asked for, which gives the same bits. An
+    action takes one byte, if there are at most 256.
+
+    Memory is reserved for `max_steps` steps but touched only as far as ants walk.
+
+    Args:
+        n_ants: M.
+        max_steps: T.
+        n_actions: how many actions there are.
+        partition: turns observations into cells and degrees.
+
+    Attributes:
+        length: how many steps each ant has made, `(n_ants,)`.
+    """
+
+    def __init__(
+        self, n_ants: int, max_steps: int, n_actions: int, partition: Partition
+    ) -> None:
+        self.n_ants, self.max_steps = n_ants, max_steps
+        self.partition = partition
+        # Where step t of an ant lies, `_place` says.
+        self._size = (max_steps + RUN - 1) // RUN * RUN * n_ants
+        self._action: ActionArray = np.empty(
+            self._size, dtype=np.min_scalar_type(n_actions - 1)
+        )
+        self.length: IntArray = np.zeros(n_ants, dtype=np.int64)
+        self._one_cell = partition.cells_per_state == 1
+        # Cells or observations, a row each.
+        self._rows: NDArray[Any] | None = None
+        self._state_shape: tuple[int, ...] = ()
+        self._room: _Room | None = None
+
+    @property
+    def nbytes_per_step(self) -> int:
+        """Memory of one step of one ant, in bytes; known after the first `append`."""
+        rows = self._rows
+        seen = 0 if rows is None else rows.itemsize * rows.shape[1]
+        return self._action.itemsize + seen
+
+    def clear(self) -> None:
+        """Forget all solutions."""
+        self.length[:] = 0
+
+    def append(
+        self,
+        ants: IntArray,
+        observation: NDArray[Any],
+        index: CellArray,
+        actions: IntArray,
+    ) -> None:
+        """Add one state-action pair to the solution of each of `ants`.
+
+        Args:
+            ants: who has chosen, `(m,)`.
+            observation: what all slots saw, `(n_ants, ...)`.
+            index: the cells of what `ants` saw, `(m, k)`.
+            actions: what they chose, `(m,)`.
+        """
+        seen = index
+        if not self._one_cell:
+            flat = observation.ndim == 2
+            seen = observation if flat else observation.reshape(self.n_ants, -1)
+        rows = self._rows
+        if rows is None or rows.dtype != seen.dtype or rows.shape[1] != seen.shape[1]:
+            rows = self._rows_for(seen)
+            self._state_shape = observation.shape[1:]
+        by_slot = not self._one_cell
+        _append(ants, seen, by_slot, actions, rows, self._action, self.length)
+
+    def _rows_for(self, seen: NDArray[Any]) -> NDArray[Any]:
+        """Memory for what is seen, when it is not of the kind seen before.
+
+        Within a trial, what is there is kept, in a type that holds both.
+
+        Raises:
+            ValueError: within a trial, the number of variables changes.
+        """
+        width, kept = seen.shape[1], self._rows
+        self._room = None  # has room for rows of the former kind
+        if kept is None or not self.length.any():
+            self._rows = np.empty((self._size, width), dtype=seen.dtype)
+        elif kept.shape[1] != width:
+            raise ValueError(
+                "observations must have as many variables throughout a trial, got "
+                f"{kept.shape[1]}, then {width}; check the environment's step and reset."
+            )
+        else:
+            kind = np.result_type(kept, seen)
+            self._rows = kept if kept.dtype == kind else kept.astype(kind)
+        return self._rows
+
+    def untried(
+        self, ants: IntArray, index: CellArray, allowed: BoolArray
+    ) -> BoolArray:
+        """The tabu list of §3.4.2: no action twice from the same state in a trial.
+
+        Each ant's own partial solution is its list, so that none has to be kept. An
+        ant that has tried all that is allowed may choose from all of it again (a
+        decision; the thesis is silent).
+
+        Args:
+            ants: who chooses, `(m,)`.
+            index: their cells, `(m, 1)`.
+            allowed: the actions they may take, `(m, n_actions)`.
+
+        Returns:
+            Those of `allowed` that the ant has not taken from its cell, `(m,
+            n_actions)`.
+        """
+        left = allowed.copy()
+        if self._rows is not None:
+            _strike_tried(
+                ants, index, self._rows, self._action, self.length, allowed, left
+            )
+        return left
+
+    def blocks(self) -> Iterator[Block]:
+        """All solutions, ant by ant, in parts that stay in the processor's cache.
+
+        The arrays of a block are valid until the next one is asked for.
+        """
+        rows = self._rows
+        if rows is None:
+            return
+        room = self._room_for(rows)
+        ends = np.cumsum(self.length)
+        first = done = 0
+        while first < self.n_ants:
+            last = int(np.searchsorted(ends, done + ROWS_PER_BLOCK, side="right"))
+            last = max(last, first + 1)
+            size = int(ends[last - 1]) - done
+            places, action = room.places[:size], room.action[:size]
+            index, degree = room.index[:size], room.degree[:size]
+            _collect(first, last, self.length, self._action, places, action)
+            seen = index if self._one_cell else room.seen[:size]
+            np.take(rows, places, axis=0, out=seen, mode="clip")  # all are in range
+            if not self._one_cell:
+                # A copy: the rest of the memory may hold anything.
+                states = seen.reshape(size, *self._state_shape)
+                self.partition.locate(states, room.all[:size], index, degree)
+                if not self.partition.checked:
+                    check_cells(index, self.partition)
+            ants = slice(first, last)
+            yield Block(ants, index, degree, action, ends[ants] - done)
+            first, done = last, done + size
+
+    def _room_for(self, rows: NDArray[Any]) -> _Room:
+        """Scratch for a block, the same in every trial."""
+        room = self._room
+        if room is None:
+            most = max(ROWS_PER_BLOCK, self.max_steps)
+            k = self.partition.cells_per_state
+            room = self._room = _Room(
+                np.empty((most, rows.shape[1]), dtype=rows.dtype),
+                np.arange(most),
+                np.empty(most, dtype=np.int64),
+                np.empty(most, dtype=self._action.dtype),
+                np.empty((most, k), dtype=np.int32),
+                np.ones((most, 1)) if k == 1 else np.empty((most, k)),
+            )
+        return room
+
+
+@njit(cache=True, inline="always")
+def _place(t: int, ant: int, n_ants: int) -> np.uint64:
+    """Where step t of an ant lies, see `RUN`.
+
+    Unsigned, which spares the check for indices from the end.
+    """
+    run, step = np.uint64(t) // np.uint64(RUN), np.uint64(t) % np.uint64(RUN)
+    return (run * np.uint64(n_ants) + np.uint64(ant)) * np.uint64(RUN) + step
+
+
+@njit(cache=True)
+def _append(
+    ants: IntArray,
+    seen: NDArray[Any],
+    by_slot: bool,
+    actions: IntArray,
+    all_seen: NDArray[Any],
+    all_action: ActionArray,
+    length: IntArray,
+) -> None:
+    """Add a step; `seen` has a row for each slot if `by_slot`, else for each ant."""
+    for j in range(ants.size):
+        ant = np.uint64(ants[j])  # unsigned, as in `_place`
+        place = _place(length[ant], ants[j], length.size)
+        row = ant if by_slot else np.uint64(j)
+        for i in range(seen.shape[1]):
+            all_seen[place, i] = seen[row, i]
+        all_action[place] = actions[j]
+        length[ant] += 1
+
+
+@njit(cache=True)
+def _collect(
+    first: int,
+    last: int,
+    length: IntArray,
+    all_action: ActionArray,
+    places: IntArray,
+    action: ActionArray,
+) -> None:
+    """Where the steps of ants first .. last - 1 lie, one ant after the other."""
+    row = np.uint64(0)
+    for ant in range(first, last):
+        for t in range(length[ant]):
+            place = _place(t, ant, length.size)
+            places[row] = place
+            action[row] = all_action[place]
+            row += np.uint64(1)
+
+
+@njit(cache=True)
+def _strike_tried(
+    ants: IntArray,
+    index: CellArray,
+    all_index: CellArray,
+    all_action: ActionArray,
+    length: IntArray,
+    allowed: BoolArray,
+    left: BoolArray,
+) -> None:
+    for j in range(ants.size):
+        ant = ants[j]
+        count = allowed[j].sum()
+        for t in range(length[ant]):
+            place = _place(t, ant, length.size)
+            u = all_action[place]
+            if all_index[place, 0] == index[j, 0] and left[j, u]:
+                left[j, u] = False
+                count -= 1
+                if count == 0:
+                    # Begin the list of this cell anew: what follows counts again.
+                    left[j] = allowed[j]
+                    count = allowed[j].sum()

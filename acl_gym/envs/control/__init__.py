@@ -1,0 +1,1 @@
+"""What all systems of this package share, whatever their dynamics."""

@@ -1,0 +1,171 @@
+"""Small parts of `environments`: checks of what callers pass, and short kernels."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from gymnasium.error import ResetNeeded
+from gymnasium.vector import AutoresetMode
+from numba import njit
+from numpy.typing import ArrayLike, NDArray
+
+from acl_gym.envs.control.system import ControlSystem
+from acl_gym.utils.typing import BoolArray, FloatArray, IntArray
+
+
+def checked_options(
+    options: dict[str, Any] | None, allowed: tuple[str, ...]
+) -> dict[str, Any]:
+    """Refuse reset options that would otherwise be ignored in silence."""
+    unknown = sorted(set(options or ()) - set(allowed), key=str)
+    if unknown:
+        raise ValueError(
+            f"reset options must be among {list(allowed)}, got {unknown}; "
+            "check the spelling."
+        )
+    return dict(options or {})
+
+
+@njit(cache=True)
+def count_step(
+    limit: int, steps: IntArray, terminated: BoolArray, truncated: BoolArray
+) -> int:
+    """Count a step of every slot; return how many have finished."""
+    n_finished = 0
+    for slot in range(steps.size):
+        steps[slot] += 1
+        truncated[slot] = (limit > 0) & (steps[slot] >= limit)
+        n_finished += terminated[slot] | truncated[slot]
+    return n_finished
+
+
+@njit(cache=True)
+def finish(
+    terminated: BoolArray, truncated: BoolArray, finished: BoolArray, walking: IntArray
+) -> int:
+    """Note who has finished now; write who walks on into `walking`, return how many."""
+    n_walking = 0
+    for slot in range(finished.size):
+        finished[slot] |= terminated[slot] | truncated[slot]
+        walking[n_walking] = slot
+        n_walking += not finished[slot]
+    return n_walking
+
+
+@njit(cache=True)
+def copy_if_below(actions: IntArray, n_actions: int, copied: IntArray) -> bool:
+    """Copy actions; return whether all are in 0..n_actions - 1, vectorised."""
+    good = True
+    for slot in range(actions.size):
+        copied[slot] = actions[slot]
+        good &= (actions[slot] >= 0) & (actions[slot] < n_actions)
+    return good
+
+
+def draw_uniforms(
+    system: ControlSystem, rng: np.random.Generator, count: int
+) -> FloatArray | None:
+    """The random numbers of one step of `count` slots, None if the system has none."""
+    if system.draws_per_step == 0:
+        return None
+    return rng.random((system.draws_per_step, count))
+
+
+def checked_actions(actions: ArrayLike, count: int, n_actions: int) -> IntArray:
+    """Return actions as a new int64 array `(count,)` within 0..n_actions - 1."""
+    array = np.asarray(actions)
+    checked = np.empty(count, dtype=np.int64)
+    ready = array.dtype == np.int64 and array.shape == checked.shape
+    if ready and copy_if_below(array, n_actions, checked):
+        return checked
+    if array.dtype.kind not in "iu":
+        raise TypeError(
+            f"actions must be integers, got dtype {array.dtype}; "
+            "cast with .astype(np.int64)."
+        )
+    if array.shape != (count,):
+        raise ValueError(
+            f"actions must have shape ({count},), one a slot, got {array.shape}."
+        )
+    if array.dtype == np.uint64:  # beyond int64 they would come out as negative
+        array = np.minimum(array, np.uint64(n_actions))
+    if not copy_if_below(array.astype(np.int64), n_actions, checked):
+        slot = int(np.argmax((checked < 0) | (checked >= n_actions)))
+        raise ValueError(
+            f"actions must lie in 0..{n_actions - 1}, got {np.asarray(actions)[slot]} "
+            f"in slot {slot}."
+        )
+    return checked
+
+
+def checked_reset_mask(mask: Any, num_envs: int, *, begun: bool) -> BoolArray | None:
+    """Return the mask of a partial reset, None for a full one.
+
+    Raises:
+        TypeError: it is not a bool array.
+        ValueError: it has the wrong shape or nothing is True.
+        ResetNeeded: there was no full reset yet.
+    """
+    if mask is None:
+        return None
+    if not isinstance(mask, np.ndarray) or mask.dtype != np.bool_:
+        actual = mask.dtype if isinstance(mask, np.ndarray) else type(mask)
+        raise TypeError(
+            f"options['reset_mask'] must be a NumPy array of bool, got {actual}."
+        )
+    if mask.shape != (num_envs,) or not mask.any():
+        raise ValueError(
+            f"options['reset_mask'] must have shape ({num_envs},) and at least one "
+            f"True, got shape {mask.shape} with {int(mask.sum())} True."
+        )
+    if not begun:
+        raise ResetNeeded(
+            "the first reset must start all slots; leave 'reset_mask' out."
+        )
+    return mask
+
+
+def final_infos(
+    observations: NDArray[Any], finished: BoolArray, infos: dict[str, Any]
+) -> dict[str, Any]:
+    """What the infos of a step say of slots that it ends and resets at once.
+
+    Args:
+        observations: the last ones, `(num_envs, ...)`.
+        finished: `(num_envs,)`.
+        infos: those of the last states, keys with arrays `(num_envs, ...)`; changed
+            where slots have not finished.
+    """
+    final_obs = np.full(finished.size, None, dtype=object)
+    for slot in np.flatnonzero(finished):
+        final_obs[slot] = observations[slot]
+    for array in infos.values():
+        array[~finished] = 0
+    return {
+        "final_obs": final_obs,
+        "_final_obs": finished.copy(),
+        "final_info": infos,
+        "_final_info": finished.copy(),
+    }
+
+
+def checked_autoreset_mode(mode: str | AutoresetMode) -> AutoresetMode:
+    """Return the mode of that name."""
+    try:
+        return AutoresetMode(mode)
+    except ValueError:
+        choices = ", ".join(repr(choice.value) for choice in AutoresetMode)
+        raise ValueError(
+            f"autoreset_mode must be one of {choices}, got {mode!r}."
+        ) from None
+
+
+def checked_render_mode(mode: str | None, metadata: dict[str, Any]) -> str | None:
+    """Return `mode` if it is None or among the modes of `metadata`."""
+    if mode is not None and mode not in metadata["render_modes"]:
+        raise ValueError(
+            f"render_mode must be None or one of {metadata['render_modes']}, "
+            f"got {mode!r}."
+        )
+    return mode

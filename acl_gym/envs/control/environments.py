@@ -1,0 +1,468 @@
+"""The bookkeeping that all control environments share, single and native vector.
+
+A system (`ControlSystem`) says how states move. This module says when a slot starts,
+how long it may walk, what happens when it has finished, and which arrays are handed
+out. Every array that leaves `reset` or `step` is a new one.
+"""
+
+from __future__ import annotations
+
+import copy
+from typing import Any, ClassVar, Self
+
+import gymnasium as gym
+import numpy as np
+from gymnasium.error import ResetNeeded
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space
+from numpy.typing import ArrayLike, NDArray
+
+from acl_gym.envs.control.bookkeeping import (
+    checked_actions,
+    checked_autoreset_mode,
+    checked_options,
+    checked_render_mode,
+    checked_reset_mask,
+    count_step,
+    draw_uniforms,
+    final_infos,
+    finish,
+)
+from acl_gym.envs.control.rendering import Frame, Renderer
+from acl_gym.envs.control.stepping import PartialStep
+from acl_gym.envs.control.system import ControlSystem
+from acl_gym.utils import validation
+from acl_gym.utils.typing import BoolArray, FloatArray, IntArray
+
+Observation = NDArray[Any]
+StepResult = tuple[Observation, FloatArray, BoolArray, BoolArray, dict[str, Any]]
+
+
+class ControlEnv(gym.Env[Observation, np.int64]):
+    """The single-environment face of a control system.
+
+    It has no time limit of its own: `gym.make(id, max_episode_steps=T)` adds one.
+
+    Args:
+        render_mode: "human" shows a window, "rgb_array" lets `render` return frames,
+            None draws nothing.
+        parameters: the parameters of the system, see its class.
+    """
+
+    metadata: dict[str, Any] = {  # noqa: RUF012
+        "render_modes": ["human", "rgb_array"],
+        "render_fps": 10,
+    }
+    system_type: ClassVar[type[ControlSystem]]
+
+    def __init__(self, render_mode: str | None = None, **parameters: Any) -> None:
+        self.render_mode = checked_render_mode(render_mode, self.metadata)
+        self.system = self.system_type(**parameters)
+        self.observation_space = self.system.observation_space
+        self.action_space = self.system.action_space
+        self._n_actions = int(self.system.action_space.n)
+        self._renderer: Renderer | None = None
+        self._table: FloatArray | None = None
+        self._state: FloatArray | None = None
+        self._finished = False
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Observation, dict[str, Any]]:
+        """Start an episode.
+
+        Args:
+            seed: seeds the generator of initial states; None continues its stream.
+            options: `{"state": array}`, shape `(state_size,)`, sets the state
+                instead of drawing it; a state of one variable may be a number. Any
+                state of the system is allowed, also a goal: the episode then ends
+                when a step leads to a goal.
+
+        Returns:
+            The first observation and the info: empty, or `"action_mask"`, a bool
+            array `(n_actions,)`, where the system offers some actions only.
+
+        Raises:
+            ValueError: the state or a key of `options` is not valid.
+        """
+        options = checked_options(options, ("state",))
+        given = options.get("state")
+        state = None
+        if given is not None:
+            row = validation.real_array("options['state']", given, finite=False)
+            state = self.system.checked_states(row[None]).T.copy()
+        super().reset(seed=seed)
+        if state is None:
+            state = self.system.sample_states(self.np_random, 1)
+        self._state = state
+        self._finished = False
+        self._action: int | None = None
+        if self.render_mode == "human":
+            self.render()
+        return self.system.observe(state)[0], self._info(state)
+
+    def step(
+        self, action: np.int64 | int
+    ) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
+        """Apply an action for one sampling time.
+
+        Returns:
+            `(observation, reward, terminated, truncated, info)` with reward
+            = -(stage cost), `terminated` once the goal is reached and the info that
+            `reset` describes.
+
+        Raises:
+            ResetNeeded: there was no `reset`, or the goal has been reached since.
+            ValueError: `action` is not an action of this environment.
+        """
+        if self._state is None or self._finished:
+            raise ResetNeeded(
+                "step() needs a running episode, but this one "
+                + ("has not begun" if self._state is None else "reached its goal")
+                + "; call reset() first."
+            )
+        actions = checked_actions(np.asarray([action]), 1, self._n_actions)
+        rewards, reached = np.empty(1), np.empty(1, dtype=np.bool_)
+        uniforms = draw_uniforms(self.system, self.np_random, 1)
+        self.system.advance(self._state, actions, uniforms, rewards, reached)
+        self._finished = bool(reached[0])
+        self._action = int(actions[0])
+        if self.render_mode == "human":
+            self.render()
+        observation = self.system.observe(self._state)[0]
+        info = self._info(self._state)
+        return observation, float(rewards[0]), self._finished, False, info
+
+    def render(self) -> Frame | None:
+        """A frame `(480, 480, 3)` for "rgb_array"; shows it for "human".
+
+        Raises:
+            ResetNeeded: there was no `reset` yet.
+            DependencyNotInstalled: pygame is missing.
+        """
+        if self.render_mode is None:
+            gym.logger.warn(
+                "render() draws nothing without a render_mode; make the environment "
+                'with render_mode="rgb_array" or "human".'
+            )
+            return None
+        if self._state is None:
+            raise ResetNeeded("render() needs a state; call reset() first.")
+        if self._renderer is None:
+            self._renderer = Renderer(self.system, self.metadata["render_fps"])
+        state = self._state[:, 0]
+        if self.render_mode == "human":
+            self._renderer.show(state, self._action, self._table)
+            return None
+        return self._renderer.frame(state, self._action, self._table)
+
+    def show_table(self, table: FloatArray | None) -> None:
+        """Draw a table of (state, action) values over the frames from now on.
+
+        Args:
+            table: `(n_states, n_actions)`, such as the pheromone of a colony. The
+                array is kept, not copied, so that frames follow it as it changes;
+                None draws no table any more.
+
+        Raises:
+            ValueError: the system draws no tables, or the table does not fit it.
+            TypeError: it is not a NumPy array.
+        """
+        if table is not None:
+            self.system.check_table(table)
+        self._table = table
+
+    def close(self) -> None:
+        """Close the window if there is one."""
+        if self._renderer is not None:
+            self._renderer.close()
+
+    def _info(self, state: FloatArray) -> dict[str, Any]:
+        mask = self.system.action_mask(state)
+        return {} if mask is None else {"action_mask": mask[0]}
+
+
+class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
+    """Native vector environment over a control system: one kernel call a step.
+
+    Args:
+        num_envs: number of slots, >= 1.
+        max_episode_steps: an episode is truncated after this many steps; None sets
+            no limit, so that an agent's own T rules.
+        autoreset_mode: what happens to a slot that has finished: "NextStep" (reset
+            on the next step, whose action is ignored), "SameStep" (reset at once,
+            last observation in `infos["final_obs"]`) or "Disabled" (the caller
+            resets, `reset(options={"reset_mask": finished})`).
+        render_mode: "rgb_array" lets `render` return a frame of each slot, None
+            draws nothing. For a window use `gymnasium.wrappers.vector.HumanRendering`,
+            which needs OpenCV as well (`pip install opencv-python`).
+        parameters: the parameters of the system, see its class.
+
+    Note:
+        One generator serves all slots in slot order. With the same seed, another
+        number of slots gives other initial states.
+    """
+
+    metadata: dict[str, Any] = {  # noqa: RUF012
+        "render_modes": ["rgb_array"],
+        "render_fps": 10,
+        "autoreset_mode": AutoresetMode.NEXT_STEP,
+    }
+    system_type: ClassVar[type[ControlSystem]]
+
+    def __init__(
+        self,
+        num_envs: int = 1,
+        *,
+        max_episode_steps: int | None = None,
+        autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
+        render_mode: str | None = None,
+        **parameters: Any,
+    ) -> None:
+        self.num_envs = validation.integer("num_envs", num_envs, at_least=1)
+        if max_episode_steps is not None:
+            max_episode_steps = validation.integer(
+                "max_episode_steps", max_episode_steps, at_least=1
+            )
+        self.max_episode_steps = max_episode_steps
+        self.autoreset_mode = checked_autoreset_mode(autoreset_mode)
+        self.metadata = {**self.metadata, "autoreset_mode": self.autoreset_mode}
+        self.render_mode = checked_render_mode(render_mode, self.metadata)
+        self.parameters = copy.deepcopy(parameters)  # the caller may change a list
+        self.system = self.system_type(**parameters)
+        self.single_observation_space = self.system.observation_space
+        self.single_action_space = self.system.action_space
+        self.observation_space = batch_space(
+            self.single_observation_space, self.num_envs
+        )
+        self.action_space = batch_space(self.single_action_space, self.num_envs)
+        self._n_actions = int(self.system.action_space.n)
+        self._renderer: Renderer | None = None
+        self._table: FloatArray | None = None
+        self._actions: IntArray | None = None  # the last ones, to be drawn
+
+        self._state: FloatArray | None = None  # (state_size, num_envs)
+        self._steps = np.zeros(self.num_envs, dtype=np.int64)
+        self._finished = np.zeros(self.num_envs, dtype=np.bool_)
+        self._wait_when_finished = False
+        self._walking: IntArray | None = None  # slots still walking; None means all
+        self._all_slots = np.arange(self.num_envs)
+        limit = self.max_episode_steps or 0
+        self._step_some = PartialStep(self.system, self.num_envs, limit)
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Observation, dict[str, Any]]:
+        """Start an episode in all slots, or in some.
+
+        Args:
+            seed: seeds the generator of initial states; None continues its stream.
+            options: any of
+
+                - `"state"`: array `(num_envs, state_size)`, sets the states instead
+                  of drawing them (rows outside the mask are not looked at); states
+                  of one variable may have shape `(num_envs,)`, goals are allowed;
+                - `"reset_mask"`: bool array `(num_envs,)`, the slots to reset, the
+                  others are left as they are;
+                - `"finished"`: `"wait"`, in any autoreset mode: from now to the next
+                  full reset a slot that finishes stands still. Its finish is
+                  reported once; after that its action is ignored, its observation
+                  stays, its reward is 0 and its flags are False. A synchronous
+                  trial of a colony is this, and costs nothing for idle slots.
+
+        Returns:
+            The observations of all slots, `(num_envs, ...)`, and the infos: empty,
+            or, where the system offers some actions only, `"action_mask"`, a bool
+            array `(num_envs, n_actions)` of the states that all slots are in now.
+
+        Raises:
+            ValueError: a state, the mask or a key of `options` is not valid.
+            TypeError: the mask is not a bool array.
+            ResetNeeded: a mask was given before the first full reset.
+        """
+        options = checked_options(options, ("state", "reset_mask", "finished"))
+        mask = checked_reset_mask(
+            options.get("reset_mask"), self.num_envs, begun=self._state is not None
+        )
+        slots = np.arange(self.num_envs) if mask is None else np.flatnonzero(mask)
+        given = options.get("state")
+        states = None if given is None else self._given_states(given, slots)
+        if "finished" in options:
+            validation.one_of("options['finished']", options["finished"], ("wait",))
+
+        super().reset(seed=seed)
+        if mask is None:
+            self._wait_when_finished = False
+        self._wait_when_finished |= "finished" in options
+        self._start(slots, states)
+        return self._observe(), self._infos()
+
+    def step(self, actions: ArrayLike) -> StepResult:
+        """Apply one action to each slot.
+
+        Args:
+            actions: integers of shape `(num_envs,)`.
+
+        Returns:
+            `(observations, rewards, terminations, truncations, infos)`, new arrays.
+
+        Raises:
+            ResetNeeded: there was no reset yet, or autoreset is disabled and a slot
+                has finished.
+            ValueError: an action has the wrong shape or is out of range.
+            TypeError: the actions are not integers.
+        """
+        if self._state is None:
+            raise ResetNeeded("step() needs states; call reset() first.")
+        checked = checked_actions(actions, self.num_envs, self._n_actions)
+        self._actions = checked
+        restarting = self._slots_to_restart()
+        rewards = np.zeros(self.num_envs)
+        terminated = np.zeros(self.num_envs, dtype=np.bool_)
+        truncated = np.zeros(self.num_envs, dtype=np.bool_)
+        n_finished = 0
+        slots = self._all_slots if self._walking is None else self._walking
+        uniforms = draw_uniforms(self.system, self.np_random, slots.size)
+        if slots is self._all_slots:
+            self.system.advance(self._state, checked, uniforms, rewards, terminated)
+            limit = self.max_episode_steps or 0
+            n_finished = count_step(limit, self._steps, terminated, truncated)
+        elif slots.size:
+            n_finished = self._step_some(
+                slots,
+                self._finished,
+                self._state,
+                self._steps,
+                checked,
+                uniforms,
+                rewards,
+                terminated,
+                truncated,
+            )
+        if restarting is not None:
+            self._start(restarting, None)
+
+        last: dict[str, Any] = {}
+        if n_finished:
+            if (
+                self.autoreset_mode is AutoresetMode.SAME_STEP
+                and not self._wait_when_finished
+            ):
+                finished = terminated | truncated
+                last = final_infos(self._observe(), finished, self._infos())
+                self._start(np.flatnonzero(finished), None)
+            else:
+                walking = np.empty(self.num_envs, dtype=np.int64)
+                n_left = finish(terminated, truncated, self._finished, walking)
+                self._walking = walking[:n_left]
+        infos = {**last, **self._infos()}
+        return self._observe(), rewards, terminated, truncated, infos
+
+    def render(self) -> tuple[Frame, ...] | None:
+        """A frame `(480, 480, 3)` of each slot.
+
+        Raises:
+            ResetNeeded: there was no `reset` yet.
+            DependencyNotInstalled: pygame is missing.
+        """
+        if self.render_mode is None:
+            gym.logger.warn(
+                "render() draws nothing without a render_mode; make the environment "
+                'with render_mode="rgb_array".'
+            )
+            return None
+        if self._renderer is None:
+            self._renderer = Renderer(self.system, self.metadata["render_fps"])
+        started = self._steps == 0
+        idle = self._finished & self._wait_when_finished
+        return tuple(
+            self._renderer.frame(
+                self._states[:, slot],
+                None
+                if self._actions is None or started[slot] or idle[slot]
+                else int(self._actions[slot]),
+                self._table,
+            )
+            for slot in range(self.num_envs)
+        )
+
+    def show_table(self, table: FloatArray | None) -> None:
+        """Draw a table over the frames from now on; see `ControlEnv.show_table`."""
+        if table is not None:
+            self.system.check_table(table)
+        self._table = table
+
+    def with_slots(self, num_envs: int) -> Self:
+        """Make a new environment of the same system and limits with other slots."""
+        return type(self)(
+            num_envs,
+            max_episode_steps=self.max_episode_steps,
+            autoreset_mode=self.autoreset_mode,
+            render_mode=self.render_mode,
+            **self.parameters,
+        )
+
+    def _slots_to_restart(self) -> IntArray | None:
+        """The finished slots that this step must reset, None if there are none."""
+        if self._walking is None or self._wait_when_finished:
+            return None
+        if self.autoreset_mode is AutoresetMode.DISABLED:
+            slots = np.flatnonzero(self._finished)
+            raise ResetNeeded(
+                f"slots {slots[:10].tolist()} have finished and autoreset is disabled; "
+                'call reset(options={"reset_mask": finished}) before the next step.'
+            )
+        return np.flatnonzero(self._finished)
+
+    def _start(self, slots: IntArray, states: FloatArray | None) -> None:
+        """Put `slots` at the given `(state_size, n)` states, or at random ones."""
+        if states is None:
+            states = self.system.sample_states(self.np_random, slots.size)
+        if slots.size == self.num_envs:
+            self._state = states
+        else:
+            self._states[:, slots] = states
+        self._steps[slots] = 0
+        self._finished[slots] = False
+        walking = np.flatnonzero(~self._finished)
+        self._walking = None if walking.size == self.num_envs else walking
+
+    def _infos(self) -> dict[str, Any]:
+        mask = self.system.action_mask(self._states)
+        if mask is None:
+            return {}
+        present = np.ones(self.num_envs, dtype=np.bool_)
+        return {"action_mask": mask, "_action_mask": present}
+
+    @property
+    def states(self) -> FloatArray:
+        """The states of all slots, `(num_envs, state_size)`, a copy.
+
+        Raises:
+            ResetNeeded: there was no reset yet.
+        """
+        return self._states.T.copy()
+
+    @property
+    def _states(self) -> FloatArray:
+        if self._state is None:
+            raise ResetNeeded("the slots have no states yet; call reset() first.")
+        return self._state
+
+    def _observe(self) -> Observation:
+        return self.system.observe(self._states)
+
+    def _given_states(self, given: Any, slots: IntArray) -> FloatArray:
+        rows = validation.real_array("options['state']", given, finite=False)
+        if rows.shape[:1] != (self.num_envs,):
+            raise ValueError(
+                "options['state'] must hold one row for each slot, shape "
+                f"({self.num_envs}, ...), got shape {rows.shape}."
+            )
+        if rows.ndim == 1 and self._state is not None and len(self._state) == 1:
+            rows = rows[:, None]
+        if self._state is not None and rows.shape == (current := self.states).shape:
+            # Rows outside the mask may hold anything, so they are not looked at.
+            current[slots] = rows[slots]
+            rows = current
+        return self.system.checked_states(rows)[slots].T.copy()

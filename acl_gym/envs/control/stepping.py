@@ -1,0 +1,187 @@
+"""A step of some slots of a vector environment, those that walk."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from acl_gym.envs.control.system import ControlSystem
+from acl_gym.utils.typing import BoolArray, FloatArray, IntArray
+
+MOST = 0.75
+"""If more of the slots walk, moving the idle ones too and taking that back is faster."""
+
+
+class PartialStep:
+    """Gathers some slots side by side, advances them, and puts them back.
+
+    Idle slots cost nothing, and nothing is allocated. Where most slots walk, all are
+    advanced where they are, and the idle ones put back; for a slot it is the same.
+
+    Args:
+        system: what moves.
+        num_envs: number of slots.
+        limit: steps after which a slot is truncated; 0 means none.
+    """
+
+    def __init__(self, system: ControlSystem, num_envs: int, limit: int) -> None:
+        self._system, self._limit = system, limit
+        self._states: FloatArray = np.empty(0)
+        self._actions: IntArray = np.empty(num_envs, dtype=np.int64)
+        self._rewards: FloatArray = np.empty(num_envs)
+        self._reached: BoolArray = np.empty(num_envs, dtype=np.bool_)
+        self._room: tuple[FloatArray, IntArray, FloatArray, BoolArray] | None = None
+        self._before: FloatArray = np.empty((0, 0))
+
+    def __call__(
+        self,
+        slots: IntArray,
+        idle: BoolArray,
+        states: FloatArray,
+        steps: IntArray,
+        actions: IntArray,
+        uniforms: FloatArray | None,
+        rewards: FloatArray,
+        terminated: BoolArray,
+        truncated: BoolArray,
+    ) -> int:
+        """Step `slots`, `(m,)`; entries of other slots stay as they are.
+
+        Args:
+            slots: who steps.
+            idle: whether each slot does not, `(num_envs,)`.
+            states: of all slots, `(state_size, num_envs)`, replaced by the next ones.
+            steps: of all slots so far, counted up.
+            actions: of all slots.
+            uniforms: `(draws_per_step, m)`, None if the system needs none.
+            rewards: of all slots, zeros; receives those of `slots`.
+            terminated: of all slots, False; receives whether `slots` are at the goal.
+            truncated: of all slots, False; receives whether the limit is reached.
+
+        Returns:
+            How many have finished.
+        """
+        if uniforms is None and slots.size > MOST * idle.size:
+            if self._before.shape != states.shape:
+                self._before = np.empty_like(states)
+            np.copyto(self._before, states)
+            self._system.advance(states, actions, None, rewards, terminated)
+            return int(
+                put_idle_back(
+                    idle,
+                    self._before,
+                    self._limit,
+                    states,
+                    steps,
+                    rewards,
+                    terminated,
+                    truncated,
+                )
+            )
+        part, part_actions, part_rewards, part_reached = self._room_for(slots, states)
+        gather_slots(slots, states, actions, part, part_actions)
+        self._system.advance(part, part_actions, uniforms, part_rewards, part_reached)
+        n_finished: int = put_slots_back(
+            slots,
+            part,
+            part_rewards,
+            part_reached,
+            self._limit,
+            states,
+            steps,
+            rewards,
+            terminated,
+            truncated,
+        )
+        return n_finished
+
+    def _room_for(
+        self, slots: IntArray, states: FloatArray
+    ) -> tuple[FloatArray, IntArray, FloatArray, BoolArray]:
+        """Scratch side by side, that of the last step if as many slots walk."""
+        size, m = len(states), slots.size
+        room = self._room
+        if room is None or room[0].shape != (size, m):
+            if self._states.size != states.size:
+                self._states = np.empty(states.size)
+            part = self._states[: size * m].reshape(size, m)
+            room = part, self._actions[:m], self._rewards[:m], self._reached[:m]
+            self._room = room
+        return room
+
+
+@njit(cache=True)
+def gather_slots(
+    slots: IntArray,
+    states: FloatArray,
+    actions: IntArray,
+    part: FloatArray,
+    part_actions: IntArray,
+) -> None:
+    """Copy the columns of `slots` side by side."""
+    for j in range(slots.size):
+        slot = np.uint64(slots[j])  # unsigned: no check for indices from the end
+        part_actions[j] = actions[slot]
+        for row in range(states.shape[0]):
+            part[row, j] = states[row, slot]
+
+
+@njit(cache=True)
+def put_slots_back(
+    slots: IntArray,
+    part: FloatArray,
+    part_rewards: FloatArray,
+    part_reached: BoolArray,
+    limit: int,
+    states: FloatArray,
+    steps: IntArray,
+    rewards: FloatArray,
+    terminated: BoolArray,
+    truncated: BoolArray,
+) -> int:
+    """Undo `gather_slots` after a step, and count it; `limit` 0 means none.
+
+    Returns how many slots have finished.
+    """
+    n_finished = 0
+    for j in range(slots.size):
+        slot = np.uint64(slots[j])
+        for row in range(states.shape[0]):
+            states[row, slot] = part[row, j]
+        steps[slot] += 1
+        rewards[slot] = part_rewards[j]
+        terminated[slot] = part_reached[j]
+        truncated[slot] = (limit > 0) & (steps[slot] >= limit)
+        n_finished += terminated[slot] | truncated[slot]
+    return n_finished
+
+
+@njit(cache=True)
+def put_idle_back(
+    idle: BoolArray,
+    before: FloatArray,
+    limit: int,
+    states: FloatArray,
+    steps: IntArray,
+    rewards: FloatArray,
+    terminated: BoolArray,
+    truncated: BoolArray,
+) -> int:
+    """Undo the step of the idle slots, and count that of the others; vectorised.
+
+    Returns how many slots have finished.
+    """
+    for row in range(states.shape[0]):
+        now, then = states[row], before[row]
+        for slot in range(idle.size):
+            now[slot] = then[slot] if idle[slot] else now[slot]
+    n_finished = 0
+    for slot in range(idle.size):
+        rewards[slot] = 0.0 if idle[slot] else rewards[slot]
+    for slot in range(idle.size):
+        walks = not idle[slot]
+        steps[slot] += walks
+        terminated[slot] &= walks
+        truncated[slot] = walks & (limit > 0) & (steps[slot] >= limit)
+        n_finished += terminated[slot] | truncated[slot]
+    return n_finished

@@ -1,0 +1,163 @@
+"""What a control system is: parameters and dynamics, with no bookkeeping."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import Any, ClassVar
+
+import numpy as np
+from gymnasium import spaces
+from numba import njit
+from numpy.typing import NDArray
+
+from acl_gym.utils import compiling as _compiling  # noqa: F401 - it says what the wait is for
+from acl_gym.utils.typing import BoolArray, FloatArray, IntArray
+
+BLOCK = 512
+"""Slots that a kernel advances at a time: what it needs stays in the nearest cache."""
+
+
+class ControlSystem(ABC):
+    """A discrete-time system x(t+1) = f(x(t), u(t)) (4.1) with a goal and a cost.
+
+    A system is an immutable set of parameters and pure functions of arrays. It owns
+    no state and no random numbers: `ControlEnv` and `ControlVectorEnv` hold those and
+    call the same functions, so that one environment and a thousand slots share one
+    model of the dynamics.
+
+    Inside, states are stored with the variables first, shape `(state_size, n)`, so
+    that each variable is one contiguous vector for the kernels.
+    """
+
+    # Where the next two depend on the parameters, a system makes them properties.
+    draws_per_step: ClassVar[int] = 0
+    """How many uniform random numbers `advance` takes for each slot and step."""
+
+    circular: ClassVar[tuple[int, ...]] = ()
+    """The state variables whose high end is their low end, such as angles."""
+
+    evaluation_steps: ClassVar[int] = 300
+    """T for the evaluation of a policy from `evaluation_states`."""
+
+    @property
+    @abstractmethod
+    def observation_space(self) -> spaces.Space[Any]:
+        """The space of one observation."""
+
+    @property
+    @abstractmethod
+    def action_space(self) -> spaces.Discrete:
+        """The space of one action."""
+
+    @property
+    @abstractmethod
+    def max_stage_cost(self) -> float:
+        """An upper bound on the cost of one step; T times it bounds J_max."""
+
+    @abstractmethod
+    def sample_states(self, rng: np.random.Generator, count: int) -> FloatArray:
+        """Draw `count` initial states, uniform over X without the goal.
+
+        Returns:
+            Array of shape `(state_size, count)`.
+        """
+
+    @abstractmethod
+    def checked_states(self, states: Any) -> FloatArray:
+        """Return `states`, shape `(n, state_size)`, validated and in canonical form.
+
+        A state of one variable may come without its axis, states of shape `(n,)`.
+        Goal states are allowed: the first step is taken from them like from any other.
+
+        Returns:
+            Array of shape `(n, state_size)`.
+
+        Raises:
+            ValueError: a state has the wrong shape, is not finite or is outside X.
+        """
+
+    @abstractmethod
+    def advance(
+        self,
+        states: FloatArray,
+        actions: IntArray,
+        uniforms: FloatArray | None,
+        rewards: FloatArray,
+        reached: BoolArray,
+    ) -> None:
+        """Apply one action to each state.
+
+        Args:
+            states: shape `(state_size, n)`, replaced by the next states in place.
+            actions: shape `(n,)`, valid indices of actions.
+            uniforms: shape `(draws_per_step, n)` from [0, 1), None if there are none.
+            rewards: shape `(n,)`, receives -(stage cost).
+            reached: shape `(n,)`, receives whether the next state is the goal.
+        """
+
+    @abstractmethod
+    def evaluation_states(self) -> FloatArray:
+        """The fixed initial states of the policy cost (3.47), `(n, state_size)`."""
+
+    @abstractmethod
+    def draw(
+        self, pygame: Any, canvas: Any, state: FloatArray, action: int | None
+    ) -> None:
+        """Draw a state.
+
+        Args:
+            pygame: the module.
+            canvas: a square pygame surface to fill.
+            state: `(state_size,)`.
+            action: what was done to reach it; None at the start of an episode.
+        """
+
+    def observe(self, states: FloatArray) -> NDArray[Any]:
+        """Return what is seen of `states` `(state_size, n)`: a new array `(n, ...)`."""
+        seen = np.empty(states.shape[::-1])
+        _transpose(states, seen)
+        return seen
+
+    def action_mask(self, states: FloatArray) -> BoolArray | None:
+        """Return U_q of (3.4): which actions each of `states` offers.
+
+        Args:
+            states: `(state_size, n)`.
+
+        Returns:
+            A new array `(n, n_actions)`; None if all actions are always offered.
+        """
+        return None
+
+    def check_table(self, table: Any) -> None:
+        """Refuse a (state, action) table that `draw_table` cannot draw.
+
+        Raises:
+            ValueError: always, unless the system can draw tables of its states.
+        """
+        raise ValueError(
+            "only the grids (GridSearch1D, GridSearch2D) draw tables, one value for "
+            f"each state and action, not {type(self).__name__}, whose states are "
+            "continuous; use frames without a table."
+        )
+
+    def draw_table(self, pygame: Any, canvas: Any, table: FloatArray) -> None:
+        """Draw a (state, action) table over what `draw` has drawn.
+
+        Args:
+            pygame: the module.
+            canvas: the surface that `draw` has filled.
+            table: `(n_states, n_actions)`, for instance levels of pheromone.
+
+        Raises:
+            ValueError: the system or the table does not allow it, see `check_table`.
+        """
+        self.check_table(table)
+
+
+@njit(cache=True)
+def _transpose(states: FloatArray, seen: FloatArray) -> None:
+    """Several times as fast as NumPy's copy of a transpose that has few columns."""
+    for row in range(states.shape[0]):
+        for slot in range(states.shape[1]):
+            seen[slot, row] = states[row, slot]

@@ -1,0 +1,64 @@
+"""The pendulum swing-up of §5.2 as environments, single and vector."""
+
+from __future__ import annotations
+
+from acl_gym.envs.control.environments import ControlEnv, ControlVectorEnv
+from acl_gym.envs.pendulum.system import Pendulum
+
+
+class PendulumEnv(ControlEnv):
+    """Swing a pendulum up and hold it there with a motor that is too weak.
+
+    ## Description
+    A pole hangs from a pivot on which a motor exerts a limited torque (§5.2). The
+    torque cannot lift it in one movement: it must swing to and fro first, and must be
+    slowed in time to stop upright.
+
+    ## Action Space
+    `Discrete(3)`, the torque u held for one sampling time.
+
+    | Num | Torque (N m) |
+    |-----|--------------|
+    | 0   | -0.8         |
+    | 1   | 0            |
+    | 2   | 0.8          |
+
+    ## Observation Space
+    `Box` of shape `(2,)`, float64: the state itself.
+
+    | Num | Observation                | Min    | Max    | Unit  |
+    |-----|----------------------------|--------|--------|-------|
+    | 0   | angle theta, 0 hangs down  | 0      | 2 pi   | rad   |
+    | 1   | angular velocity omega     | -9     | 9      | rad/s |
+
+    ## Rewards
+    The reward is the negative stage cost (5.4), `-(e' Q e + R u^2)`, with the error
+    e = [theta - pi, omega] taken after the step. The return is -J.
+
+    ## Starting State
+    Uniform over the state space without the goal region.
+
+    ## Episode End
+    Terminated when |theta - pi| <= 0.1 rad and |omega| <= 0.1 rad/s. There is no
+    time limit unless `max_episode_steps` sets one.
+
+    ## Arguments
+    Every parameter of `Pendulum` is a keyword of `gym.make` and `gym.make_vec`:
+
+    >>> import gymnasium as gym, acl_gym
+    >>> env = gym.make("acl_gym/Pendulum-v0", max_episode_steps=300, substeps=2)
+    >>> observation, info = env.reset(options={"state": [0.0, 0.0]})
+    >>> observation.tolist()
+    [0.0, 0.0]
+
+    ## Version History
+    - v0: first version.
+    """
+
+    system_type = Pendulum
+
+
+class PendulumVectorEnv(ControlVectorEnv):
+    """Many pendulums, one a slot, advanced by one kernel; see `PendulumEnv`."""
+
+    system_type = Pendulum

@@ -1,0 +1,302 @@
+"""The pendulum swing-up of §5.2: parameters and dynamics."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, fields
+from functools import cached_property
+from typing import Any, ClassVar
+
+import numpy as np
+from gymnasium import spaces
+
+from acl_gym.envs.control.system import ControlSystem
+from acl_gym.envs.pendulum import kernels
+from acl_gym.envs.pendulum.kernels import TWO_PI
+from acl_gym.utils import threads, validation
+from acl_gym.utils.typing import BoolArray, FloatArray, IntArray
+
+
+@dataclass(frozen=True, kw_only=True)
+class Pendulum(ControlSystem):
+    """Parameters (Table 5.1) and dynamics (5.1) of the pendulum.
+
+    The state is x = [theta omega]: theta = 0 hangs, theta = pi stands.
+
+    Attributes:
+        inertia: J, kg m^2, > 0.
+        motor_gain: K_m, > 0.
+        damping: D, kg m^2 / s, >= 0.
+        mass: m, kg, > 0.
+        length: L, m, > 0.
+        gravity: g, m / s^2, >= 0.
+        torques: U, N m, the torque u of each action, one or more.
+        sampling_time: T_s, s, > 0; the torque is constant over it.
+        substeps: Runge-Kutta steps in one sampling time, >= 1. Measured against
+            DOP853 over the whole state space, one step of the default 0.1 s is off
+            by at most 5e-4 rad and 6e-3 rad/s with 1 substep, 3e-5 and 4e-4 with
+            2, 2e-6 and 2e-5 with 4.
+        omega_max: rad / s, > 0. Not given in the thesis; a decision: falling freely
+            from upright reaches 8.86. omega is clipped to it after each step.
+        goal_bounds: half-widths (rad, rad / s), > 0, of the goal region around
+            x_g = [pi 0].
+        state_weight: Q of (5.4), symmetric and positive semi-definite, shape (2, 2).
+        torque_weight: R of (5.4), >= 0.
+    """
+
+    circular: ClassVar[tuple[int, ...]] = (0,)
+
+    inertia: float = 0.005
+    motor_gain: float = 0.1
+    damping: float = 0.01
+    mass: float = 0.1
+    length: float = 0.1
+    gravity: float = 9.81
+    torques: tuple[float, ...] = (-0.8, 0.0, 0.8)
+    sampling_time: float = 0.1
+    substeps: int = 1
+    omega_max: float = 9.0
+    goal_bounds: tuple[float, float] = (0.1, 0.1)
+    state_weight: tuple[tuple[float, float], tuple[float, float]] = (
+        (1.0, 0.0),
+        (0.0, 0.1),
+    )
+    torque_weight: float = 0.05
+
+    def __post_init__(self) -> None:
+        for name in ("inertia", "motor_gain", "mass", "length", "sampling_time"):
+            validation.number(name, getattr(self, name), above=0)
+        for name in ("damping", "gravity", "torque_weight"):
+            validation.number(name, getattr(self, name), at_least=0)
+        validation.number("omega_max", self.omega_max, above=0)
+        validation.integer("substeps", self.substeps, at_least=1)
+        torques = validation.real_array("torques", self.torques, ndim=1)
+        bounds = self._checked_bounds()
+        weight = _weight_matrix(self.state_weight)
+        # Plain tuples and floats: the parameters stay immutable, hashable and JSON.
+        canonical: dict[str, Any] = {
+            "torques": tuple(torques.tolist()),
+            "goal_bounds": tuple(bounds.tolist()),
+            "state_weight": tuple(map(tuple, weight.tolist())),
+            "substeps": int(self.substeps),
+        }
+        for field in fields(self):
+            value = canonical.get(field.name)
+            if value is None:
+                value = float(getattr(self, field.name))
+            object.__setattr__(self, field.name, value)
+        self._check_step()
+
+    @cached_property
+    def _dynamics(self) -> tuple[Any, ...]:
+        """For `integrate`: accelerations K_m u / J in rad / s^2 of each torque, ..."""
+        return (
+            self.motor_gain / self.inertia * np.array(self.torques),
+            self.mass * self.gravity * self.length / self.inertia,
+            self.damping / self.inertia,
+            self.sampling_time / self.substeps,
+            int(self.substeps),
+        )
+
+    @cached_property
+    def _goal_and_cost(self) -> tuple[Any, ...]:
+        """For `settle`: bounds, Q, R u^2 of each action, the goal."""
+        (cost_theta, cost_cross), (_, cost_omega) = self.state_weight
+        return (
+            float(self.omega_max),
+            float(cost_theta),
+            float(cost_cross),
+            float(cost_omega),
+            self.torque_weight * np.square(self.torques),
+            *map(float, self.goal_bounds),
+        )
+
+    @property
+    def observation_space(self) -> spaces.Box:
+        """theta in [0, 2 pi), omega in [-omega_max, omega_max]; float64."""
+        return spaces.Box(
+            low=np.array([0.0, -self.omega_max]),
+            high=np.array([TWO_PI, self.omega_max]),
+            dtype=np.float64,
+        )
+
+    @property
+    def action_space(self) -> spaces.Discrete:
+        """One action for each torque."""
+        return spaces.Discrete(len(self.torques))
+
+    @property
+    def max_stage_cost(self) -> float:
+        """The stage cost (5.4) at its dearest corner of X and dearest torque."""
+        weight = np.array(self.state_weight)
+        corners = [
+            np.array([math.pi, speed]) for speed in (-self.omega_max, self.omega_max)
+        ]
+        dearest = max(float(e @ weight @ e) for e in corners)
+        return dearest + self.torque_weight * max(u * u for u in self.torques)
+
+    def sample_states(self, rng: np.random.Generator, count: int) -> FloatArray:
+        """Draw states uniformly over X without the goal, shape `(2, count)`."""
+        low = np.array([[0.0], [-self.omega_max]])
+        span = np.array([[TWO_PI], [2.0 * self.omega_max]])
+        states = low + span * rng.random((2, count))
+        # Each column is drawn again until it lies outside the goal region.
+        while (inside := np.flatnonzero(self._in_goal(states))).size:
+            states[:, inside] = low + span * rng.random((2, inside.size))
+        return states
+
+    def checked_states(self, states: Any) -> FloatArray:
+        """Return states `(n, 2)` with theta brought into [0, 2 pi).
+
+        Raises:
+            ValueError: wrong shape, not finite, or omega beyond omega_max.
+        """
+        array = validation.real_array("states", states, finite=False)
+        if array.ndim != 2 or array.shape[1] != 2:
+            raise ValueError(
+                f"states must be rows [theta, omega], shape (n, 2), got {array.shape}."
+            )
+        if not np.isfinite(array).all():
+            row = int(np.flatnonzero(~np.isfinite(array).all(axis=1))[0])
+            raise ValueError(
+                f"states must be finite, got {array[row].tolist()} in row {row}."
+            )
+        if (beyond := np.flatnonzero(np.abs(array[:, 1]) > self.omega_max)).size:
+            raise ValueError(
+                f"omega must lie in [-{self.omega_max:g}, {self.omega_max:g}] rad/s, "
+                f"got {array[beyond[0], 1]:g} in row {beyond[0]}; "
+                "set omega_max to allow more."
+            )
+        array[:, 0] = np.mod(array[:, 0], TWO_PI)
+        array[array[:, 0] >= TWO_PI, 0] = 0.0
+        return array
+
+    def advance(
+        self,
+        states: FloatArray,
+        actions: IntArray,
+        uniforms: FloatArray | None,
+        rewards: FloatArray,
+        reached: BoolArray,
+    ) -> None:
+        """One sampling time of (5.1); see `ControlSystem.advance`."""
+        move = kernels.advance
+        if threads.worth_it(actions.size):
+            move = kernels.advance_in_parallel
+        move(states, actions, self._dynamics, self._goal_and_cost, rewards, reached)
+
+    def evaluation_states(self) -> FloatArray:
+        """100 states: theta_i = 2 pi i / 10 + 0.01, omega_j over 10 values to the ends.
+
+        A decision: the thesis names no initial states for (3.47). The 0.01 keeps
+        the set off the unstable symmetry axis.
+        """
+        theta = TWO_PI * np.arange(10) / 10 + 0.01
+        omega = -self.omega_max + 2.0 * self.omega_max * np.arange(10) / 9
+        return np.stack(np.meshgrid(theta, omega, indexing="ij"), axis=-1).reshape(
+            -1, 2
+        )
+
+    def draw(
+        self, pygame: Any, canvas: Any, state: FloatArray, action: int | None
+    ) -> None:
+        """The pole, the goal region behind it, and an arc for the torque."""
+        size = canvas.get_width()
+        pivot = np.array([0.5, 0.5]) * size
+        length = 0.36 * size
+
+        def point(angle: float, radius: float) -> tuple[float, float]:
+            """theta = 0 hangs down, positive angles turn counter-clockwise."""
+            x, y = math.sin(angle), math.cos(angle)
+            return float(pivot[0] + radius * x), float(pivot[1] + radius * y)
+
+        canvas.fill((255, 255, 255))
+        bound = self.goal_bounds[0]
+        edge = np.linspace(math.pi - bound, math.pi + bound, 9)
+        sector = [tuple(pivot), *(point(a, 1.12 * length) for a in edge)]
+        pygame.draw.polygon(canvas, (205, 232, 216), sector)
+        theta = float(state[0])
+        width = 0.035 * size
+        side = 0.5 * width
+        normal = np.array([math.cos(theta), -math.sin(theta)]) * side
+        tip = np.array(point(theta, length))
+        corners = [pivot - normal, pivot + normal, tip + normal, tip - normal]
+        pygame.draw.polygon(canvas, (0, 114, 178), [tuple(c) for c in corners])
+        pygame.draw.circle(canvas, (0, 114, 178), tuple(tip), 1.6 * width)
+        pygame.draw.circle(canvas, (40, 40, 40), tuple(pivot), 0.8 * width)
+        torque = 0.0 if action is None else self.torques[action]
+        if torque:
+            self._draw_torque(pygame, canvas, point, torque, size)
+
+    def _draw_torque(
+        self, pygame: Any, canvas: Any, point: Any, torque: float, size: int
+    ) -> None:
+        """An arc around the pivot, as long as the torque is large, with a head."""
+        share = torque / max(abs(u) for u in self.torques)
+        radius, thickness = 0.1 * size, max(2, round(0.012 * size))
+        angles = math.pi / 2 * np.linspace(0.0, 1.0, 25) * share
+        middle = math.pi  # the arc is centred above the pivot
+        arc = middle + angles - angles[-1] / 2
+        pygame.draw.lines(
+            canvas, (213, 94, 0), False, [point(a, radius) for a in arc], thickness
+        )
+        forward = math.copysign(0.35, torque)
+        head = [
+            point(arc[-1], radius + 0.025 * size),
+            point(arc[-1], radius - 0.025 * size),
+            point(arc[-1] + forward, radius),
+        ]
+        pygame.draw.polygon(canvas, (213, 94, 0), head)
+
+    def _checked_bounds(self) -> FloatArray:
+        bounds = validation.real_array("goal_bounds", self.goal_bounds, ndim=1)
+        if bounds.size != 2 or (bounds <= 0).any():
+            raise ValueError(
+                "goal_bounds must be two half-widths > 0 (rad, rad/s), got "
+                f"{self.goal_bounds!r}."
+            )
+        share = np.minimum(bounds / (math.pi, self.omega_max), 1.0).prod()
+        if share > 0.99:
+            raise ValueError(
+                "goal_bounds must leave 1% or more of the state space to start from, "
+                f"got {self.goal_bounds!r}, which leave {1 - share:.2%}."
+            )
+        return bounds
+
+    def _check_step(self) -> None:
+        """Refuse parameters for which Runge-Kutta would diverge (limit: 2.78)."""
+        step = self.sampling_time / self.substeps
+        stiffness = self.mass * self.gravity * self.length / self.inertia
+        fastest = max(math.sqrt(stiffness), self.damping / self.inertia)
+        pushes = np.array(self.torques) * self.motor_gain / self.inertia
+        if not (step * fastest < 2.5 and np.isfinite(pushes).all()):
+            raise ValueError(
+                "sampling_time / substeps must be well below the fastest time constant "
+                f"of the pendulum, {1 / fastest:.3g} s, got {step:g} s; use more "
+                "substeps or check inertia, mass, length, gravity and damping."
+            )
+
+    def _in_goal(self, states: FloatArray) -> BoolArray:
+        bound_theta, bound_omega = self.goal_bounds
+        theta, omega = states
+        inside = (np.abs(theta - math.pi) <= bound_theta) & (
+            np.abs(omega) <= bound_omega
+        )
+        return np.asarray(inside, dtype=np.bool_)
+
+
+def _weight_matrix(values: Any) -> FloatArray:
+    weight = validation.real_array("state_weight", values, ndim=2)
+    # Rounding may leave the smaller eigenvalue of v v' a hair below zero.
+    slack = 1e-12 * float(np.abs(weight).max())
+    valid = (
+        weight.shape == (2, 2)
+        and weight[0, 1] == weight[1, 0]
+        and np.linalg.eigvalsh(weight)[0] >= -slack
+    )
+    if not valid:
+        raise ValueError(
+            "state_weight must be a symmetric positive semi-definite (2, 2) matrix, "
+            f"got {values!r}."
+        )
+    return weight

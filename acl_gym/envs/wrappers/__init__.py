@@ -1,0 +1,15 @@
+"""Wrappers around environments, of this package or of others."""
+
+from acl_gym.envs.wrappers.scaling import (
+    ScaledObservation,
+    ScaledVectorObservation,
+    Scaling,
+)
+from acl_gym.envs.wrappers.waiting import WaitingVectorEnv
+
+__all__ = [
+    "ScaledObservation",
+    "ScaledVectorObservation",
+    "Scaling",
+    "WaitingVectorEnv",
+]

@@ -1,0 +1,25 @@
+"""Following a policy, and what it costs (3.47)."""
+
+from acl_gym.evaluation.policy_cost import (
+    PolicyCost,
+    Predictor,
+    Trajectory,
+    actions_in,
+    control_env,
+    evaluate_policy_cost,
+    record_trajectory,
+    require_predictor,
+    with_slots_for,
+)
+
+__all__ = [
+    "PolicyCost",
+    "Predictor",
+    "Trajectory",
+    "actions_in",
+    "control_env",
+    "evaluate_policy_cost",
+    "record_trajectory",
+    "require_predictor",
+    "with_slots_for",
+]

@@ -1,0 +1,247 @@
+"""The cost of a policy from given initial states (3.47)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+from gymnasium.vector import VectorEnv
+from numpy.typing import NDArray
+
+from acl_gym.colony.costs import Cost, as_cost, solution_costs
+from acl_gym.colony.episodes import Episode
+from acl_gym.envs.control.environments import ControlVectorEnv
+from acl_gym.evaluation.rollout import Rollout, require_vector_env
+from acl_gym.policies import PartitionPolicy
+from acl_gym.utils.typing import FloatArray
+
+
+class Predictor(Protocol):
+    """Anything with Stable-Baselines3's `predict`: our agents and theirs."""
+
+    def predict(self, observation: Any, *, deterministic: bool = ...) -> Any:
+        """Return `(actions, state)` for a batch of observations."""
+
+
+@dataclass(frozen=True)
+class PolicyCost:
+    """What a policy costs from each initial state.
+
+    Attributes:
+        costs: J of each episode, `(n,)`.
+        success: whether each ended in a terminal state, `(n,)`.
+        lengths: steps of each, `(n,)`.
+    """
+
+    costs: FloatArray
+    success: NDArray[np.bool_]
+    lengths: NDArray[np.int64]
+
+    @property
+    def cost(self) -> float:
+        """J^h, the mean cost over the initial states (3.47)."""
+        return float(self.costs.mean())
+
+    @property
+    def success_rate(self) -> float:
+        """The fraction of episodes that ended in a terminal state."""
+        return float(self.success.mean())
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """One episode under a policy.
+
+    Attributes:
+        states: x(0) .. x(n), `(n + 1, state_size)`.
+        actions: u(0) .. u(n - 1) as indices, `(n,)`.
+        costs: stage costs of the steps, `(n,)`.
+        success: whether it ended in a terminal state.
+    """
+
+    states: FloatArray
+    actions: NDArray[np.int64]
+    costs: FloatArray
+    success: bool
+
+
+def evaluate_policy_cost(
+    model: Predictor,
+    env: VectorEnv[Any, Any, Any],
+    states: FloatArray | None = None,
+    *,
+    max_steps: int | None = None,
+    seed: int | None = None,
+    cost: Cost | Callable[[Episode], float] | None = None,
+) -> PolicyCost:
+    """Follow the policy of `model`, without exploring, once from each initial state.
+
+    Args:
+        model: an agent with `predict(observation, deterministic=True)`.
+        env: where to follow it. An unwrapped environment of this package is given as
+            many slots as there are states; any other must have that many already.
+        states: initial states `(n, ...)`. None takes `evaluation_states()` of an
+            environment of this package, and random ones of any other.
+        max_steps: T, >= 1. None takes the environment's `evaluation_steps`, 300 for
+            an environment of another package.
+        seed: seeds the environment where it is random.
+        cost: what a solution costs; None takes the sum of its stage costs, see
+            `acl_gym.colony.costs`.
+
+    Returns:
+        Costs, successes and lengths, one for each state.
+
+    Raises:
+        TypeError: `model` has no `predict`, or `env` is not a vector environment.
+        ValueError: the number of slots and of states differ and `env` is wrapped.
+    """
+    require_predictor(model)
+    require_vector_env(env)
+    base = env.unwrapped
+    if isinstance(base, ControlVectorEnv):
+        if states is None:
+            states = base.system.evaluation_states()
+        if max_steps is None:
+            max_steps = base.system.evaluation_steps
+        env = with_slots_for(env, states)
+    elif states is not None:
+        raise ValueError(
+            "states can only be set in environments of acl_gym, got "
+            f"{type(base).__name__}; leave them out to start from random states."
+        )
+    if states is not None and env.num_envs != len(states):
+        raise ValueError(
+            f"a wrapped env must have one slot for each of the {len(states)} states, "
+            f"got {env.num_envs} slots."
+        )
+    rollout = Rollout(env, 300 if max_steps is None else max_steps)
+    whole = as_cost(cost)
+    observation = rollout.start(seed=seed, states=states, record=whole is not None)
+    while rollout.ants.size:
+        actions = _chosen(model, observation[rollout.ants], rollout)
+        observation = rollout.step(actions).observation
+    costs = rollout.cost if whole is None else solution_costs(whole, rollout.episodes())
+    return PolicyCost(costs, rollout.success, rollout.length)
+
+
+def with_slots_for(
+    env: VectorEnv[Any, Any, Any], states: FloatArray | None = None
+) -> VectorEnv[Any, Any, Any]:
+    """An environment that has a slot for each initial state of an evaluation.
+
+    Who evaluates often asks once, and hands it to `evaluate_policy_cost` each time.
+
+    Args:
+        env: where to evaluate.
+        states: initial states; None takes `evaluation_states()` of an environment of
+            this package.
+
+    Returns:
+        A new environment of the same system, or `env` itself where it has as many
+        slots already, is wrapped, or is of another package.
+    """
+    base = env.unwrapped
+    if base is not env or not isinstance(base, ControlVectorEnv):
+        return env
+    if states is None:
+        states = base.system.evaluation_states()
+    return env if env.num_envs == len(states) else base.with_slots(len(states))
+
+
+def _chosen(model: Predictor, observation: Any, rollout: Rollout) -> NDArray[np.int64]:
+    """Indices of the actions that `model` takes for the walking slots."""
+    allowed = rollout.allowed()
+    if allowed is not None and isinstance(model, PartitionPolicy):
+        actions, _ = model.predict(observation, action_masks=allowed)
+    else:
+        actions, _ = model.predict(observation, deterministic=True)
+    return np.asarray(actions) - rollout.first_action
+
+
+def record_trajectory(
+    model: Predictor,
+    env: VectorEnv[Any, Any, Any],
+    state: FloatArray,
+    *,
+    max_steps: int | None = None,
+) -> Trajectory:
+    """Follow the policy of `model` once and keep every state, action and cost.
+
+    Args:
+        model: see `evaluate_policy_cost`.
+        env: an environment of this package with one slot, wrapped or not.
+        state: the initial state, `(state_size,)`.
+        max_steps: T; None takes that of the environment.
+
+    Raises:
+        TypeError: `model` has no `predict`, or `env` is of another package.
+        ValueError: it has more than one slot.
+    """
+    require_predictor(model)
+    base = control_env(env)
+    if env.num_envs != 1:
+        raise ValueError(f"env must have one slot, got {env.num_envs}.")
+    rollout = Rollout(
+        env, base.system.evaluation_steps if max_steps is None else max_steps
+    )
+    observation = rollout.start(states=np.asarray(state)[None])
+    states, actions, costs = [base.states[0]], [], []
+    while rollout.ants.size:
+        action = _chosen(model, observation, rollout)
+        step = rollout.step(action)
+        observation = step.observation
+        states.append(base.states[0])
+        actions.append(int(action[0]))
+        costs.append(float(step.cost[0]))
+    return Trajectory(
+        np.array(states), np.array(actions), np.array(costs), bool(rollout.success[0])
+    )
+
+
+def actions_in(
+    model: Predictor, env: VectorEnv[Any, Any, Any], states: FloatArray
+) -> NDArray[np.int64]:
+    """The action of the policy in each of some states, `(n,)`.
+
+    Args:
+        model: see `evaluate_policy_cost`.
+        env: an environment of this package with one slot a state, wrapped or not.
+        states: `(n, state_size)`.
+
+    Raises:
+        TypeError: `model` has no `predict`, or `env` is of another package.
+    """
+    require_predictor(model)
+    control_env(env)
+    observation, _ = env.reset(options={"state": states})
+    return np.asarray(model.predict(observation, deterministic=True)[0], dtype=np.int64)
+
+
+def require_predictor(model: Any) -> None:
+    """Refuse what cannot choose actions.
+
+    Raises:
+        TypeError: `model` has no method `predict`.
+    """
+    if not callable(getattr(model, "predict", None)) or isinstance(model, type):
+        raise TypeError(
+            "model must be an agent or a policy with "
+            f"predict(observation, deterministic=True), got {model!r}."
+        )
+
+
+def control_env(env: VectorEnv[Any, Any, Any]) -> ControlVectorEnv:
+    """The environment of this package that `env` is or wraps.
+
+    Raises:
+        TypeError: it is of another package.
+    """
+    base = env.unwrapped
+    if not isinstance(base, ControlVectorEnv):
+        raise TypeError(
+            "env must be a vector environment of acl_gym, which can be put into any "
+            f"state; got {type(base).__name__}."
+        )
+    return base

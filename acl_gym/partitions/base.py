@@ -1,0 +1,99 @@
+"""What a partition is: a batch of states becomes `(index, degree)`."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import Any, ClassVar
+
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import ArrayLike, NDArray
+
+from acl_gym.utils.typing import CellArray, FloatArray, IntArray
+
+
+class Partition(ABC):
+    """A map from states to cells with degrees."""
+
+    n_cells: int
+    """How many cells there are: the rows of an agent's table."""
+
+    cells_per_state: int
+    """k, how many cells a state belongs to at most."""
+
+    state_ndim: int = 1
+    """Axes of the array that is one state; 0 where a state is a plain number."""
+
+    checked: ClassVar[bool] = False
+    """Whether `locate` itself sees to it that cells are in range, so that an agent
+    need not look at them again in every step."""
+
+    @abstractmethod
+    def locate(
+        self,
+        states: NDArray[Any],
+        slots: IntArray,
+        index: CellArray,
+        degree: FloatArray,
+    ) -> None:
+        """Locate the states of some slots, without allocating.
+
+        Args:
+            states: the observations of all slots, `(n, ...)`.
+            slots: which rows of `states` to locate, shape `(m,)`.
+            index: int32 `(>= m, k)`; row j receives the cells of `states[slots[j]]`.
+            degree: float64 `(>= m, k)`; row j receives their degrees.
+
+        Raises:
+            ValueError: a state is not finite or does not belong to the partition.
+        """
+
+    @abstractmethod
+    def settings(self) -> dict[str, Any]:
+        """What `partition_from_settings` needs to build this partition again."""
+
+    @abstractmethod
+    def cell_states(self) -> NDArray[Any]:
+        """The state that stands for each cell, `(n_cells, ...)`."""
+
+    def check_space(self, space: spaces.Space[Any]) -> None:
+        """Refuse an observation space whose states this partition cannot take.
+
+        Agents ask before they learn. A partition of your own accepts every space
+        unless it overrides this.
+
+        Raises:
+            ValueError: the observations of `space` are not states of the partition.
+        """
+        return None
+
+    def __call__(self, states: ArrayLike) -> tuple[CellArray, FloatArray]:
+        """Return `(index, degree)`, each `(n, k)`, for a batch of states `(n, ...)`.
+
+        Raises:
+            ValueError: a state is not finite or does not belong to the partition.
+        """
+        try:
+            batch = np.asarray(states)
+        except ValueError as error:
+            raise ValueError(f"states must be an array: {error}.") from error
+        n = len(batch) if batch.ndim else 0
+        index = np.zeros((n, self.cells_per_state), dtype=np.int32)
+        degree = np.zeros((n, self.cells_per_state))
+        self.locate(batch, np.arange(n), index, degree)
+        if not self.checked:
+            check_cells(index, self)
+        return index, degree
+
+
+def check_cells(index: CellArray, partition: Partition) -> None:
+    """Hold a partition to its own number of cells; tables are indexed by them.
+
+    Raises:
+        ValueError: a cell is out of range.
+    """
+    if index.size and (index.min() < 0 or index.max() >= partition.n_cells):
+        raise ValueError(
+            f"{type(partition).__name__}.locate must give cells in "
+            f"0..{partition.n_cells - 1}, got {index.min()} to {index.max()}."
+        )

@@ -1,0 +1,181 @@
+"""States that are cells already: `Discrete`, `MultiDiscrete` and `MultiBinary`."""
+
+from __future__ import annotations
+
+from typing import Any, Self
+
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import ArrayLike, NDArray
+
+from acl_gym.partitions.base import Partition
+from acl_gym.partitions.kernels import locate_discrete
+from acl_gym.utils.typing import CellArray, FloatArray, IntArray
+
+_MOST_START = 2**52
+"""Up to here, sizes added, integers are exact as floats, as which they may arrive."""
+
+
+class Discrete(Partition):
+    """One cell for each value, or combination of values, of integer states (§3.2).
+
+    A state is an array of integers, variable i among `starts[i]`, ..., `starts[i] +
+    sizes[i] - 1`; it belongs wholly to its own cell. The last variable is the
+    fastest, as in (4.8). See `from_space`.
+
+    Args:
+        sizes: how many values each variable has, >= 1. An int is one variable whose
+            states are plain integers, `(n,)` for a batch; an array of any shape means
+            states of that shape, `(n, ...)`.
+        starts: the smallest value of each variable, an int for all of them or an
+            array of the shape of `sizes`.
+
+    Attributes:
+        sizes: int64, as given.
+        starts: int64, of the same shape.
+
+    Raises:
+        ValueError: `sizes` or `starts` are not such integers, or there are 2^31 cells
+            or more.
+    """
+
+    checked = True
+    cells_per_state = 1
+
+    def __init__(self, sizes: ArrayLike, starts: ArrayLike = 0) -> None:
+        self.sizes = _integers("sizes", sizes, 1, np.iinfo(np.int64).max)
+        starts = _integers("starts", starts, -_MOST_START, _MOST_START)
+        if starts.shape not in ((), self.sizes.shape):
+            raise ValueError(
+                f"starts must be an integer or have the shape of sizes, "
+                f"{self.sizes.shape}, got shape {starts.shape}."
+            )
+        self.starts = np.full(self.sizes.shape, starts)
+        self.state_ndim = self.sizes.ndim
+        self.n_cells = int(np.prod(self.sizes.astype(object)))
+        if self.n_cells > np.iinfo(np.int32).max:
+            raise ValueError(
+                f"a partition must have fewer than 2^31 cells, got {self.n_cells}; "
+                "leave out variables, or merge values of them."
+            )
+        self._flat_sizes = self.sizes.ravel()
+        self._flat_starts = self.starts.ravel()
+
+    @classmethod
+    def from_space(cls, space: spaces.Space[Any]) -> Self:
+        """Take each element of a finite space as a cell.
+
+        Args:
+            space: `Discrete`, `MultiDiscrete` or `MultiBinary`, for instance
+                `env.single_observation_space`.
+
+        Raises:
+            ValueError: the space is of another kind or too large.
+        """
+        return cls(*_sizes_and_starts(space))
+
+    def check_space(self, space: spaces.Space[Any]) -> None:
+        """Refuse a space whose elements are not the cells.
+
+        Raises:
+            ValueError: the observations of `space` are not states of the partition.
+        """
+        remedy = "; build the partition with Discrete.from_space(space)."
+        if not isinstance(space, FINITE_SPACES):
+            remedy = "; let automatic_partition(env) build a partition that fits."
+        else:
+            sizes, starts = _sizes_and_starts(space)
+            if np.array_equal(sizes, self.sizes) and np.all(starts == self.starts):
+                return
+        raise ValueError(
+            f"{self!r} takes observations from a finite space of these sizes and "
+            f"starts, got {space}{remedy}"
+        )
+
+    def locate(
+        self,
+        states: NDArray[Any],
+        slots: IntArray,
+        index: CellArray,
+        degree: FloatArray,
+    ) -> None:
+        """See `Partition.locate`; int64 and float64 states are not copied."""
+        shape = self.sizes.shape
+        if states.ndim == 0 or states.shape[1:] != shape:
+            wanted = ", ".join(["n", *map(str, shape)]) + ("" if shape else ",")
+            raise ValueError(f"states must have shape ({wanted}), got {states.shape}.")
+        if states.dtype != np.int64 and states.dtype != np.float64:
+            states = _as_numbers(states)
+        flat = states.reshape(len(states), self._flat_sizes.size)
+        sizes, starts = self._flat_sizes, self._flat_starts
+        bad, axis = locate_discrete(flat, slots, sizes, starts, index, degree)
+        if bad >= 0:
+            variable = f", variable {axis}" if shape else ""
+            raise ValueError(
+                f"states must be whole numbers in {starts[axis]}.."
+                f"{starts[axis] + sizes[axis] - 1}, got {flat[bad, axis]} in row "
+                f"{bad}{variable}."
+            )
+
+    def cell_states(self) -> IntArray:
+        """The state of each cell, int64 `(n_cells, ...)`, as observed."""
+        variables = np.unravel_index(np.arange(self.n_cells), self._flat_sizes)
+        states: IntArray = np.stack(variables, axis=-1) + self._flat_starts
+        return states.reshape(self.n_cells, *self.sizes.shape)
+
+    def settings(self) -> dict[str, Any]:
+        """See `Partition.settings`."""
+        return {
+            "type": type(self).__name__,
+            "sizes": self.sizes.tolist(),
+            "starts": self.starts.tolist(),
+        }
+
+    def __repr__(self) -> str:
+        """Name, values of each variable, and where they do not start at 0."""
+        starts = f", starts={self.starts.tolist()}" if self.starts.any() else ""
+        return f"Discrete({self.sizes.tolist()}{starts})"
+
+
+FINITE_SPACES = (spaces.Discrete, spaces.MultiDiscrete, spaces.MultiBinary)
+"""The spaces of which each element can be a cell."""
+
+
+def _sizes_and_starts(space: spaces.Space[Any]) -> tuple[ArrayLike, ArrayLike]:
+    if isinstance(space, spaces.Discrete):
+        return int(space.n), int(space.start)
+    if isinstance(space, spaces.MultiDiscrete):
+        return space.nvec, space.start
+    if isinstance(space, spaces.MultiBinary):
+        return np.full(space.shape, 2), 0
+    raise ValueError(
+        f"space must be Discrete, MultiDiscrete or MultiBinary, got {space}; for a "
+        "Box take Crisp or Fuzzy."
+    )
+
+
+def _integers(name: str, values: ArrayLike, lowest: int, highest: int) -> IntArray:
+    try:
+        array = np.asarray(values)
+    except ValueError:  # ragged
+        array = np.empty(0)
+    if (
+        array.dtype.kind not in "iu"
+        or array.size == 0
+        or array.min() < lowest
+        or array.max() > highest
+    ):
+        bounds = f">= {lowest}" if highest > _MOST_START else f"within +-{highest}"
+        raise ValueError(
+            f"{name} must be an integer or an array of integers, each {bounds}, got "
+            f"{values!r}."
+        )
+    return array.astype(np.int64)
+
+
+def _as_numbers(states: NDArray[Any]) -> NDArray[Any]:
+    if states.dtype.kind not in "bfiu":
+        raise ValueError(f"states must be whole numbers, got dtype {states.dtype}.")
+    # Unsigned ones of 64 bits may lie beyond int64; all that are in range are exact.
+    wide = states.dtype.kind == "f" or states.dtype == np.uint64
+    return states.astype(np.float64 if wide else np.int64)

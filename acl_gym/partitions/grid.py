@@ -1,0 +1,315 @@
+"""Grids over real variables: crisp bins (4.2) and triangular memberships (4.7)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from numbers import Integral
+from typing import Any, ClassVar, Self
+
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import ArrayLike, NDArray
+
+from acl_gym.partitions.base import Partition
+from acl_gym.partitions.kernels import Axes, locate, locate_in_parallel
+from acl_gym.utils import threads, validation
+from acl_gym.utils.typing import CellArray, FloatArray, IntArray
+
+
+class Grid(Partition):
+    """A product of axes, each with strictly increasing centres.
+
+    Args:
+        centres: for each state variable its centres, strictly increasing; one or
+            more variables, one or more centres each.
+        periods: for each variable its period if it is circular (2 pi for an angle),
+            else None. None for all: no variable is circular.
+
+    Raises:
+        ValueError: centres that do not increase strictly or are not finite, or that
+            span a full period; a period that is not positive.
+    """
+
+    fuzzy: ClassVar[bool]
+    checked = True
+
+    def __init__(
+        self,
+        centres: Sequence[ArrayLike],
+        periods: Sequence[float | None] | None = None,
+    ) -> None:
+        if not isinstance(centres, Iterable) or (
+            isinstance(centres, np.ndarray) and centres.ndim == 1
+        ):
+            raise ValueError(
+                "centres must be one sequence for each state variable, got "
+                f"{centres!r}; pass [sequence] for a single variable."
+            )
+        axes = [_checked_centres(axis, values) for axis, values in enumerate(centres)]
+        if not axes:
+            raise ValueError("centres must hold one or more state variables, got none.")
+        lengths = _checked_periods(periods, axes)
+        self.centres = tuple(axes)
+        self.periods = tuple(lengths)
+        self._cells = np.array([axis.size for axis in axes], dtype=np.int64)
+        self.n_cells = int(np.prod(self._cells.astype(object)))
+        if self.n_cells > np.iinfo(np.int32).max:
+            raise ValueError(
+                f"a partition must have fewer than 2^31 cells, got {self.n_cells}; "
+                "use fewer centres."
+            )
+        self.cells_per_state = 2 ** len(axes) if self.fuzzy else 1
+
+        edges = [
+            # A lone centre takes every state, so it needs no copy a period on.
+            axis
+            if period is None or axis.size == 1
+            else np.append(axis, axis[0] + period)
+            for axis, period in zip(axes, lengths, strict=True)
+        ]
+        self._edges = np.concatenate(edges)
+        counts = [axis.size for axis in edges]
+        self._axes: Axes = (
+            tuple(
+                int(end) - n for end, n in zip(np.cumsum(counts), counts, strict=True)
+            ),
+            tuple(counts),
+            tuple(axis.size for axis in axes),
+            tuple(period or 0.0 for period in lengths),
+            tuple(_regular_rate(axis) for axis in edges),
+        )
+
+    @classmethod
+    def from_box(
+        cls,
+        space: spaces.Box,
+        cells: int | Sequence[int],
+        circular: Iterable[int] = (),
+    ) -> Self:
+        """Spread centres evenly over a Box.
+
+        Args:
+            space: a bounded one-dimensional Box, for instance
+                `env.single_observation_space`.
+            cells: number of centres, for all variables or for each.
+            circular: the variables whose high end is their low end, such as angles.
+                Their centres are low, low + range / n, ... as in (5.2); all others
+                have centres on both ends as in (5.3).
+
+        Raises:
+            ValueError: the Box is unbounded or not one-dimensional, or `cells` or
+                `circular` do not fit it.
+        """
+        if not isinstance(space, spaces.Box) or len(space.shape) != 1:
+            raise ValueError(f"space must be a one-dimensional Box, got {space}.")
+        low = space.low.astype(np.float64)
+        high = space.high.astype(np.float64)
+        if not (np.isfinite(low) & np.isfinite(high)).all():
+            raise ValueError(
+                f"space must be bounded in every variable, got {space}; "
+                "give the centres of an unbounded variable yourself."
+            )
+        counts: list[Any] = []
+        if isinstance(cells, Integral):
+            counts = [cells] * low.size
+        elif isinstance(cells, Iterable):
+            counts = list(cells)
+        if len(counts) != low.size:
+            raise ValueError(
+                f"cells must be an int or {low.size} ints, one a variable, "
+                f"got {cells!r}."
+            )
+        round_axes = list(circular) if isinstance(circular, Iterable) else [None]
+        for axis in round_axes:
+            whole = isinstance(axis, Integral) and not isinstance(axis, bool)
+            if not whole or not 0 <= axis < low.size:
+                raise ValueError(
+                    f"circular must hold variables 0..{low.size - 1}, got {circular!r}."
+                )
+        centres, periods = [], []
+        for axis, count in enumerate(counts):
+            validation.integer(f"cells[{axis}]", count, at_least=1)
+            is_round = axis in round_axes
+            centres.append(
+                np.linspace(low[axis], high[axis], count, endpoint=not is_round)
+            )
+            periods.append(float(high[axis] - low[axis]) if is_round else None)
+        return cls(centres, periods)
+
+    def check_space(self, space: spaces.Space[Any]) -> None:
+        """Refuse what is not a one-dimensional Box of as many variables.
+
+        Raises:
+            ValueError: the observations of `space` are not states of the partition.
+        """
+        dimensions = len(self.centres)
+        if not isinstance(space, spaces.Box) or space.shape != (dimensions,):
+            raise ValueError(
+                f"{self!r} takes observations from a Box of shape ({dimensions},), "
+                f"got {space}; build the partition from env.single_observation_space, "
+                "or let automatic_partition(env) do it."
+            )
+
+    def refine(self, axis: int, centres: ArrayLike) -> Self:
+        """Return the partition with more centres along one axis.
+
+        Around a goal that is narrow beside the cells this costs a few cells and can
+        save a policy from hovering (docs/hovering.md).
+
+        Args:
+            axis: the state variable.
+            centres: what to add, in any order; those that are there are skipped.
+
+        Raises:
+            ValueError: there is no such axis, or a centre is not finite.
+        """
+        if validation.integer("axis", axis, at_least=0) >= len(self.centres):
+            raise ValueError(
+                f"axis must lie in 0..{len(self.centres) - 1}, got {axis}."
+            )
+        axes = list(self.centres)
+        there = axes[axis]
+        added = validation.real_array("centres", centres, ndim=1)
+        # What differs by rounding only is the same centre.
+        distance = np.abs(added[:, None] - there).min(axis=1)
+        new = added[distance > 1e-9 * max(np.ptp(there), np.ptp(added))]
+        axes[axis] = np.union1d(there, new)
+        return type(self)(axes, self.periods)
+
+    def locate(
+        self,
+        states: NDArray[Any],
+        slots: IntArray,
+        index: CellArray,
+        degree: FloatArray,
+    ) -> None:
+        """See `Partition.locate`."""
+        dimensions = len(self.centres)
+        if states.ndim != 2 or states.shape[1] != dimensions:
+            raise ValueError(
+                f"states must have shape (n, {dimensions}), got {states.shape}."
+            )
+        if states.dtype != np.float64:
+            states = _as_float64(states)
+        find = locate
+        if threads.worth_it(slots.size):
+            find = locate_in_parallel
+        bad = find(
+            states,
+            slots,
+            self._edges,
+            self._axes,
+            self.fuzzy,
+            index,
+            degree,
+        )
+        if bad >= 0:
+            raise ValueError(
+                f"states must be finite, got {states[bad].tolist()} in row {bad}."
+            )
+
+    def cell_states(self) -> FloatArray:
+        """The centres of all cells, `(n_cells, d)`, in the order of (4.8)."""
+        mesh = np.meshgrid(*self.centres, indexing="ij")
+        return np.stack(mesh, axis=-1).reshape(-1, len(self.centres))
+
+    def settings(self) -> dict[str, Any]:
+        """See `Partition.settings`."""
+        return {
+            "type": type(self).__name__,
+            "centres": [axis.tolist() for axis in self.centres],
+            "periods": list(self.periods),
+        }
+
+    def __repr__(self) -> str:
+        """Name, cells along each axis, and which axes are circular."""
+        shape = " x ".join(str(n) for n in self._cells)
+        rounds = [axis for axis, p in enumerate(self.periods) if p is not None]
+        return f"{type(self).__name__}({shape} cells, circular={rounds})"
+
+
+class Crisp(Grid):
+    """Crisp bins: a state belongs wholly to the nearest centre, (4.2).
+
+    A state half-way between two centres belongs to the upper one. See `from_box` for
+    evenly spread centres.
+
+    Args:
+        centres: for each state variable its centres, strictly increasing.
+        periods: for each variable its period if circular, else None.
+    """
+
+    fuzzy = False
+
+
+class Fuzzy(Grid):
+    """Triangular membership functions around the centres, (4.7)-(4.9).
+
+    The degree of a cell is the product of the memberships of the variables; a state
+    beyond the outermost centres belongs wholly to the outermost. See `from_box` for
+    evenly spread centres.
+
+    Args:
+        centres: for each state variable its centres, strictly increasing.
+        periods: for each variable its period if circular, else None.
+    """
+
+    fuzzy = True
+
+
+def _as_float64(states: NDArray[Any]) -> FloatArray:
+    if states.dtype.kind not in "fiu":
+        raise ValueError(f"states must be real numbers, got dtype {states.dtype}.")
+    return states.astype(np.float64)
+
+
+def _checked_centres(axis: int, values: ArrayLike) -> FloatArray:
+    centres = validation.real_array(f"centres[{axis}]", values, ndim=1)
+    with np.errstate(over="ignore", divide="ignore"):
+        gaps = np.diff(centres)
+        usable = np.isfinite(gaps) & np.isfinite(1.0 / gaps)
+    if (falls := np.flatnonzero(gaps <= 0)).size:
+        i = int(falls[0])
+        raise ValueError(
+            f"centres[{axis}] must increase strictly, got {centres[i]:g} followed by "
+            f"{centres[i + 1]:g} at position {i}; sort them and drop duplicates."
+        )
+    if not usable.all():
+        raise ValueError(
+            f"centres[{axis}] must be further apart than 1e-307 and closer than "
+            f"1e307, got {values!r}."
+        )
+    return centres
+
+
+def _checked_periods(
+    periods: Sequence[float | None] | None, axes: list[FloatArray]
+) -> list[float | None]:
+    if periods is None:
+        return [None] * len(axes)
+    if not isinstance(periods, Sequence) or len(periods) != len(axes):
+        raise ValueError(
+            f"periods must hold one entry for each of the {len(axes)} variables, "
+            f"got {periods!r}."
+        )
+    lengths: list[float | None] = []
+    for axis, period in enumerate(periods):
+        if period is not None:
+            period = validation.number(f"periods[{axis}]", period, above=0)
+            span = float(axes[axis][-1] - axes[axis][0])
+            if span >= period:
+                raise ValueError(
+                    f"centres[{axis}] must span less than their period {period:g}, "
+                    f"got {span:g}; leave out the centre that repeats the first."
+                )
+        lengths.append(period)
+    return lengths
+
+
+def _regular_rate(edges: FloatArray) -> float:
+    """1 / spacing where the spacing is constant to rounding, else 0."""
+    if edges.size < 2:
+        return 0.0
+    gaps = np.diff(edges)
+    regular = np.allclose(gaps, gaps.mean(), rtol=1e-9, atol=0.0)
+    return float(1.0 / gaps.mean()) if regular else 0.0

@@ -1,0 +1,157 @@
+"""The model of a finite decision process, as far as an environment tells it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Self
+
+import gymnasium as gym
+import numpy as np
+from gymnasium import spaces
+from gymnasium.vector import SyncVectorEnv, VectorEnv
+from numpy.typing import NDArray
+
+from acl_gym.utils import validation
+from acl_gym.utils.typing import BoolArray, FloatArray, IntArray
+
+
+@dataclass(frozen=True)
+class TabularModel:
+    """What each action does in each state: the model of a finite MDP.
+
+    Each array is `(n_states, n_actions, outcomes)`: an action has so many outcomes,
+    some of them perhaps with probability 0.
+
+    Args:
+        probability: P of (3.39), each >= 0, summing to 1 over the outcomes.
+        next_state: the state that an outcome leads to.
+        reward: its reward R.
+        terminated: whether the episode ends there: nothing follows.
+        first_state: the observation that stands for state 0, `Discrete.start`.
+        first_action: the action that stands for action 0, `Discrete.start`.
+
+    Raises:
+        ValueError: shapes differ, probabilities are none, a state is out of range, or
+            a reward is not finite.
+    """
+
+    probability: FloatArray
+    next_state: IntArray
+    reward: FloatArray
+    terminated: BoolArray
+    first_state: int = 0
+    first_action: int = 0
+
+    def __post_init__(self) -> None:
+        probability = validation.real_array("probability", self.probability, ndim=3)
+        reward = validation.real_array("reward", self.reward, ndim=3)
+        next_state, terminated = np.array(self.next_state), np.array(self.terminated)
+        for name, array, kind, wanted in (
+            ("next_state", next_state, "iu", "integers"),
+            ("reward", reward, "f", "numbers"),
+            ("terminated", terminated, "b", "bools"),
+        ):
+            if array.shape != probability.shape or array.dtype.kind not in kind:
+                raise ValueError(
+                    f"{name} must hold {wanted} in the shape of probability, "
+                    f"{probability.shape}, got {array.dtype} in {array.shape}."
+                )
+        total = probability.sum(axis=2)
+        wrong = (probability < 0).any(axis=2) | ~np.isclose(total, 1, rtol=0, atol=1e-9)
+        if wrong.any():
+            state, action = np.argwhere(wrong)[0]
+            raise ValueError(
+                "probability must be >= 0 and sum to 1 over the outcomes, got "
+                f"{probability[state, action].tolist()} for action {action} in state "
+                f"{state}."
+            )
+        if next_state.min() < 0 or next_state.max() >= len(probability):
+            raise ValueError(
+                f"next_state must lie in 0..{len(probability) - 1}, got "
+                f"{next_state.min()} to {next_state.max()}."
+            )
+        # Copies of the class's own kind, which nobody else can change.
+        arrays: dict[str, NDArray[Any]] = {
+            "probability": probability,
+            "next_state": next_state.astype(np.int64),
+            "reward": reward,
+            "terminated": terminated,
+        }
+        for name, kept in arrays.items():
+            kept.flags.writeable = False
+            object.__setattr__(self, name, kept)
+
+    @property
+    def n_states(self) -> int:
+        """The number of states."""
+        return int(self.probability.shape[0])
+
+    @property
+    def n_actions(self) -> int:
+        """The number of actions."""
+        return int(self.probability.shape[1])
+
+    @classmethod
+    def of(cls, env: gym.Env[Any, Any] | VectorEnv[Any, Any, Any]) -> Self:
+        """Read the model of an environment that tells it.
+
+        Those are the environments of this package whose system has `outcomes()`, and
+        those with a table `P` as Gymnasium's FrozenLake, CliffWalking and Taxi have
+        it, also as the first of a `SyncVectorEnv`. Wrappers are looked through: what
+        they change is not in the model.
+
+        Raises:
+            TypeError: the environment tells no model.
+        """
+        base: Any = getattr(env, "unwrapped", env)
+        if isinstance(base, SyncVectorEnv):
+            base = base.envs[0].unwrapped
+        outcomes = getattr(getattr(base, "system", None), "outcomes", None)
+        table = getattr(base, "P", None)
+        if outcomes is not None:
+            probability, next_state, reward, terminated = outcomes()
+        elif isinstance(table, dict) and table:
+            probability, next_state, reward, terminated = _arrays_of(table)
+        else:
+            raise TypeError(
+                "env must tell its model, by outcomes() of its system or by a table "
+                f"P[state][action], got {type(base).__name__}; build a TabularModel "
+                "from arrays, or learn with QLearning, which needs no model."
+            )
+        vector = isinstance(base, VectorEnv)
+        seen = base.single_observation_space if vector else base.observation_space
+        done = base.single_action_space if vector else base.action_space
+        first_state = int(seen.start) if isinstance(seen, spaces.Discrete) else 0
+        return cls(
+            probability,
+            next_state,
+            reward,
+            terminated,
+            first_state=first_state,
+            first_action=int(done.start),
+        )
+
+
+def _arrays_of(
+    table: dict[int, dict[int, list[tuple[float, int, float, bool]]]],
+) -> tuple[FloatArray, IntArray, FloatArray, BoolArray]:
+    """The arrays of a model from `P[state][action]`, padded by impossible outcomes."""
+    n_states, n_actions = len(table), len(table.get(0, ()))
+    if set(table) != set(range(n_states)) or any(
+        set(row) != set(range(n_actions)) for row in table.values()
+    ):
+        raise ValueError(
+            "P must have the keys P[0..n_states - 1][0..n_actions - 1], with the same "
+            "actions for each state; number states and actions from 0."
+        )
+    most = max(len(listed) for row in table.values() for listed in row.values())
+    shape = (n_states, n_actions, most)
+    probability, reward = np.zeros(shape), np.zeros(shape)
+    next_state = np.zeros(shape, dtype=np.int64)
+    terminated = np.ones(shape, dtype=np.bool_)
+    for state, row in table.items():
+        for action, listed in row.items():
+            for i, outcome in enumerate(listed):
+                at = state, action, i
+                probability[at], next_state[at], reward[at], terminated[at] = outcome
+    return probability, next_state, reward, terminated

@@ -1,0 +1,157 @@
+"""Fuzzy Q-iteration: dynamic programming on the agents' own partition.
+
+With a fine partition it is the optimum to measure the learners against; with theirs
+it tells what the partition itself allows.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from gymnasium.vector import VectorEnv
+from numba import njit
+from tqdm.auto import tqdm
+
+from acl_gym.colony.selection import ALL, best_value
+from acl_gym.envs.control.environments import ControlVectorEnv
+from acl_gym.partitions import Partition
+from acl_gym.policies import TablePolicy
+from acl_gym.utils import validation
+from acl_gym.utils.typing import BoolArray, CellArray, FloatArray
+
+_SLOTS = 65_536  # states tried at once
+
+
+@dataclass(frozen=True)
+class QIterationResult:
+    """What fuzzy Q-iteration found.
+
+    Attributes:
+        policy: the greedy policy.
+        iterations: sweeps made.
+        change: the largest change of a value in the last sweep.
+    """
+
+    policy: TablePolicy
+    iterations: int
+    change: float
+
+
+@dataclass(frozen=True)
+class _Model:
+    """What each action does in each cell: arrays over `(n_cells, n_actions)`."""
+
+    reward: FloatArray
+    terminated: BoolArray
+    index: CellArray
+    degree: FloatArray
+
+
+def fuzzy_q_iteration(
+    env: VectorEnv[Any, Any, Any],
+    partition: Partition,
+    *,
+    discount: float = 1.0,
+    tolerance: float = 1e-6,
+    max_iterations: int = 1000,
+    progress_bar: bool = False,
+) -> QIterationResult:
+    """Iterate the Bellman optimality equation (3.40) over a partition.
+
+    Q_iu <- r(x_i, u) + gamma max_v sum_j beta_j(f(x_i, u)) Q_jv, where x_i is the
+    state that stands for cell i, in place, cell by cell. A crisp partition makes it
+    value iteration (3.42) on the cells. The deterministic environment is its own
+    model: it is asked through `reset(options={"state": ...})` and one step.
+
+    Args:
+        env: a deterministic environment of this package.
+        partition: the cells.
+        discount: gamma_rl, in [0, 1]; 1 finds the undiscounted policy.
+        tolerance: stop when no value changes by more, > 0.
+        max_iterations: stop after so many sweeps, >= 1. Not reaching the tolerance
+            is reported in the result: without a discount, cells from which the goal
+            cannot be reached cost more with each sweep.
+        progress_bar: show a bar.
+
+    Raises:
+        TypeError: `env` is of another package, or random.
+        ValueError: a parameter is out of range.
+    """
+    base = env.unwrapped
+    if not isinstance(base, ControlVectorEnv) or base.system.draws_per_step:
+        raise TypeError(
+            "env must be a deterministic vector environment of acl_gym, which can be "
+            f"put into any state; got {type(base).__name__}."
+        )
+    discount = validation.number("discount", discount, at_least=0, at_most=1)
+    tolerance = validation.number("tolerance", tolerance, above=0)
+    max_iterations = validation.integer("max_iterations", max_iterations, at_least=1)
+
+    model = _try_all(base, partition)
+    values = np.zeros(model.reward.shape)
+    change, iterations = np.inf, 0
+    with tqdm(
+        total=max_iterations, disable=not progress_bar, desc="Q-iteration"
+    ) as bar:
+        while change > tolerance and iterations < max_iterations:
+            change = _sweep(
+                model.reward,
+                model.terminated,
+                model.index,
+                model.degree,
+                discount,
+                values,
+            )
+            iterations += 1
+            bar.update()
+    return QIterationResult(TablePolicy(partition, values), iterations, float(change))
+
+
+def _try_all(env: ControlVectorEnv, partition: Partition) -> _Model:
+    """Take every action from the state of every cell, many cells at a time."""
+    states = partition.cell_states()
+    n_actions = int(env.system.action_space.n)
+    shape = (len(states), n_actions)
+    k = partition.cells_per_state
+    model = _Model(
+        reward=np.empty(shape),
+        terminated=np.empty(shape, dtype=np.bool_),
+        index=np.empty((*shape, k), dtype=np.int32),
+        degree=np.empty((*shape, k)),
+    )
+    for start in range(0, len(states), _SLOTS):
+        some = slice(start, min(start + _SLOTS, len(states)))
+        trial = env.with_slots(some.stop - some.start)
+        for u in range(n_actions):
+            trial.reset(options={"state": states[some]})
+            actions = np.full(trial.num_envs, u)
+            observation, reward, terminated, _, _ = trial.step(actions)
+            model.reward[some, u] = reward
+            model.terminated[some, u] = terminated
+            model.index[some, u], model.degree[some, u] = partition(observation)
+    return model
+
+
+@njit(cache=True)
+def _sweep(
+    reward: FloatArray,
+    terminated: BoolArray,
+    index: CellArray,
+    degree: FloatArray,
+    discount: float,
+    values: FloatArray,
+) -> float:
+    """One pass over all cells and actions, in place; returns the largest change."""
+    n_cells, n_actions = reward.shape
+    change = 0.0
+    for cell in range(n_cells):
+        for u in range(n_actions):
+            best = 0.0
+            if not terminated[cell, u]:
+                best = best_value(values, index[cell], degree[cell], u, ALL)
+            new = reward[cell, u] + discount * best
+            change = max(change, abs(new - values[cell, u]))
+            values[cell, u] = new
+    return change

@@ -1,0 +1,339 @@
+"""Value iteration (3.42) and the exact value of a policy, where the model is known.
+
+For a finite number of states: what the learners are held against.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+from gymnasium import spaces
+from gymnasium.vector import VectorEnv
+from numba import njit
+from numpy.typing import ArrayLike
+from scipy import sparse
+from scipy.sparse import csgraph
+from scipy.sparse.linalg import spsolve
+from tqdm.auto import tqdm
+
+from acl_gym.partitions import Discrete
+from acl_gym.planning.model import TabularModel
+from acl_gym.policies import TablePolicy
+from acl_gym.utils import validation
+from acl_gym.utils.typing import BoolArray, FloatArray, IntArray
+
+
+@dataclass(frozen=True)
+class ValueIterationResult:
+    """What value iteration found.
+
+    Attributes:
+        values: V of each state, `(n_states,)`.
+        action_values: Q of each action in each state, `(n_states, n_actions)`.
+        actions: a best action of each state, `(n_states,)`; see `value_iteration`.
+        iterations: sweeps made.
+        change: the largest change of a value in the last sweep.
+        model: what it was found for.
+    """
+
+    values: FloatArray
+    action_values: FloatArray
+    actions: IntArray
+    iterations: int
+    change: float
+    model: TabularModel
+
+    @property
+    def policy(self) -> TablePolicy:
+        """The policy that takes `actions`, on observations of a `Discrete` space.
+
+        Its table holds the action values, that of the action taken raised to the best
+        of its state, and its ranks break ties in favour of it.
+        """
+        model, table = self.model, self.action_values.copy()
+        states = np.arange(model.n_states)
+        table[states, self.actions] = table.max(axis=1)
+        ranks = np.tile(np.arange(model.n_actions, dtype=np.int32), (len(table), 1))
+        # The action taken changes places with the first.
+        ranks[states, 0] = self.actions
+        ranks[states, self.actions] = 0
+        space = spaces.Discrete(model.n_states, start=model.first_state)
+        partition = Discrete.from_space(space)
+        return TablePolicy(partition, table, ranks, model.first_action)
+
+
+def value_iteration(
+    model: TabularModel | gym.Env[Any, Any] | VectorEnv[Any, Any, Any],
+    *,
+    discount: float = 1.0,
+    tolerance: float = 1e-10,
+    max_iterations: int = 100_000,
+    progress_bar: bool = False,
+) -> ValueIterationResult:
+    """Iterate the Bellman optimality equation (3.42) until values change no more.
+
+    V(q) <- max_u sum_q' P (R + gamma V(q')), from V = 0, in place: each state takes
+    the values that those before it have just got, which needs fewer sweeps than
+    (3.42) with two tables and ends with the same values.
+
+    Actions whose values lie within `tolerance` of the best, or within that fraction
+    of it if it exceeds 1, are tied (a decision). Of these the policy takes one from
+    which an end may come soonest, and the first of those. Without a discount this
+    matters: where only the goal is rewarded, to stand still for ever is tied with
+    going there. A policy of best actions that always ends is an optimal one.
+
+    Args:
+        model: the model, or an environment that `TabularModel.of` can read.
+        discount: gamma_rl, in [0, 1].
+        tolerance: stop when no value changes by more, > 0.
+        max_iterations: stop after so many sweeps, >= 1. Not reaching the tolerance is
+            reported in the result: without a discount, states from which no end can be
+            reached cost more with each sweep.
+        progress_bar: show a bar.
+
+    Raises:
+        TypeError: an environment tells no model.
+        ValueError: a parameter is out of range, or values have overflowed.
+    """
+    if not isinstance(model, TabularModel):
+        model = TabularModel.of(model)
+    discount = validation.number("discount", discount, at_least=0, at_most=1)
+    tolerance = validation.number("tolerance", tolerance, above=0)
+    max_iterations = validation.integer("max_iterations", max_iterations, at_least=1)
+
+    arrays = (model.probability, model.next_state, model.reward, model.terminated)
+    values = np.zeros(model.n_states)
+    change, iterations = np.inf, 0
+    with tqdm(
+        total=max_iterations, disable=not progress_bar, desc="Value iteration"
+    ) as bar:
+        while change > tolerance and iterations < max_iterations:
+            change = _sweep(*arrays, discount, values)
+            iterations += 1
+            bar.update()
+    action_values = _action_values(*arrays, discount, values)
+    if not (np.isfinite(values).all() and np.isfinite(action_values).all()):
+        raise ValueError(
+            f"values must stay finite, but have overflowed within {iterations} sweeps; "
+            "scale the rewards down, or lower discount or max_iterations."
+        )
+    best = action_values.max(axis=1, keepdims=True)
+    tied = action_values >= best - tolerance * np.maximum(1.0, np.abs(best))
+    actions = _nearest_to_an_end(
+        model.probability, model.next_state, model.terminated, tied
+    )
+    return ValueIterationResult(
+        values, action_values, actions, iterations, float(change), model
+    )
+
+
+def policy_value(
+    model: TabularModel | gym.Env[Any, Any] | VectorEnv[Any, Any, Any],
+    policy_actions: ArrayLike,
+    discount: float = 1.0,
+) -> FloatArray:
+    """The exact value of a policy in each state: (3.38), solved as a linear system.
+
+    Without a discount, a policy may come to states that it never ends from, and then
+    goes round among some of them for ever. If no reward is expected there, that is
+    worth 0, as an end is. If costs accrue, it is worth -inf, and so is every state
+    from which it may come to that; if rewards accrue, +inf.
+
+    Args:
+        model: the model, or an environment that `TabularModel.of` can read.
+        policy_actions: the action of each state, counted from 0, `(n_states,)`.
+        discount: gamma_rl, in [0, 1].
+
+    Returns:
+        V^h, `(n_states,)`.
+
+    Raises:
+        TypeError: an environment tells no model.
+        ValueError: `policy_actions` or `discount` are out of range; or, without a
+            discount, a value is not defined because both costs and rewards accrue.
+    """
+    if not isinstance(model, TabularModel):
+        model = TabularModel.of(model)
+    discount = validation.number("discount", discount, at_least=0, at_most=1)
+    actions = np.asarray(policy_actions)
+    n = model.n_states
+    if actions.shape != (n,) or actions.dtype.kind not in "iu":
+        raise ValueError(
+            f"policy_actions must be {n} integers, one a state, got {actions.dtype} "
+            f"in shape {actions.shape}."
+        )
+    if actions.min() < 0 or actions.max() >= model.n_actions:
+        raise ValueError(
+            f"policy_actions must lie in 0..{model.n_actions - 1}, got "
+            f"{actions.min()} to {actions.max()}; subtract first_action."
+        )
+    states = np.arange(n)
+    probability = model.probability[states, actions]
+    terminated = model.terminated[states, actions]
+    reward = (probability * model.reward[states, actions]).sum(axis=1)
+    rows = np.repeat(states, probability.shape[1])
+    columns = model.next_state[states, actions].ravel()
+    goes_on = np.where(terminated, 0.0, probability).ravel()
+    chain = sparse.csr_array((goes_on, (rows, columns)), shape=(n, n))
+    chain.eliminate_zeros()
+    values = np.zeros(n)
+    unknown = np.ones(n, dtype=np.bool_)
+    if discount == 1:
+        ends = (terminated & (probability > 0)).any(axis=1)
+        values, unknown = _for_ever(chain, reward, ends)
+    some = np.flatnonzero(unknown)
+    if some.size:
+        system = sparse.eye_array(some.size) - discount * chain[some][:, some]
+        values[some] = spsolve(system.tocsc(), reward[some])
+    return values
+
+
+def _for_ever(
+    chain: Any, reward: FloatArray, ends: BoolArray
+) -> tuple[FloatArray, BoolArray]:
+    """Where an undiscounted policy never ends: its value there, 0 or infinite.
+
+    Args:
+        chain: sparse `(n, n)`, probabilities of going on from state to state.
+        reward: expected, `(n,)`.
+        ends: whether an episode may end right after a state, `(n,)`.
+
+    Returns:
+        Values `(n,)`, and where they are still to be computed, `(n,)`.
+
+    Raises:
+        ValueError: a value is not defined.
+    """
+    # The policy stays for ever in those strong components that nothing leaves.
+    _, label = csgraph.connected_components(chain, connection="strong")
+    edges = chain.tocoo()
+    left = np.zeros(label.max() + 1, dtype=np.bool_)
+    left[label[edges.row[label[edges.row] != label[edges.col]]]] = True
+    left[label[ends]] = True
+    stays = ~left[label]
+    costs, gains = (
+        stays & np.isin(label, label[stays & (sign * reward > 0)]) for sign in (-1, 1)
+    )
+    to_costs, to_gains = _leading_to(chain, costs), _leading_to(chain, gains)
+    if (to_costs & to_gains).any():
+        raise ValueError(
+            "without a discount a policy must not come to both endless costs and "
+            f"endless rewards, as from state {int(np.argmax(to_costs & to_gains))}; "
+            "use a discount below 1."
+        )
+    values = np.zeros(reward.size)
+    values[to_costs] = -np.inf
+    values[to_gains] = np.inf
+    return values, ~(to_costs | to_gains | stays)
+
+
+def _leading_to(chain: Any, target: BoolArray) -> BoolArray:
+    """The states from which `target` may be reached, itself among them, `(n,)`."""
+    found, count = target.copy(), -1
+    while found.sum() > count:
+        count = int(found.sum())
+        found |= chain @ found.astype(np.float64) > 0
+    return found
+
+
+@njit(cache=True)
+def _action_value(
+    probability: FloatArray,
+    next_state: IntArray,
+    reward: FloatArray,
+    terminated: BoolArray,
+    discount: float,
+    values: FloatArray,
+    state: int,
+    action: int,
+) -> float:
+    """The expected reward and what follows, the sum in (3.42)."""
+    total = 0.0
+    for i in range(probability.shape[2]):
+        worth = reward[state, action, i]
+        if not terminated[state, action, i]:
+            worth += discount * values[next_state[state, action, i]]
+        total += probability[state, action, i] * worth
+    return total
+
+
+@njit(cache=True)
+def _sweep(
+    probability: FloatArray,
+    next_state: IntArray,
+    reward: FloatArray,
+    terminated: BoolArray,
+    discount: float,
+    values: FloatArray,
+) -> float:
+    """One pass over all states, in place; returns the largest change."""
+    change = 0.0
+    for state in range(values.size):
+        best = -np.inf
+        for u in range(probability.shape[1]):
+            value = _action_value(
+                probability, next_state, reward, terminated, discount, values, state, u
+            )
+            best = max(best, value)
+        change = max(change, abs(best - values[state]))
+        values[state] = best
+    return change
+
+
+@njit(cache=True)
+def _action_values(
+    probability: FloatArray,
+    next_state: IntArray,
+    reward: FloatArray,
+    terminated: BoolArray,
+    discount: float,
+    values: FloatArray,
+) -> FloatArray:
+    """Q of every state and action from V of the states."""
+    n_states, n_actions, _ = probability.shape
+    table = np.empty((n_states, n_actions))
+    for state in range(n_states):
+        for u in range(n_actions):
+            table[state, u] = _action_value(
+                probability, next_state, reward, terminated, discount, values, state, u
+            )
+    return table
+
+
+@njit(cache=True)
+def _nearest_to_an_end(
+    probability: FloatArray,
+    next_state: IntArray,
+    terminated: BoolArray,
+    tied: BoolArray,
+) -> IntArray:
+    """Of the tied actions of each state, the first from which an end is nearest."""
+    n_states, n_actions, k = probability.shape
+    never = n_states + 1
+    steps = np.full(n_states, never)
+    actions = np.zeros(n_states, dtype=np.int64)
+    changed = True
+    while changed:
+        changed = False
+        for state in range(n_states):
+            nearest = never + 1
+            for u in range(n_actions):
+                if not tied[state, u]:
+                    continue
+                away = never
+                for i in range(k):
+                    if probability[state, u, i] > 0.0:
+                        if terminated[state, u, i]:
+                            away = 1
+                        else:
+                            away = min(away, steps[next_state[state, u, i]] + 1)
+                if away < nearest:
+                    nearest = away
+                    actions[state] = u
+            if nearest < steps[state]:
+                steps[state] = nearest
+                changed = True
+    return actions

@@ -1,0 +1,235 @@
+"""A policy as a table over a partition: what every method here ends with."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import Any
+
+import numpy as np
+from numba import njit
+from numpy.typing import ArrayLike, NDArray
+
+from acl_gym.colony.pheromone import Pheromone
+from acl_gym.colony.selection import choose_actions, greedy_actions
+from acl_gym.partitions import Partition
+from acl_gym.utils import validation
+from acl_gym.utils.typing import BoolArray, CellArray, FloatArray, IntArray, RankArray
+
+
+def random_ranks(n_cells: int, n_actions: int, rng: np.random.Generator) -> RankArray:
+    """A random order of the actions for each cell, `(n_cells, n_actions)`.
+
+    Ties are to be broken at random (4.16). Drawn once, the order makes the policy a
+    function (a decision).
+    """
+    ranks = np.tile(np.arange(n_actions, dtype=np.int32), (n_cells, 1))
+    return np.asarray(rng.permuted(ranks, axis=1), dtype=np.int32)
+
+
+class PartitionPolicy(ABC):
+    """What chooses actions through a partition, with Stable-Baselines3's `predict`.
+
+    Attributes:
+        partition: turns observations into cells and degrees.
+        first_action: the action that column 0 of a table stands for,
+            `Discrete.start`.
+    """
+
+    partition: Partition
+    first_action: int
+
+    @property
+    @abstractmethod
+    def n_actions(self) -> int:
+        """The number of actions, the columns of the table."""
+
+    @abstractmethod
+    def _act(
+        self,
+        index: CellArray,
+        degree: FloatArray,
+        deterministic: bool,
+        allowed: BoolArray | None,
+    ) -> IntArray:
+        """Choose columns of the table, `(n,)`, for cells and degrees `(n, k)`."""
+
+    def predict(
+        self,
+        observation: ArrayLike,
+        state: Any = None,
+        episode_start: Any = None,
+        deterministic: bool = True,
+        action_masks: ArrayLike | None = None,
+    ) -> tuple[NDArray[np.int64], Any]:
+        """Choose actions, with the signature of Stable-Baselines3.
+
+        Args:
+            observation: one observation or a batch of them.
+            state: passed through; a table has no memory.
+            episode_start: not used.
+            deterministic: True follows the policy, False explores as in learning,
+                where there is a difference.
+            action_masks: which actions may be chosen, `(n_actions,)` or
+                `(n, n_actions)`, such as `info["action_mask"]`; None: all.
+
+        Returns:
+            `(actions, state)`; the action of a single observation has no axis.
+
+        Raises:
+            ValueError: an observation is not finite or has the wrong shape, or a mask
+                has the wrong shape or allows nothing.
+        """
+        batch = np.asarray(observation)
+        single = batch.ndim == self.partition.state_ndim
+        index, degree = self.partition(batch[None] if single else batch)
+        allowed = self._checked_masks(action_masks, len(index))
+        actions = self._act(index, degree, deterministic, allowed) + self.first_action
+        return (actions[0] if single else actions), state
+
+    def _checked_masks(self, masks: ArrayLike | None, count: int) -> BoolArray | None:
+        if masks is None:
+            return None
+        allowed = np.asarray(masks) != 0
+        if allowed.ndim == 1:
+            allowed = allowed[None]
+        shape = (count, self.n_actions)
+        if allowed.shape != shape or not allowed.any(axis=1).all():
+            raise ValueError(
+                f"action_masks must have shape {shape} and allow an action in each "
+                f"row, got {np.asarray(masks).tolist()!r:.200}."
+            )
+        return np.ascontiguousarray(allowed)
+
+
+class TablePolicy(PartitionPolicy):
+    """The action with the largest degree-weighted table entry (4.16).
+
+    Args:
+        partition: turns observations into cells and degrees.
+        table: `(n_cells, n_actions)`, pheromone levels or action values.
+        ranks: `(n_cells, n_actions)`, by which tied actions are told apart; None
+            draws them from a fixed seed.
+        first_action: the action that column 0 stands for, `Discrete.start`.
+
+    Raises:
+        ValueError: `table` or `ranks` do not fit the partition.
+    """
+
+    def __init__(
+        self,
+        partition: Partition,
+        table: FloatArray,
+        ranks: RankArray | None = None,
+        first_action: int = 0,
+    ) -> None:
+        if table.dtype != np.float64 or table.ndim != 2:
+            raise ValueError(
+                f"table must be float64 with two axes, got {table.dtype} with "
+                f"{table.ndim}."
+            )
+        if len(table) != partition.n_cells:
+            raise ValueError(
+                f"table must have {partition.n_cells} rows, one a cell, got "
+                f"{len(table)}."
+            )
+        n_cells, n_actions = table.shape
+        if ranks is None:
+            ranks = random_ranks(n_cells, n_actions, np.random.default_rng(0))
+        if ranks.shape != table.shape:
+            raise ValueError(
+                f"ranks must have the shape of the table, {table.shape}, got "
+                f"{ranks.shape}."
+            )
+        self.partition = partition
+        self.table = table
+        self.ranks = ranks
+        self.first_action = first_action
+
+    @property
+    def n_actions(self) -> int:
+        """See `PartitionPolicy.n_actions`."""
+        return int(self.table.shape[1])
+
+    def _act(
+        self,
+        index: CellArray,
+        degree: FloatArray,
+        deterministic: bool,
+        allowed: BoolArray | None,
+    ) -> IntArray:
+        return greedy_actions(self.table, self.ranks, index, degree, allowed)
+
+    def best_actions(self) -> IntArray:
+        """The best column of every cell, `(n_cells,)`, (3.10)."""
+        return _best_actions(self.table, self.ranks)
+
+    def copy(self) -> TablePolicy:
+        """The same policy over a table that no longer changes."""
+        return TablePolicy(
+            self.partition, self.table.copy(), self.ranks, self.first_action
+        )
+
+
+class SoftPolicy(PartitionPolicy):
+    """Actions drawn from the pheromone as the ants draw them (4.11), only steeper.
+
+    A greedy policy on a coarse table can fall into a cycle beside the goal that it
+    never leaves (docs/hovering.md). Drawing in proportion to tau^exponent follows
+    the same pheromone, and leaves every cycle sooner or later.
+
+    Args:
+        partition: turns observations into cells and degrees.
+        levels: pheromone, `(n_cells, n_actions)`; copied.
+        exponent: > 0; the larger, the closer to the greedy policy.
+        seed: of the draws, >= 0; None draws one from the system.
+        first_action: the action that column 0 stands for, `Discrete.start`.
+
+    Raises:
+        TypeError: `seed` is not an integer.
+        ValueError: `exponent` is not > 0 and finite, or `seed` is negative.
+    """
+
+    def __init__(
+        self,
+        partition: Partition,
+        levels: FloatArray,
+        exponent: float = 10.0,
+        seed: int | None = None,
+        first_action: int = 0,
+    ) -> None:
+        exponent = validation.number("exponent", exponent, above=0)
+        if seed is not None:
+            seed = validation.integer("seed", seed, at_least=0)
+        self.partition = partition
+        self.first_action = first_action
+        n_cells, n_actions = levels.shape
+        self._pheromone = Pheromone(n_cells, n_actions, 1.0, exponent)
+        self._pheromone.set_levels(levels)
+        self._rng = np.random.default_rng(seed)
+
+    @property
+    def n_actions(self) -> int:
+        """See `PartitionPolicy.n_actions`."""
+        return int(self._pheromone.levels.shape[1])
+
+    def _act(
+        self,
+        index: CellArray,
+        degree: FloatArray,
+        deterministic: bool,
+        allowed: BoolArray | None,
+    ) -> IntArray:
+        return choose_actions(
+            "boltzmann", self._pheromone, index, degree, 0.0, self._rng, allowed
+        )
+
+
+@njit(cache=True)
+def _best_actions(table: FloatArray, ranks: RankArray) -> IntArray:
+    best = np.zeros(table.shape[0], dtype=np.int64)
+    for cell in range(table.shape[0]):
+        for u in range(1, table.shape[1]):
+            lead = table[cell, u] - table[cell, best[cell]]
+            if lead > 0.0 or (lead == 0.0 and ranks[cell, u] < ranks[cell, best[cell]]):
+                best[cell] = u
+    return best

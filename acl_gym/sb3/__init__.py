@@ -1,0 +1,1 @@
+"""Stable-Baselines3: its interface for our environments, and its DQN."""

@@ -1,0 +1,32 @@
+"""The kinds of arrays and rows that signatures speak of, each defined once."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+"""Real numbers: states, degrees, levels, costs."""
+
+IntArray = NDArray[np.int64]
+"""Whole numbers: slots, counts, indices of actions."""
+
+BoolArray = NDArray[np.bool_]
+"""Flags and masks."""
+
+CellArray = NDArray[np.int32]
+"""Indices of a partition's cells."""
+
+ActionArray = NDArray[np.integer[Any]]
+"""Indices of actions in the smallest integers that hold them."""
+
+RankArray = NDArray[np.int32]
+"""An order of the actions for each cell, by which ties are broken."""
+
+Float32Array = NDArray[np.float32]
+"""Features for a neural network."""
+
+Row = dict[str, float]
+"""The measures of one trial, see `TabularAgent.history`."""

@@ -1,0 +1,559 @@
+"""The adapter: what Stable-Baselines3 expects of a `VecEnv`, checked piece by piece."""
+
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from gymnasium import spaces
+from gymnasium.vector import AutoresetMode, SyncVectorEnv, VectorEnv
+from gymnasium.vector.utils import batch_space
+from gymnasium.wrappers.vector import RecordEpisodeStatistics
+from stable_baselines3 import DQN, PPO
+from stable_baselines3.common.evaluation import evaluate_policy
+from stable_baselines3.common.monitor import Monitor
+from stable_baselines3.common.vec_env import DummyVecEnv, VecEnv, VecMonitor
+
+import acl_gym
+from acl_gym.sb3.adapter import VectorEnvAdapter
+
+PENDULUM = "acl_gym/Pendulum-v0"
+MODES = ("Disabled", "SameStep")
+# Too fast for the goal region; without torque it has slowed enough one step later.
+COASTING = [np.pi + 0.03, -0.166]
+
+
+class Countdown(gym.Env[Any, Any]):
+    """Ends by itself after `length` steps; everything it says can be foretold."""
+
+    metadata: dict[str, Any] = {"render_modes": ["rgb_array"]}  # noqa: RUF012
+
+    def __init__(
+        self,
+        length: int = 3,
+        space: spaces.Space[Any] | None = None,
+        render_mode: str | None = "rgb_array",
+    ) -> None:
+        self.length = length
+        self.render_mode = render_mode
+        self.observation_space = space or spaces.Box(0, 100, (2,), np.float32)
+        self.action_space: spaces.Space[Any] = spaces.Discrete(2)
+        self.given: dict[str, Any] = {}
+
+    def _look(self) -> Any:
+        now = np.array([self.t, self.t], dtype=np.float32)
+        if isinstance(self.observation_space, spaces.Dict):
+            return {"place": now, "flag": self.t % 2}
+        return now
+
+    def reset(self, *, seed: Any = None, options: Any = None) -> tuple[Any, Any]:
+        super().reset(seed=seed)
+        self.t = 0
+        self.given = {"seed": seed, "options": dict(options or {})}
+        return self._look(), {"begun": self.np_random.integers(2**31)}
+
+    def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
+        self.t += 1
+        info = {"t": self.t} if self.t % 2 else {}
+        return self._look(), -0.1 * self.t, self.t == self.length, False, info
+
+    def double(self, number: int) -> int:
+        return 2 * number * self.length
+
+    def render(self) -> Any:
+        return np.full((4, 6, 3), self.length, dtype=np.uint8)
+
+
+DICT_SPACE = spaces.Dict(
+    {"place": spaces.Box(0, 100, (2,), np.float32), "flag": spaces.Discrete(2)}
+)
+
+
+def countdowns(
+    *lengths: int,
+    mode: str = "Disabled",
+    space: spaces.Space[Any] | None = None,
+    **kwargs: Any,
+) -> SyncVectorEnv:
+    makers: list[Callable[[], gym.Env[Any, Any]]] = [
+        lambda length=length: Countdown(length, space)  # type: ignore[misc]
+        for length in lengths
+    ]
+    return SyncVectorEnv(makers, autoreset_mode=AutoresetMode(mode), **kwargs)
+
+
+def pendulums(num_envs: int, mode: str = "Disabled", **kwargs: Any) -> VectorEnv:
+    return gym.make_vec(PENDULUM, num_envs=num_envs, autoreset_mode=mode, **kwargs)
+
+
+def step(env: VecEnv, action: int = 0) -> Any:
+    return env.step(np.full(env.num_envs, action))
+
+
+# --- what goes in ---------------------------------------------------------------
+
+
+def test_next_step_is_refused_with_a_remedy() -> None:
+    with pytest.raises(ValueError, match=r"NEXT_STEP.*autoreset_mode=.Disabled"):
+        VectorEnvAdapter(pendulums(2, "NextStep"))
+
+
+def test_a_mode_that_is_not_stated_counts_as_next_step() -> None:
+    env = pendulums(2)
+    env.metadata = {}
+    with pytest.raises(ValueError, match="NEXT_STEP"):
+        VectorEnvAdapter(env)
+
+
+@pytest.mark.parametrize("make", [lambda: gym.make(PENDULUM), lambda: None, lambda: 3])
+def test_only_vector_environments(make: Callable[[], Any]) -> None:
+    with pytest.raises(TypeError, match=r"gymnasium\.vector\.VectorEnv"):
+        VectorEnvAdapter(make())
+
+
+def _with_spaces(observation: spaces.Space[Any], action: spaces.Space[Any]) -> Any:
+    env = pendulums(2)
+    env.single_observation_space = observation
+    env.single_action_space = action
+    env.observation_space = batch_space(observation, 2)
+    env.action_space = batch_space(action, 2)
+    return env
+
+
+@pytest.mark.parametrize(
+    ("observation", "action", "message"),
+    [
+        (DICT_SPACE, spaces.Discrete(3, start=1), "actions must count from 0"),
+        (
+            spaces.Discrete(3, start=-1),
+            spaces.Discrete(3),
+            "observations must count from 0",
+        ),
+        (
+            spaces.Box(0, 1, (2,)),
+            spaces.MultiDiscrete([2, 2], start=[0, 1]),
+            "actions must count from 0",
+        ),
+        (spaces.Tuple([spaces.Discrete(2)]), spaces.Discrete(2), "FlattenObservation"),
+        (
+            spaces.Dict({"a": spaces.Dict({"b": spaces.Discrete(2)})}),
+            spaces.Discrete(2),
+            "FlattenObservation",
+        ),
+    ],
+)
+def test_spaces_that_sb3_would_misread_are_refused(
+    observation: spaces.Space[Any], action: spaces.Space[Any], message: str
+) -> None:
+    with pytest.raises(ValueError, match=message):
+        VectorEnvAdapter(_with_spaces(observation, action))
+
+
+def test_spaces_are_those_of_one_slot() -> None:
+    env = pendulums(3)
+    adapter = VectorEnvAdapter(env)
+    assert adapter.num_envs == 3
+    assert adapter.observation_space == env.single_observation_space
+    assert adapter.action_space == spaces.Discrete(3)
+    assert adapter.spec is env.spec
+    assert adapter.env is env
+
+
+# --- what comes out --------------------------------------------------------------
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_types_and_shapes(mode: str) -> None:
+    env = VectorEnvAdapter(pendulums(4, mode, max_episode_steps=3))
+    env.seed(1)
+    observations = env.reset()
+    assert isinstance(observations, np.ndarray)
+    assert observations.shape == (4, 2)
+    assert observations.dtype == env.observation_space.dtype
+    for _ in range(7):
+        observations, rewards, dones, infos = step(env)
+        assert observations.shape == (4, 2)
+        assert all(env.observation_space.contains(row) for row in observations)
+        assert rewards.shape == (4,)
+        assert rewards.dtype == np.float32
+        assert dones.shape == (4,)
+        assert dones.dtype == np.bool_
+        assert isinstance(infos, list)
+        assert [type(info) for info in infos] == [dict] * 4
+        for info, done in zip(infos, dones, strict=True):
+            assert isinstance(info["TimeLimit.truncated"], bool)
+            assert ("terminal_observation" in info) == done
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_a_crafted_truncation(mode: str) -> None:
+    env = VectorEnvAdapter(pendulums(2, mode, max_episode_steps=2))
+    twin = gym.make(PENDULUM)
+    env.set_options({"state": np.array([[1.0, 0.5], [2.0, -0.5]])})
+    env.reset()
+    _, _, dones, infos = step(env, 2)
+    assert not dones.any()
+    assert not any(info["TimeLimit.truncated"] for info in infos)
+    observations, _, dones, infos = step(env, 2)
+    assert dones.all()
+    for slot, state in enumerate(([1.0, 0.5], [2.0, -0.5])):
+        twin.reset(options={"state": state})
+        twin.step(2)
+        last, *_ = twin.step(2)
+        assert infos[slot]["TimeLimit.truncated"] is True
+        np.testing.assert_allclose(infos[slot]["terminal_observation"], last)
+        assert not np.allclose(observations[slot], last)  # already the next episode
+
+
+@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("limit", [None, 1], ids=["no limit", "at the limit as well"])
+def test_a_crafted_termination(mode: str, limit: int | None) -> None:
+    env = VectorEnvAdapter(pendulums(2, mode, max_episode_steps=limit))
+    # Slot 0 coasts into the goal region, slot 1 hangs at rest.
+    env.set_options({"state": np.array([COASTING, [0.0, 0.0]])})
+    env.reset()
+    observations, rewards, dones, infos = step(env, 1)
+    assert dones.tolist() == [True, limit == 1]
+    # Terminated wins where an episode also ran out of time.
+    assert infos[0]["TimeLimit.truncated"] is False
+    assert infos[1]["TimeLimit.truncated"] is (limit == 1)
+    theta, omega = infos[0]["terminal_observation"]
+    assert abs(theta - np.pi) <= 0.1
+    assert abs(omega) <= 0.1
+    assert not np.allclose(observations[0], infos[0]["terminal_observation"])
+    cost = (theta - np.pi) ** 2 + 0.1 * omega**2
+    np.testing.assert_allclose(rewards, [-cost, -(np.pi**2)], rtol=1e-6)
+    if limit is None:  # the other slot was left alone
+        np.testing.assert_allclose(observations[1], [0.0, 0.0], atol=1e-12)
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_slots_that_go_on_are_not_disturbed(mode: str) -> None:
+    states = np.array([COASTING, [1.0, 0.5]])
+    env = VectorEnvAdapter(pendulums(2, mode))
+    twin = gym.make(PENDULUM)
+    env.set_options({"state": states})
+    env.reset()
+    twin.reset(options={"state": states[1]})
+    for _ in range(10):
+        observations, rewards, _, _ = step(env, 1)
+        expected, reward, *_ = twin.step(1)
+        np.testing.assert_allclose(observations[1], expected)
+        assert rewards[1] == np.float32(reward)
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_infos_are_taken_apart(mode: str) -> None:
+    env = VectorEnvAdapter(countdowns(2, 3, mode=mode))
+    env.seed(5)
+    env.reset()
+    begun = [info["begun"] for info in env.reset_infos]
+    assert begun == [np.random.default_rng(5 + i).integers(2**31) for i in range(2)]
+    *_, infos = step(env)
+    assert infos == [{"t": 1, "TimeLimit.truncated": False}] * 2
+    *_, dones, infos = step(env)
+    assert dones.tolist() == [True, False]
+    assert infos[1] == {"TimeLimit.truncated": False}
+    assert infos[0]["terminal_observation"].tolist() == [2, 2]
+    assert env.reset_infos[0]["begun"] != begun[0]
+    assert env.reset_infos[1]["begun"] == begun[1]
+    observations, *_, infos = step(env)
+    assert observations.tolist() == [[1, 1], [0, 0]]
+    assert infos[1]["t"] == 3
+    assert infos[1]["terminal_observation"].tolist() == [3, 3]
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_the_same_as_sb3s_own_vector_environment(mode: str) -> None:
+    """Step for step what `DummyVecEnv` gives for the same single environments."""
+    ours = VectorEnvAdapter(countdowns(2, 3, 5, mode=mode))
+    theirs = DummyVecEnv([lambda n=n: Countdown(n) for n in (2, 3, 5)])  # type: ignore[misc]
+    for env in (ours, theirs):
+        env.seed(11)
+    np.testing.assert_array_equal(ours.reset(), theirs.reset())
+    for _ in range(12):
+        assert ours.reset_infos == theirs.reset_infos
+        for mine, other in zip(step(ours)[:3], step(theirs)[:3], strict=True):
+            np.testing.assert_array_equal(mine, other)
+            assert mine.dtype == other.dtype
+    for _ in range(12):
+        for mine, other in zip(step(ours)[3], step(theirs)[3], strict=True):
+            last = mine.pop("terminal_observation", None)
+            np.testing.assert_array_equal(last, other.pop("terminal_observation", None))
+            begun = mine.pop("begun", None)  # SAME_STEP mixes the reset's info in
+            assert begun is None or mode == "SameStep"
+            assert mine == other
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_observations_may_be_a_dict(mode: str) -> None:
+    env = VectorEnvAdapter(countdowns(2, 3, mode=mode, space=DICT_SPACE))
+    observations = env.reset()
+    assert observations["place"].shape == (2, 2)
+    step(env)
+    observations, _, dones, infos = step(env)
+    assert dones.tolist() == [True, False]
+    assert observations["place"].tolist() == [[0, 0], [2, 2]]
+    assert observations["flag"].tolist() == [0, 0]
+    assert infos[0]["terminal_observation"]["place"].tolist() == [2, 2]
+    assert DICT_SPACE.contains(
+        {**infos[0]["terminal_observation"], "flag": np.int64(0)}
+    )
+
+
+@pytest.mark.parametrize("copy", [True, False])
+@pytest.mark.parametrize("mode", MODES)
+def test_nothing_handed_out_is_used_again(mode: str, copy: bool) -> None:
+    env = VectorEnvAdapter(countdowns(2, 3, mode=mode, copy=copy))
+    results = [(env.reset(),)]
+    for _ in range(8):
+        observations, rewards, dones, infos = step(env)
+        last = [info.get("terminal_observation", np.empty(0)) for info in infos]
+        results.append((observations, rewards, dones, *last))
+    arrays = [array for result in results for array in result]
+    for i, one in enumerate(arrays):
+        assert not any(np.shares_memory(one, other) for other in arrays[:i])
+    # The countdown shows that no array was overwritten later.
+    assert [r[0][1, 0] for r in results] == [0, 1, 2, 0, 1, 2, 0, 1, 2]
+
+
+def test_actions_are_copied() -> None:
+    env = VectorEnvAdapter(pendulums(2))
+    env.set_options({"state": np.zeros((2, 2))})
+    env.reset()
+    actions = np.array([0, 2])
+    env.step_async(actions)
+    actions[:] = 1
+    observations, *_ = env.step_wait()
+    assert observations[0, 1] < 0 < observations[1, 1]
+
+
+def test_step_wait_needs_actions() -> None:
+    env = VectorEnvAdapter(pendulums(2))
+    env.reset()
+    with pytest.raises(RuntimeError, match="step_async"):
+        env.step_wait()
+    step(env)
+    with pytest.raises(RuntimeError, match="step_async"):
+        env.step_wait()
+
+
+# --- seeds and options -----------------------------------------------------------
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_a_seed_gives_one_run(mode: str) -> None:
+    def run(seed: int) -> np.ndarray:
+        env = VectorEnvAdapter(pendulums(3, mode, max_episode_steps=4))
+        assert env.seed(seed) == [seed, seed + 1, seed + 2]
+        rows = [env.reset()] + [step(env, 2)[0] for _ in range(9)]
+        return np.array(rows)
+
+    np.testing.assert_array_equal(run(3), run(3))
+    assert not np.array_equal(run(3)[0], run(4)[0])
+
+
+def test_seed_and_options_are_used_once() -> None:
+    env = VectorEnvAdapter(countdowns(2, 3))
+    env.seed(7)
+    env.set_options({"colour": "red"})
+    env.reset()
+    given = env.get_attr("given")
+    assert [g["seed"] for g in given] == [7, 8]
+    assert [g["options"] for g in given] == [{"colour": "red"}] * 2
+    env.reset()
+    assert env.get_attr("given") == [{"seed": None, "options": {}}] * 2
+
+
+def test_options_for_single_slots_are_refused() -> None:
+    env = VectorEnvAdapter(pendulums(2))
+    with pytest.raises(TypeError, match="one dict for all slots"):
+        env.set_options([{}, {}])
+
+
+# --- attributes, methods, wrappers, frames -----------------------------------------
+
+
+def test_attributes_of_a_native_vector_environment() -> None:
+    env = VectorEnvAdapter(
+        acl_gym.ScaledVectorObservation(pendulums(3, max_episode_steps=9), [0])
+    )
+    assert env.get_attr("max_episode_steps") == [9, 9, 9]
+    assert env.get_attr("max_episode_steps", indices=1) == [9]
+    assert env.get_attr("scaling", [0, 2])[1].circular == (0,)
+    assert env.get_attr("observation_space") == [env.observation_space] * 3
+    assert env.get_attr("action_space", 0) == [spaces.Discrete(3)]
+    assert not env.has_attr("no_such_attribute")
+    env.set_attr("max_episode_steps", 5)
+    assert env.env.unwrapped.max_episode_steps == 5
+    with pytest.raises(ValueError, match="all 3 slots together"):
+        env.set_attr("max_episode_steps", 7, indices=[0])
+    with pytest.raises(AttributeError, match="no_such_attribute"):
+        env.set_attr("no_such_attribute", 1)
+
+
+def test_methods_of_a_native_vector_environment() -> None:
+    env = VectorEnvAdapter(pendulums(3))
+    others = env.env_method("with_slots", 7)
+    assert len(others) == 3
+    assert others[0] is others[2]
+    assert others[0].num_envs == 7
+    with pytest.raises(ValueError, match="all 3 slots together"):
+        env.env_method("with_slots", 7, indices=1)
+    with pytest.raises(AttributeError, match="no_such_method"):
+        env.env_method("no_such_method")
+
+
+def test_attributes_and_methods_of_single_environments() -> None:
+    env = VectorEnvAdapter(countdowns(2, 3, 5))
+    assert env.get_attr("length") == [2, 3, 5]
+    assert env.get_attr("length", [2, 0]) == [5, 2]
+    env.set_attr("length", 4, indices=1)
+    assert env.get_attr("length") == [2, 4, 5]
+    assert env.env_method("double", 10) == [40, 80, 100]
+    assert env.env_method("double", number=1, indices=[2]) == [10]
+
+
+def test_wrappers_are_found() -> None:
+    native = VectorEnvAdapter(RecordEpisodeStatistics(pendulums(2)))
+    assert native.env_is_wrapped(RecordEpisodeStatistics) == [True, True]  # type: ignore[arg-type]
+    assert native.env_is_wrapped(Monitor) == [False, False]
+    monitored = SyncVectorEnv(
+        [lambda: Monitor(Countdown()), Countdown],
+        autoreset_mode=AutoresetMode.DISABLED,
+    )
+    assert VectorEnvAdapter(monitored).env_is_wrapped(Monitor) == [True, False]
+
+
+def test_frames() -> None:
+    env = VectorEnvAdapter(countdowns(2, 3, 5, 7))
+    assert env.render_mode == "rgb_array"
+    assert env.metadata == {"render_modes": ["human", "rgb_array"]}
+    env.reset()
+    assert [frame[0, 0, 0] for frame in env.get_images()] == [2, 3, 5, 7]
+    assert env.render().shape == (8, 12, 3)
+    without = VectorEnvAdapter(
+        SyncVectorEnv([lambda: Countdown(render_mode=None)], autoreset_mode="Disabled")
+    )
+    assert without.render_mode is None
+
+
+def test_close_twice() -> None:
+    env = VectorEnvAdapter(pendulums(2))
+    env.close()
+    env.close()
+    assert env.env.closed
+
+
+# --- monitors and statistics ---------------------------------------------------------
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_monitor_agrees_with_returns_by_hand(mode: str) -> None:
+    env = VecMonitor(VectorEnvAdapter(pendulums(5, mode, max_episode_steps=7)))
+    env.seed(0)
+    env.reset()
+    returns, lengths, finished = np.zeros(5), np.zeros(5, dtype=int), 0
+    rng = np.random.default_rng(1)
+    for _ in range(30):
+        _, rewards, dones, infos = env.step(rng.integers(3, size=5))
+        returns += rewards
+        lengths += 1
+        for slot in np.flatnonzero(dones):
+            episode = infos[slot]["episode"]
+            assert episode["r"] == pytest.approx(returns[slot], rel=1e-6)
+            assert episode["l"] == lengths[slot]
+            returns[slot] = lengths[slot] = 0
+            finished += 1
+        assert all(("episode" in infos[i]) == dones[i] for i in range(5))
+    assert finished == env.episode_count >= 20
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_gymnasiums_statistics_come_through(mode: str) -> None:
+    env = VectorEnvAdapter(
+        RecordEpisodeStatistics(pendulums(3, mode, max_episode_steps=4))
+    )
+    env.seed(0)
+    env.reset()
+    total = np.zeros(3)
+    for _ in range(4):
+        _, rewards, dones, infos = step(env)
+        total += rewards
+    assert dones.all()
+    for slot, info in enumerate(infos):
+        assert info["episode"]["r"] == pytest.approx(total[slot])
+        assert info["episode"]["l"] == 4
+
+
+# --- the agents of Stable-Baselines3 -------------------------------------------------
+
+
+class Push:
+    """Always the same action: what `evaluate_policy` asks of a model, and no more."""
+
+    def predict(
+        self,
+        observation: np.ndarray,
+        state: Any = None,
+        episode_start: Any = None,
+        deterministic: bool = False,
+    ) -> tuple[np.ndarray, Any]:
+        return np.full(len(observation), 2), state
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_evaluate_policy(mode: str) -> None:
+    env = VectorEnvAdapter(pendulums(4, mode, max_episode_steps=10))
+    monitored = VecMonitor(env)
+    monitored.seed(2)
+    rewards, lengths = evaluate_policy(
+        Push(), monitored, n_eval_episodes=8, return_episode_rewards=True
+    )
+    assert lengths == [10] * 8
+    monitored.seed(2)
+    env.reset()
+    by_hand = np.zeros(4)
+    for _ in range(10):
+        by_hand += step(env, 2)[1]
+    np.testing.assert_allclose(rewards[:4], by_hand, rtol=1e-6)
+
+
+def test_our_agents_under_evaluate_policy() -> None:
+    env = pendulums(4, max_episode_steps=15)
+    partition = acl_gym.Crisp.from_box(env.single_observation_space, (6, 5), [0])
+    agent = acl_gym.ACL(env, partition, max_steps=15, seed=0).learn(trials=1)
+    mean, _ = evaluate_policy(agent, VecMonitor(VectorEnvAdapter(env)), 6)
+    assert mean < 0
+
+
+@pytest.fixture(params=MODES)
+def training_env(request: pytest.FixtureRequest) -> Iterator[VecEnv]:
+    env = VecMonitor(VectorEnvAdapter(pendulums(4, request.param, max_episode_steps=9)))
+    yield env
+    env.close()
+
+
+def test_dqn_learns_from_the_right_transitions(training_env: VecEnv) -> None:
+    model = DQN("MlpPolicy", training_env, learning_starts=40, seed=0, device="cpu")
+    model.learn(400)
+    assert model.num_timesteps == 400
+    assert len(model.ep_info_buffer) == 4 * (400 // 4 // 9)
+    buffer = model.replay_buffer
+    assert buffer.timeouts[8].tolist() == [1.0] * 4
+    assert buffer.dones[8].tolist() == [1.0] * 4
+    # Within an episode a next observation is the following one; across a reset not.
+    np.testing.assert_array_equal(
+        buffer.next_observations[:8], buffer.observations[1:9]
+    )
+    assert (buffer.next_observations[8] != buffer.observations[9]).all()
+
+
+def test_ppo_learns(training_env: VecEnv) -> None:
+    model = PPO(
+        "MlpPolicy", training_env, n_steps=16, batch_size=32, seed=0, device="cpu"
+    )
+    model.learn(128)
+    assert model.num_timesteps == 128
+    assert len(model.ep_info_buffer) > 0

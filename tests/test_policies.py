@@ -1,0 +1,113 @@
+"""Policies over tables: greedy and soft."""
+
+from __future__ import annotations
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+from acl_gym import ACL, Fuzzy, PolicyEvaluation
+from acl_gym.policies import SoftPolicy, TablePolicy, random_ranks
+
+GRID = Fuzzy([[0.0, 1.0, 2.0]])
+
+
+def test_table_policy_follows_the_weighted_table() -> None:
+    table = np.array([[3.0, 1.0], [0.0, 2.0], [0.0, 1.0]])
+    policy = TablePolicy(GRID, table, first_action=4)
+    # Between 0 and 1 the actions tie at 3 (1 - x) = 1 - x + 2 x, that is x = 1/2.
+    actions, state = policy.predict([[0.49], [0.51], [2.0]], state="kept")
+    assert actions.tolist() == [4, 5, 5]
+    assert state == "kept"
+    assert policy.predict([0.0])[0] == 4
+    assert policy.best_actions().tolist() == [0, 1, 1]
+
+
+def test_a_copy_no_longer_follows_the_table() -> None:
+    policy = TablePolicy(GRID, np.eye(3, 2))
+    kept = policy.copy()
+    policy.table[:] = [[0.0, 1.0]] * 3
+    assert policy.predict([0.0])[0] == 1
+    assert kept.predict([0.0])[0] == 0
+
+
+def test_ranks_are_permutations_of_all_orders() -> None:
+    ranks = random_ranks(400, 3, np.random.default_rng(0))
+    assert (np.sort(ranks, axis=1) == np.arange(3)).all()
+    assert len(np.unique(ranks, axis=0)) == 6
+
+
+@pytest.mark.parametrize("exponent", [1.0, 2.0, 10.0, 2.5])
+def test_soft_policy_draws_from_the_distribution(exponent: float) -> None:
+    """(4.11) without epsilon, in the middle between two cells."""
+    levels = np.array([[1.0, 2.0, 4.0], [5.0, 4.0, 1.0], [1.0, 1.0, 1.0]])
+    policy = SoftPolicy(GRID, levels, exponent, seed=1)
+    n = 40_000
+    drawn = np.bincount(policy.predict(np.full((n, 1), 0.25))[0], minlength=3) / n
+    weights = levels**exponent
+    rows = weights / weights.sum(axis=1, keepdims=True)
+    expected = 0.75 * rows[0] + 0.25 * rows[1]
+    np.testing.assert_allclose(drawn, expected, atol=4 * 0.5 / np.sqrt(n))
+
+
+def test_soft_policy_is_seeded_and_keeps_its_own_levels() -> None:
+    levels = np.ones((3, 2))
+    states = np.linspace(0, 2, 50)[:, None]
+    first = SoftPolicy(GRID, levels, seed=3)
+    second = SoftPolicy(GRID, levels, seed=3)
+    levels[:] = [[1e9, 1.0]] * 3
+    drawn = first.predict(states)[0]
+    assert set(drawn.tolist()) == {0, 1}
+    np.testing.assert_array_equal(drawn, second.predict(states)[0])
+
+
+@pytest.mark.parametrize("exponent", [0.0, -1.0, float("nan"), float("inf")])
+def test_soft_policy_refuses_a_bad_exponent(exponent: float) -> None:
+    with pytest.raises(ValueError, match="exponent"):
+        SoftPolicy(GRID, np.ones((3, 2)), exponent)
+
+
+def test_soft_policy_refuses_a_bad_seed() -> None:
+    with pytest.raises(ValueError, match="seed must be at least 0, got -1"):
+        SoftPolicy(GRID, np.ones((3, 2)), seed=-1)
+    with pytest.raises(TypeError, match="seed must be an integer"):
+        SoftPolicy(GRID, np.ones((3, 2)), seed=0.5)  # type: ignore[arg-type]
+
+
+def test_colony_hands_out_a_soft_policy_and_learns_on_as_before() -> None:
+    env = gym.make_vec("acl_gym/Pendulum-v0", num_envs=20)
+    grid = Fuzzy.from_box(env.single_observation_space, (8, 9), circular=[0])
+    plain, watched = (ACL(env, grid, tau0=1e-6, seed=4) for _ in range(2))
+    evaluation = PolicyEvaluation(
+        env, every=2, max_steps=20, policy=lambda colony: colony.soft_policy(seed=0)
+    )
+    plain.learn(trials=4)
+    watched.learn(trials=4, callback=evaluation)
+    np.testing.assert_array_equal(plain.table, watched.table)
+    assert isinstance(evaluation.best_policy, SoftPolicy)
+    assert evaluation.best is not None
+    assert evaluation.best.cost == min(
+        row["policy_cost"] for row in watched.history if "policy_cost" in row
+    )
+
+
+def test_a_table_of_nothing_finite_still_gives_actions() -> None:
+    """No entry is larger than another, so any action will do, but it must be one."""
+    states = np.random.default_rng(0).uniform(0, 2, (2_000, 1))
+    for value in (-np.inf, np.inf, np.nan):
+        actions = TablePolicy(GRID, np.full((3, 4), value)).predict(states)[0]
+        assert set(actions.tolist()) <= {0, 1, 2, 3}
+
+
+@pytest.mark.parametrize(
+    ("table", "ranks"),
+    [
+        (np.ones((2, 3)), None),
+        (np.ones((3, 3), dtype=int), None),
+        (np.ones(3), None),
+        (np.ones((3, 2)), np.zeros((3, 3), dtype=np.int32)),
+    ],
+)
+def test_a_table_that_does_not_fit_is_refused(table, ranks) -> None:
+    with pytest.raises(ValueError, match=r"^(table|ranks) must"):
+        TablePolicy(GRID, table, ranks)

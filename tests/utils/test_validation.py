@@ -1,0 +1,94 @@
+"""The checks of arguments: what passes, what is refused, and how the message reads."""
+
+from decimal import Decimal
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+import pytest
+
+from acl_gym.utils import validation
+
+NAN, INF = float("nan"), float("inf")
+
+
+@pytest.mark.parametrize(
+    "value", [2, 2.0, -3.5, Fraction(1, 4), np.float32(0.5), np.int8(3), 0, -0.0]
+)
+def test_real_numbers_become_floats(value: Any) -> None:
+    result = validation.number("x", value)
+    assert type(result) is float
+    assert result == value
+
+
+@pytest.mark.parametrize(
+    "value", [True, np.True_, "1", None, 1j, [1.0], np.array([1.0]), Decimal(1)]
+)
+def test_other_types_are_no_numbers(value: Any) -> None:
+    with pytest.raises(TypeError, match=r"^rate must be a real number, got .* of type"):
+        validation.number("rate", value)
+
+
+@pytest.mark.parametrize(
+    "value",
+    [NAN, INF, -INF, np.float64(NAN), pytest.param(10**400, id="beyond all floats")],
+)
+def test_numbers_must_be_finite(value: Any) -> None:
+    with pytest.raises(ValueError, match=r"^rate must lie in \(-inf, inf\), got"):
+        validation.number("rate", value)
+
+
+@pytest.mark.parametrize(
+    ("bounds", "inside", "outside", "interval"),
+    [
+        ({"above": 0}, [1e-300, 5], [0, -0.0, -1], r"\(0, inf\)"),
+        ({"at_least": 0}, [0, -0.0, 5], [-1e-300, -1], r"\[0, inf\)"),
+        ({"below": 1}, [0.999, -5], [1, 2], r"\(-inf, 1\)"),
+        ({"at_most": 1}, [1, -5], [1.001, 2], r"\(-inf, 1\]"),
+        ({"above": 0, "at_most": 1}, [0.1, 1], [0, 1.1, -1], r"\(0, 1\]"),
+        ({"at_least": 0, "below": 1}, [0, 0.9], [1, -0.1], r"\[0, 1\)"),
+        ({"at_least": 0, "at_most": 1}, [0, 1], [-0.1, 1.1], r"\[0, 1\]"),
+        ({"above": 0, "below": 1}, [0.5], [0, 1], r"\(0, 1\)"),
+    ],
+    ids=str,
+)
+def test_bounds(
+    bounds: dict[str, float], inside: list[float], outside: list[float], interval: str
+) -> None:
+    for value in inside:
+        assert validation.number("rate", value, **bounds) == value
+    for value in [*outside, NAN, INF, -INF]:
+        with pytest.raises(ValueError, match=rf"^rate must lie in {interval}, got"):
+            validation.number("rate", value, **bounds)
+
+
+@pytest.mark.parametrize("value", [1, 7, np.int32(3), np.uint8(200), 10**30])
+def test_integers_become_ints(value: Any) -> None:
+    result = validation.integer("count", value, at_least=1)
+    assert type(result) is int
+    assert result == value
+
+
+@pytest.mark.parametrize(
+    "value", [True, np.False_, 1.0, NAN, "1", None, [1], np.array([1]), Fraction(2, 1)]
+)
+def test_other_types_are_no_integers(value: Any) -> None:
+    with pytest.raises(TypeError, match=r"^count must be an integer, got .* of type"):
+        validation.integer("count", value, at_least=1)
+
+
+@pytest.mark.parametrize("value", [0, -1, np.int64(-5)])
+def test_integers_must_not_be_too_small(value: Any) -> None:
+    message = rf"^count must be at least 1, got {value}\."
+    with pytest.raises(ValueError, match=message):
+        validation.integer("count", value, at_least=1)
+
+
+def test_one_of_the_choices_passes() -> None:
+    assert validation.one_of("mode", "fast", ("slow", "fast")) == "fast"
+
+
+@pytest.mark.parametrize("value", ["Fast", "", None, 1, ["fast"]])
+def test_anything_but_a_choice_is_refused(value: Any) -> None:
+    with pytest.raises(ValueError, match=r"^mode must be one of 'slow', 'fast', got"):
+        validation.one_of("mode", value, ("slow", "fast"))

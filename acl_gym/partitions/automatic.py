@@ -318,3 +318,16 @@ def _checked_bounds(
             )
         pairs[int(axis)] = (float(ends[0]), float(ends[1]))
     return pairs
+
+
+def thesis_partition(env: Env, cells: Any = None, *, kind: type[Grid] = Fuzzy) -> Partition:
+    """The partition of the thesis (provisional)."""
+    system = env.unwrapped.system
+    name = type(system).__name__
+    if cells is not None and not isinstance(cells, str) and np.ndim(cells[0]) == 1:
+        return kind(cells, circular=list(system.circular)) if system.circular else kind(cells)
+    if name == "Pendulum":
+        return named.pendulum(*(cells or (40, 41)), kind=kind, omega_max=system.omega_max)
+    if name == "Navigation":
+        return named.navigation(cells or "regular", kind=kind)
+    return Discrete(system.observation_space.n)

@@ -1,308 +1,276 @@
-"""The runner keeps every finished result and never makes one twice."""
+"""The runner keeps every finished run, makes none twice, and says what went wrong."""
 
 from __future__ import annotations
 
-import json
-import multiprocessing
 import os
 import signal
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
-import gymnasium as gym
+import numpy as np
 import pytest
 from filelock import FileLock
 
-from acl_gym import ACL, Fuzzy
-from acl_gym.experiments import runner
-from acl_gym.experiments.runner import (
-    FolderInUseError,
-    Task,
-    TaskFailedError,
-    run_tasks,
-)
+from acl_gym.experiments import methods, runner
+from acl_gym.experiments.executors import RunFailedError
+from acl_gym.experiments.runner import FolderInUseError, list_jobs, run_studies
+from acl_gym.experiments.store import Job, Store
+from acl_gym.experiments.study import Study
+from acl_gym.experiments.systems import grid_1d, pendulum
+
+SHORT = replace(grid_1d(), trials=2)
+OTHER = replace(grid_1d(alpha=2.0), trials=2)
+REFUSED = replace(grid_1d(alpha=-1.0), trials=2)
+ENDLESS = replace(pendulum("crisp", cells=(4, 5)), trials=10**6)
 
 
-def square(number: int, calls: str, report) -> dict:
-    """A task that leaves a mark each time it is run."""
-    with open(calls, "a") as file:
-        file.write(f"{number}\n")
-    report(0.5)
-    return {"square": number * number}
+def times_of(folder: Path) -> dict[str, int]:
+    return {path.name: path.stat().st_mtime_ns for path in folder.glob("*.parquet")}
 
 
-def levels(seed: int, report) -> dict:
-    """What a small colony has laid, to the last bit."""
-    env = gym.make_vec("acl_gym/Pendulum-v0", num_envs=30)
-    grid = Fuzzy.from_box(env.single_observation_space, (8, 9), circular=[0])
-    colony = ACL(env, grid, seed=seed, max_steps=60).learn(trials=4)
-    return {"levels": colony.pheromone.levels.tobytes().hex()}
-
-
-def refuse(report) -> dict:
-    raise ValueError("three is not a number")
-
-
-def die(report) -> dict:
-    os.kill(os.getpid(), signal.SIGKILL)
-    return {}
-
-
-def tasks(calls: Path, numbers=range(4), **settings: int) -> list[Task]:
-    return [
-        Task(f"square-{n}", square, (n, str(calls)), {"n": n, **settings})
-        for n in numbers
-    ]
-
-
-def calls_in(path: Path) -> list[str]:
-    return sorted(path.read_text().split()) if path.exists() else []
-
-
-def test_results_come_in_order_and_are_made_once(tmp_path: Path) -> None:
-    calls, told = tmp_path / "calls", []
-    for _ in range(2):
-        results = run_tasks(
-            tasks(calls),
-            tmp_path / "runs",
-            workers=2,
-            progress=lambda name, fraction: told.append((name, fraction)),
-        )
-        assert [result["square"] for result in results] == [0, 1, 4, 9]
-    assert calls_in(calls) == ["0", "1", "2", "3"]
-    assert told.count(("square-2", 1.0)) == 2
-    assert not list((tmp_path / "runs").glob(".*")), "no temporary file may stay"
+def test_runs_come_by_study_and_seed_and_are_made_once(tmp_path: Path) -> None:
+    first = run_studies([SHORT, OTHER, SHORT], range(3), tmp_path, workers=2)
+    before = times_of(tmp_path)
+    again = run_studies([SHORT, OTHER], range(3), tmp_path, workers=2)
+    assert len(before) == 6
+    assert times_of(tmp_path) == before
+    for study in (SHORT, OTHER):
+        assert [run.seed for run in first.runs(study)] == [0, 1, 2]
+        assert (first.values(study) == again.values(study)).all()
+    assert not list(tmp_path.glob(".*")), "no temporary file may stay"
 
 
 def test_seeds_in_processes_give_the_bits_of_seeds_in_series(tmp_path: Path) -> None:
-    seeds = range(4)
-    made = run_tasks(
-        [Task(f"seed-{n}", levels, (n,), {"seed": n}) for n in seeds],
-        tmp_path / "runs",
-        workers=2,
-    )
-    in_series = [levels(n, lambda fraction: None)["levels"] for n in seeds]
-    assert [result["levels"] for result in made] == in_series
-    assert len(set(in_series)) == len(in_series), "seeds differ"
+    study = replace(pendulum("fuzzy", 30, (8, 9), max_steps=60), trials=3)
+    made = run_studies([study], range(4), tmp_path, workers=2).runs(study)
+    tables = [methods.run(study, seed).table.tobytes() for seed in range(4)]
+    assert [run.table.tobytes() for run in made] == tables
+    assert len(set(tables)) == len(tables), "seeds differ"
+
+
+def test_of_equal_studies_the_most_demanding_counts() -> None:
+    few = replace(SHORT, most_runs=2)
+    assert len(list_jobs([few], range(5))) == 2
+    assert len(list_jobs([few, replace(SHORT, most_runs=3)], range(5))) == 3
+    assert len(list_jobs([few, SHORT], range(5))) == 5
+    assert few.key == SHORT.key
 
 
 def test_other_settings_or_other_code_run_again(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    calls = tmp_path / "calls"
-    run_tasks(tasks(calls, [1]), tmp_path / "runs", workers=1)
-    run_tasks(tasks(calls, [1], trials=7), tmp_path / "runs", workers=1)
-    assert calls_in(calls) == ["1", "1"]
-    monkeypatch.setattr(runner, "code_fingerprint", lambda module: "other code")
-    run_tasks(tasks(calls, [1], trials=7), tmp_path / "runs", workers=1)
-    assert calls_in(calls) == ["1", "1", "1"]
+    run_studies([SHORT], [0], tmp_path, workers=1)
+    run_studies([OTHER], [0], tmp_path, workers=1)
+    before = times_of(tmp_path)
+    assert len(before) == 2
+    monkeypatch.setattr("acl_gym.experiments.store.code_of_runs", lambda: "other code")
+    assert not Store(tmp_path).has(Job(SHORT, 0))
+    monkeypatch.undo()
+    monkeypatch.setattr("acl_gym.experiments.store.versions", lambda: {"torch": "0"})
+    assert not Store(tmp_path).has(Job(SHORT, 0))
 
 
-def test_other_versions_run_again(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+def test_a_damaged_run_is_made_again_with_a_word(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
-    calls = tmp_path / "calls"
-    run_tasks(tasks(calls, [1]), tmp_path / "runs", workers=1)
-    others = {**runner.versions(), "torch": "0.1"}
-    monkeypatch.setattr(runner, "versions", lambda: others)
-    run_tasks(tasks(calls, [1]), tmp_path / "runs", workers=1)
-    assert calls_in(calls) == ["1", "1"]
+    first = run_studies([SHORT], [0, 1], tmp_path, workers=1)
+    assert not caplog.messages
+    path = Store(tmp_path).path(Job(SHORT, 1))
+    path.write_bytes(path.read_bytes()[:-50])
+    again = run_studies([SHORT], [0, 1], tmp_path, workers=1)
+    assert "1 of 2 runs" in caplog.text
+    assert "are made again" in caplog.text
+    assert (first.values(SHORT) == again.values(SHORT)).all()
 
 
-def test_a_kept_result_says_where_it_was_made(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    calls = tmp_path / "calls"
-    (first,) = run_tasks(tasks(calls, [1]), tmp_path / "runs", workers=1)
-    assert first["made"]["processes"] == 1
-    assert first["made"]["numba"] == runner.versions()["numba"]
-    monkeypatch.setattr(runner, "circumstances", lambda workers: {"cpu": "another"})
-    kept, new = run_tasks(tasks(calls, [1, 2]), tmp_path / "runs", workers=2)
-    assert kept["made"] == first["made"]
-    assert new["made"] == {"cpu": "another"}
+def test_a_failure_is_one_clear_error_and_loses_nothing(tmp_path: Path) -> None:
+    run_studies([SHORT], [0, 1], tmp_path, workers=1)
+    before = times_of(tmp_path)
+    with pytest.raises(RunFailedError, match="failed: alpha must lie in"):
+        run_studies([SHORT, REFUSED], [0, 1], tmp_path, workers=1)
+    assert times_of(tmp_path) == before
 
 
-@pytest.mark.parametrize("damage", [b"", b"{", b"[]", b"\xff\xfe", b'{"key": 1}'])
-def test_a_damaged_result_is_made_again(tmp_path: Path, damage: bytes) -> None:
-    calls, runs = tmp_path / "calls", tmp_path / "runs"
-    run_tasks(tasks(calls, [3]), runs, workers=1)
-    (runs / "square-3.json").write_bytes(damage)
-    (result,) = run_tasks(tasks(calls, [3]), runs, workers=1)
-    assert result["square"] == 9
-    assert calls_in(calls) == ["3", "3"]
+def test_two_runners_do_not_share_a_folder(tmp_path: Path) -> None:
+    with FileLock(tmp_path / "running.lock"):
+        with pytest.raises(FolderInUseError, match="another run works on"):
+            run_studies([SHORT], [0], tmp_path, workers=1)
+        assert not times_of(tmp_path)
+    run_studies([SHORT], [0], tmp_path, workers=1)
+    assert len(times_of(tmp_path)) == 1
 
 
-@pytest.mark.parametrize(
-    ("function", "message"),
-    [(refuse, "bad failed: three is not a number"), (die, "a worker process died")],
-)
-def test_a_failure_is_one_clear_error_and_loses_nothing(
-    tmp_path: Path, function, message: str
-) -> None:
-    calls, runs = tmp_path / "calls", tmp_path / "runs"
-    run_tasks(tasks(calls, [1, 2]), runs, workers=1)
-    with pytest.raises(TaskFailedError, match=message):
-        run_tasks(
-            [*tasks(calls, [1, 2]), Task("bad", function, (), {})], runs, workers=1
-        )
-    run_tasks(tasks(calls, [1, 2]), runs, workers=1)
-    assert calls_in(calls) == ["1", "2"]
-
-
-def test_a_worker_may_die_while_results_are_kept(tmp_path: Path) -> None:
-    """The pool then refuses the next task; what had finished before is kept all the same."""
-    calls, runs = tmp_path / "calls", tmp_path / "runs"
-    works = tasks(calls, [1, 2, 3, 4, 5])
-    works.insert(3, Task("bad", die, (), {}))
-
-    def keep_slowly(name: str, fraction: float) -> None:
-        while fraction == 1.0 and multiprocessing.active_children():
-            time.sleep(0.01)
-
-    with pytest.raises(TaskFailedError, match="a worker process died while"):
-        run_tasks(works, runs, workers=1, progress=keep_slowly)
-    assert {path.stem for path in runs.glob("*.json")} == {
-        "square-1",
-        "square-2",
-        "square-3",
-    }
-    assert calls_in(calls) == ["1", "2", "3"]
-
-
-KILLED = """
-import os
-import signal
-import time
+SCRIPT = """
+import signal, sys
 from pathlib import Path
-from acl_gym.experiments.runner import Task, run_tasks
-from tests.experiments.test_runner import square, tasks
-
-def slow(report):
-    (Path({folder!r}) / "worker").write_text(str(os.getpid()))
-    time.sleep(600)
+from acl_gym.experiments.executors import RunFailedError
+from acl_gym.experiments.runner import run_studies
+from tests.experiments.test_runner import ENDLESS, OTHER, SHORT
 
 if __name__ == "__main__":
     # A shell that runs this in the background has it ignore Ctrl-C.
     signal.signal(signal.SIGINT, signal.default_int_handler)
-    folder = Path({folder!r})
-    run_tasks(
-        [*tasks(folder / "calls"), Task("slow", slow, (), {{}})],
-        folder / "runs",
-        workers=1,
-    )
+    try:
+        run_studies([SHORT, OTHER, ENDLESS], [0], Path(sys.argv[1]), workers=1)
+    except RunFailedError as error:
+        sys.exit(str(error))
 """
 
 
-def start_killed(folder: Path) -> subprocess.Popen[bytes]:
-    script = folder / "killed.py"
-    script.write_text(KILLED.format(folder=str(folder)))
-    root = Path(__file__).resolve().parents[2]
-    return subprocess.Popen(
-        [sys.executable, str(script)],
-        env={**os.environ, "PYTHONPATH": str(root)},
-        stderr=subprocess.DEVNULL,
+@pytest.fixture
+def running(tmp_path: Path) -> Iterator[subprocess.Popen[str]]:
+    """A runner that has kept two runs and is at a third, which never ends."""
+    script = tmp_path / "endless.py"
+    script.write_text(SCRIPT)
+    process = subprocess.Popen(
+        [sys.executable, str(script), str(tmp_path / "runs")],
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(["", *sys.path])},
+        stderr=subprocess.PIPE,
+        text=True,
         start_new_session=True,
     )
-
-
-def test_killed_at_any_moment_it_goes_on(tmp_path: Path) -> None:
-    process = start_killed(tmp_path)
-    runs = tmp_path / "runs"
     give_up = time.monotonic() + 120
-    while len(list(runs.glob("square-*.json"))) < 4 and time.monotonic() < give_up:
+    while len(times_of(tmp_path / "runs")) < 2 and time.monotonic() < give_up:
         time.sleep(0.05)
-    while not (tmp_path / "worker").exists() and time.monotonic() < give_up:
-        time.sleep(0.05)
-    # A second runner is refused while the first one lives, and loses nothing of it.
-    with pytest.raises(FolderInUseError, match="another run works on"):
-        run_tasks(tasks(tmp_path / "calls"), runs, workers=1)
+    assert len(times_of(tmp_path / "runs")) == 2, process.poll()
+    yield process
     process.kill()
-    process.wait()
-    (runs / ".square-1.json.77.tmp").write_text("{")
-    worker = int((tmp_path / "worker").read_text())
-    while _runs(worker) and time.monotonic() < give_up:
+    process.communicate()
+
+
+def workers_of(parent: int) -> list[int]:
+    found = []
+    for each in Path("/proc").glob("[0-9]*"):
+        try:
+            stat = (each / "stat").read_text().rsplit(")", 1)[1].split()
+            line = (each / "cmdline").read_bytes()
+        except (OSError, IndexError):
+            continue
+        if int(stat[1]) == parent and b"popen_loky" in line and stat[0] != "Z":
+            found.append(int(each.name))
+    return found
+
+
+def gone(pids: list[int], seconds: float = 30) -> bool:
+    give_up = time.monotonic() + seconds
+    while time.monotonic() < give_up:
+        if not any(Path(f"/proc/{pid}").exists() for pid in pids):
+            return True
         time.sleep(0.05)
-    assert not _runs(worker), "a worker must not outlive the runner"
-    for path in runs.glob("square-*.json"):
-        assert "result" in json.loads(path.read_text())
-    results = run_tasks(tasks(tmp_path / "calls"), runs, workers=1)
-    assert [result["square"] for result in results] == [0, 1, 4, 9]
-    assert calls_in(tmp_path / "calls") == ["0", "1", "2", "3"]
+    return False
+
+
+def test_killed_it_leaves_nothing_running_and_goes_on(
+    tmp_path: Path, running: subprocess.Popen[str]
+) -> None:
+    runs = tmp_path / "runs"
+    with pytest.raises(FolderInUseError, match="another run works on"):
+        run_studies([SHORT], [0], runs, workers=1)
+    workers = workers_of(running.pid)
+    assert workers
+    running.kill()
+    assert gone(workers), "a worker must not outlive the runner"
+    before = times_of(runs)
+    (runs / ".half.parquet.77.tmp").write_text("{")
+    found = run_studies([SHORT, OTHER], [0], runs, workers=1)
+    assert times_of(runs) == before
+    assert len(found.runs(OTHER)) == 1
     assert not list(runs.glob(".*")), "nothing half written may stay"
 
 
-def _runs(pid: int) -> bool:
+def test_a_worker_that_dies_is_reported_and_nothing_is_lost(
+    tmp_path: Path, running: subprocess.Popen[str]
+) -> None:
+    for worker in workers_of(running.pid):
+        os.kill(worker, signal.SIGKILL)
+    _, message = running.communicate(timeout=60)
+    assert running.returncode == 1
+    assert "a worker process died while" in message
+    assert "call again to go on" in message
+    assert len(times_of(tmp_path / "runs")) == 2
+
+
+def test_ctrl_c_stops_at_once_and_leaves_nothing_running(
+    running: subprocess.Popen[str],
+) -> None:
+    workers = workers_of(running.pid)
+    os.killpg(running.pid, signal.SIGINT)  # as a terminal does
+    running.communicate(timeout=60)
+    assert running.returncode != 0
+    assert gone(workers)
+
+
+def test_processes_of_the_caller_are_left_alone(tmp_path: Path) -> None:
+    """A failure ends the runner's own workers, and no other child of the caller."""
+    bystander = subprocess.Popen([sys.executable, "-c", "input()"], stdin=-1)
     try:
-        os.kill(pid, 0)
-    except ProcessLookupError:
-        return False
-    return True
-
-
-def test_ctrl_c_stops_at_once_and_leaves_nothing_running(tmp_path: Path) -> None:
-    process = start_killed(tmp_path)
-    give_up = time.monotonic() + 120
-    while not (tmp_path / "worker").exists() and time.monotonic() < give_up:
-        time.sleep(0.05)
-    os.killpg(process.pid, signal.SIGINT)  # as a terminal does
-    process.wait(timeout=60)  # the task itself would sleep for ten minutes
-    assert process.returncode != 0
-    assert not _runs(int((tmp_path / "worker").read_text()))
-
-
-def test_two_runners_do_not_share_a_folder(tmp_path: Path) -> None:
-    calls = tmp_path / "calls"
-    with FileLock(tmp_path / "running.lock"):
-        with pytest.raises(FolderInUseError, match="another run works on"):
-            run_tasks(tasks(calls), tmp_path, workers=1)
-        assert not calls.exists()
-    run_tasks(tasks(calls), tmp_path, workers=1)
-    assert calls_in(calls) == ["0", "1", "2", "3"]
+        methods.warm_up(SHORT)
+        broken = replace(SHORT, settings={**SHORT.settings, "max_steps": -1})
+        with pytest.raises(RunFailedError):
+            run_studies([SHORT, broken], [0], tmp_path, workers=1)
+        assert bystander.poll() is None
+    finally:
+        bystander.communicate(b"\n")
 
 
 FULL = """
 import resource, sys
 from pathlib import Path
-from acl_gym.experiments.runner import Task, TaskFailedError, run_tasks
-from tests.experiments.test_runner import long_text, square
+from acl_gym.experiments.executors import RunFailedError
+from acl_gym.experiments.runner import run_studies
+from acl_gym.experiments.systems import pendulum
+from dataclasses import replace
+from tests.experiments.test_runner import SHORT
 
 if __name__ == "__main__":
-    folder, calls = Path(sys.argv[1]), sys.argv[2]
-    tasks = [
-        Task("small", square, (2, calls), {}),
-        Task("large", long_text, (), {}),
-    ]
+    large = replace(pendulum("crisp", 2, (60, 61), max_steps=40), trials=2)
+    run_studies([large.brief(), SHORT.brief()], [0], Path(sys.argv[1]) / "warm", workers=1)
     # No file may grow beyond this: writing fails as on a full disk.
-    resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000))
+    resource.setrlimit(resource.RLIMIT_FSIZE, (12_000, 12_000))
     try:
-        run_tasks(tasks, folder, workers=1)
-    except TaskFailedError as error:
+        run_studies([SHORT, large], [0], Path(sys.argv[1]), workers=1)
+    except RunFailedError as error:
         print(error)
 """
 
 
-def long_text(report) -> dict:
-    """A result that a small disk does not hold."""
-    return {"text": "x" * 100_000}
-
-
 def test_a_full_disk_loses_nothing(tmp_path: Path) -> None:
-    script, folder = tmp_path / "full.py", tmp_path / "runs"
+    script, runs = tmp_path / "full.py", tmp_path / "runs"
     script.write_text(FULL)
     for _ in range(2):
         done = subprocess.run(
-            [sys.executable, script, folder, tmp_path / "calls"],
+            [sys.executable, script, runs],
             env={**os.environ, "PYTHONPATH": os.pathsep.join(["", *sys.path])},
             capture_output=True,
             text=True,
             check=False,
             timeout=120,
         )
-        assert done.returncode == 0, done.stderr
-        assert "the result of large cannot be written to" in done.stdout
+        assert "cannot be written to" in done.stdout, done.stderr
         assert "make room and call again" in done.stdout
-        assert sorted(path.name for path in folder.glob("*.json")) == ["small.json"]
-        assert not list(folder.glob(".*")), "no temporary file may stay"
-    assert calls_in(tmp_path / "calls") == ["2"], "what was there is not made again"
+        assert [name.split("-")[1] for name in times_of(runs)] == ["gridsearch1d"]
+        assert not list(runs.glob(".*")), "no temporary file may stay"
+
+
+def test_progress_counts_what_was_there(tmp_path: Path) -> None:
+    from rich.console import Console
+
+    run_studies([SHORT], [0], tmp_path, workers=1)
+    console = Console(record=True, force_terminal=False, width=80)
+    run_studies([SHORT], [0, 1, 2], tmp_path, workers=1, console=console)
+    assert "3/3" in console.export_text()
+
+
+def test_a_study_travels_as_it_is(tmp_path: Path) -> None:
+    """Nothing of a study is lost on the way to another process or into its file."""
+    study: Study = replace(SHORT, watched={"level": (1, 0)})
+    run = run_studies([study], [5], tmp_path, workers=1).runs(study)[0]
+    again = methods.run(study, 5)
+    assert (run.rows["level"] == again.rows["level"]).all()
+    assert np.array_equal(run.table, again.table)
+    assert run.made["processes"] == 1
+    assert runner.list_jobs([study], [5])[0].key == Job(study, 5).key

@@ -195,10 +195,10 @@ class Hidden(VectorWrapper[Any, Any, Any, Any]):
         return observation[:, self._shown], *rest
 
 
-class Backwards(VectorWrapper[Any, Any, Any, Any]):
+class ReversedSlots(VectorWrapper[Any, Any, Any, Any]):
     """The slots of an environment in reverse order.
 
-    With `BackwardsLuck` in the agent, each ant meets the same luck as in the order as it
+    With `ReversedLuck` in the agent, each ant meets the same luck as in the order as it
     is: only the order changes in which what they learn is merged.
 
     Args:
@@ -227,7 +227,7 @@ class Backwards(VectorWrapper[Any, Any, Any, Any]):
         )
 
 
-class BackwardsLuck:
+class ReversedLuck:
     """A generator whose random numbers come in reverse order along their last axis.
 
     Args:

@@ -1,0 +1,254 @@
+"""How each method makes one run of a study. A method more is one entry in `METHODS`."""
+
+from __future__ import annotations
+
+import time
+import warnings
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+import pandas as pd
+from gymnasium.vector import VectorEnv
+from gymnasium.wrappers.vector import TransformReward
+
+from acl_gym.agents.acl import ACL, PheromoneBoundWarning
+from acl_gym.agents.base import TabularAgent
+from acl_gym.agents.q_learning import QLearning
+from acl_gym.callbacks.base import Callback, Row
+from acl_gym.envs.wrappers.perturbations import ReversedLuck, ReversedSlots
+from acl_gym.evaluation import Predictor, evaluate_policy_cost
+from acl_gym.experiments.episode_costs import EPISODE_COSTS
+from acl_gym.experiments.results import Run
+from acl_gym.experiments.study import Study
+from acl_gym.planning.q_iteration import fuzzy_q_iteration
+from acl_gym.planning.value_iteration import value_iteration
+from acl_gym.policies import TablePolicy
+
+
+class Method(NamedTuple):
+    """A way to come to a policy.
+
+    Attributes:
+        label: what it is called in tables and figures.
+        run: makes one run of a study.
+        restore: makes the last policy of a run again, for the system without
+            perturbations.
+    """
+
+    label: str
+    run: Callable[[Study, int], Run]
+    restore: Callable[[Study, Run], Predictor]
+
+
+def run(study: Study, seed: int) -> Run:
+    """Run a study once.
+
+    Args:
+        study: what to run.
+        seed: of the agent, and through it of its environment.
+    """
+    warm_up(study)
+    return METHODS[study.method].run(study, seed)
+
+
+_WARM: set[tuple[Any, ...]] = set()
+
+
+def warm_up(study: Study) -> None:
+    """Compile the kernels of a study, so that no measured time holds a compilation."""
+    if study.kernels not in _WARM:
+        METHODS[study.method].run(study.brief(), 0)
+        _WARM.add(study.kernels)
+
+
+def restore_policy(study: Study, run: Run) -> Any:
+    """The last policy of a run."""
+    return METHODS[study.method].restore(study, run)
+
+
+class Evaluation(Callback):
+    """Evaluates the policy after each trial, or ever more seldom.
+
+    Args:
+        study: says how.
+
+    Attributes:
+        rows: one an evaluation.
+    """
+
+    def __init__(self, study: Study) -> None:
+        self.rows: list[Row] = []
+        self._study, self._task = study, study.task
+        self._states = study.task.evaluation_states()
+        self._env = study.task.make_env(len(self._states))
+        self._due = 0.0
+
+    def on_trial_end(self, agent: Any, row: Row) -> bool | None:
+        """Evaluate if it is time to, and after the last trial."""
+        study, done = self._study, row["env_steps"]
+        last = study.steps is not None and done >= study.steps
+        if done < self._due and not last:
+            return True
+        cost = None if self._task.cost is None else EPISODE_COSTS[self._task.cost].cost
+        result = evaluate_policy_cost(
+            agent.policy,
+            self._env,
+            self._states,
+            max_steps=self._task.longest_evaluation,
+            seed=0,
+            cost=cost,
+        )
+        table = agent.table
+        levels = {name: table[pair] for name, pair in study.watched.items()}
+        if study.method == "acl":
+            levels |= {"lowest_level": table.min(), "highest_level": table.max()}
+        self.rows.append(
+            {
+                **row,
+                "policy_cost": result.cost,
+                "success_rate": result.success_rate,
+                **{name: float(level) for name, level in levels.items()},
+            }
+        )
+        self._due = study.spacing * done
+        return True
+
+
+def make_agent(study: Study, seed: int) -> TabularAgent:
+    """The agent of a method with a table, ready to learn."""
+    task, settings = study.task, dict(study.settings)
+    env: VectorEnv[Any, Any, Any] = task.make_env(study.slots)
+    if study.reversed_slots:
+        env = ReversedSlots(env)
+    if settings.pop("reward", "stage") == "steps":
+        env = TransformReward(env, lambda reward: np.full_like(reward, -1.0))
+    if study.method == "acl" and task.cost is not None:
+        settings["cost"] = EPISODE_COSTS[task.cost].cost
+    kind = ACL if study.method == "acl" else QLearning
+    with warnings.catch_warnings():
+        # Table 4.1 has a tau_0 above 1 / J_max: the thesis wants it so.
+        warnings.simplefilter("ignore", PheromoneBoundWarning)
+        if "update" in settings:  # provisional
+            from acl_gym.experiments import orders
+
+            names = {"in_turn": "one phase", "once_per_ant": "once an ant", "once_per_trial": "once a trial", "each_visit": "two phases"}
+            agent = orders.colony(names[settings.pop("update")], env, study.make_partition(), seed=seed, **settings)
+        else:
+            agent = kind(env, study.make_partition(), seed=seed, **settings)
+    if study.reversed_slots:
+        agent.rng = ReversedLuck(agent.rng)  # type: ignore[assignment]
+    return agent
+
+
+def _learn_table(study: Study, seed: int) -> Run:
+    agent, evaluation = make_agent(study, seed), Evaluation(study)
+    failure = ""
+    try:
+        agent.learn(study.steps, study.trials, callback=evaluation)
+    except ValueError as error:
+        if study.method == "acl":
+            raise
+        failure = str(error)  # values that overflow: Q-learning may diverge
+        evaluation.rows.append(
+            {
+                "env_steps": agent.num_timesteps + 1,
+                "seconds": agent.seconds,
+                "policy_cost": study.task.highest_cost,
+                "success_rate": 0.0,
+            }
+        )
+    rows = pd.DataFrame(evaluation.rows, dtype=np.float64)
+    return Run(rows, np.array(agent.table).ravel(), agent.seconds, failure, seed)
+
+
+def _restore_table(study: Study, run: Run) -> TablePolicy:
+    partition = study.make_partition()
+    return TablePolicy(partition, run.table.reshape(partition.n_cells, -1).copy())
+
+
+def _learn_dqn(study: Study, seed: int) -> Run:
+    # Only here: importing torch takes seconds that the other methods do not need.
+    import torch
+
+    from acl_gym.sb3.dqn import PolicyCostCallback, scaled_env
+
+    torch.set_num_threads(1)  # the fastest for such small networks
+    task = study.task
+    evaluation = PolicyCostCallback(
+        scaled_env(task.env_id, **task.env), every=study.evaluate_every or 1_000
+    )
+    model = _make_dqn(study, seed)
+    model.learn(study.steps, callback=evaluation)
+    rows = pd.DataFrame(evaluation.history, dtype=np.float64)
+    weights = torch.nn.utils.parameters_to_vector(model.q_net.parameters())
+    table = weights.detach().numpy().astype(np.float64)
+    return Run(rows, table, float(rows["seconds"].iloc[-1]), "", seed)
+
+
+def _make_dqn(study: Study, seed: int) -> Any:
+    from acl_gym.sb3.dqn import DQNSettings, make_dqn
+
+    if study.task.perturbations or study.task.cost is not None:
+        raise ValueError(
+            "DQN needs a task without perturbations and judged by its stage costs, got "
+            f"{study.task}."
+        )
+    settings = DQNSettings(**study.settings)
+    return make_dqn(study.task.env_id, settings, seed, **study.task.env)
+
+
+def _restore_dqn(study: Study, run: Run) -> Predictor:
+    import torch
+
+    from acl_gym.partitions.discrete import FINITE_SPACES
+    from acl_gym.sb3.dqn import ScaledPolicy
+
+    model = _make_dqn(study, run.seed)
+    weights = torch.as_tensor(run.table, dtype=torch.float32)
+    torch.nn.utils.vector_to_parameters(weights, model.q_net.parameters())
+    env = study.task.make_system_env(1)
+    if isinstance(env.single_observation_space, FINITE_SPACES):
+        return model
+    return ScaledPolicy(model, env.single_observation_space, env.system.circular)
+
+
+def _plan(study: Study, seed: int) -> Run:
+    """Value iteration where a state is a cell, else fuzzy Q-iteration; no seed matters.
+
+    Of several discounts the one with the cheapest policy counts.
+    """
+    task, settings = study.task, dict(study.settings)
+    env = task.make_system_env(1)
+    discounts = settings.pop("discounts", [settings.pop("discount", 1.0)])
+    began, found = time.perf_counter(), []
+    partition = study.make_partition()
+    for discount in discounts:
+        if partition.cells_per_state == 1 and not hasattr(partition, "centres"):
+            policy = value_iteration(env, discount=discount, **settings).policy
+        else:
+            policy = fuzzy_q_iteration(
+                env, partition, discount=discount, **settings
+            ).policy
+        result = evaluate_policy_cost(policy, env, max_steps=task.longest_evaluation)
+        found.append((result, policy, discount))
+    seconds = time.perf_counter() - began
+    best, policy, discount = min(found, key=lambda each: each[0].cost)
+    row = {
+        "env_steps": 0.0,
+        "seconds": seconds,
+        "policy_cost": best.cost,
+        "success_rate": best.success_rate,
+        "discount": discount,
+    }
+    rows = pd.DataFrame([row], dtype=np.float64)
+    return Run(rows, policy.table.ravel(), seconds, "", seed)
+
+
+METHODS = {
+    "acl": Method("ACL", _learn_table, _restore_table),
+    "q-learning": Method("Q-learning", _learn_table, _restore_table),
+    "dqn": Method("DQN", _learn_dqn, _restore_dqn),
+    "planning": Method("dynamic programming", _plan, _restore_table),
+}
+"""The methods by name."""

@@ -1,0 +1,192 @@
+"""What a run depends on beside its study, and where, when and with what it was made."""
+
+from __future__ import annotations
+
+import ast
+import datetime
+import hashlib
+import json
+import os
+import platform
+import subprocess
+from collections.abc import Iterator
+from functools import cache
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import acl_gym
+
+ROOT = Path(acl_gym.__file__).parent
+
+RUNS = "acl_gym.experiments.methods"
+"""The module that makes runs."""
+
+_PACKAGES = ("numpy", "numba", "scipy", "gymnasium", "stable-baselines3", "torch")
+
+# They draw or say something while a run is made, and change nothing in its result.
+_SILENT = ("compiling", "rendering", "painter")
+
+
+def hashed(value: Any) -> str:
+    """The SHA-256 hash of JSON types."""
+    text = json.dumps(value, sort_keys=True)
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+@cache
+def code_of_runs(root: Path = ROOT) -> str:
+    """A hash over the code that runs depend on.
+
+    That is the module that makes them, what it imports from this package, directly or
+    not, and every environment with its maps, for environments are made by their ids. A
+    figure, a claim or a page is none of it; nor are comments, docstrings, and imports
+    for the type checker alone.
+
+    Args:
+        root: where the package lies.
+    """
+    digest = hashlib.sha256()
+    for name, path in sorted(sources_of(RUNS, root).items()):
+        digest.update(name.encode())
+        digest.update(ast.dump(_without_docstrings(path)).encode())
+    for path in sorted(root.glob("envs/**/*.txt")):
+        digest.update(path.name.encode())
+        digest.update(path.read_bytes())
+    return digest.hexdigest()
+
+
+def sources_of(module: str, root: Path = ROOT) -> dict[str, Path]:
+    """The files that a module runs on, by the names of their modules.
+
+    Args:
+        module: the name of a module.
+        root: where the package lies.
+    """
+    files = {_module_name(path, root): path for path in root.rglob("*.py")}
+    found: dict[str, Path] = {}
+    waiting = [module, *(name for name in files if name.startswith("acl_gym.envs"))]
+    while waiting:
+        name = waiting.pop()
+        if name in found or name not in files or name.endswith(_SILENT):
+            continue
+        found[name] = files[name]
+        waiting += _imported(files[name], files)
+    return found
+
+
+def _module_name(path: Path, root: Path) -> str:
+    parts = path.relative_to(root).with_suffix("").parts
+    return ".".join(["acl_gym", *(p for p in parts if p != "__init__")])
+
+
+def _imported(path: Path, files: dict[str, Path]) -> list[str]:
+    """The modules of this package that a file imports when it is run."""
+    names = []
+    for node in _executed(ast.parse(path.read_bytes())):
+        if isinstance(node, ast.Import):
+            names += [each.name for each in node.names]
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            names += [_home(node.module, each.name, files) for each in node.names]
+    return names
+
+
+def _home(package: str, name: str, files: dict[str, Path]) -> str:
+    """The module in which an imported name is defined.
+
+    What else a package's `__init__` offers beside the name does not count.
+    """
+    if f"{package}.{name}" in files:
+        return f"{package}.{name}"
+    path = files.get(package)
+    if path is not None and path.name == "__init__.py":
+        for node in _executed(ast.parse(path.read_bytes())):
+            if isinstance(node, ast.ImportFrom) and node.module:
+                for each in node.names:
+                    if (each.asname or each.name) == name:
+                        return _home(node.module, each.name, files)
+    return package
+
+
+def _executed(node: ast.AST) -> Iterator[ast.AST]:
+    """All nodes of a tree, except those that only a type checker reads."""
+    for child in ast.iter_child_nodes(node):
+        if isinstance(child, ast.If) and "TYPE_CHECKING" in ast.dump(child.test):
+            continue
+        yield child
+        yield from _executed(child)
+
+
+def _without_docstrings(path: Path) -> ast.Module:
+    tree = ast.parse(path.read_bytes())
+    for node in [tree, *ast.walk(tree)]:
+        body = getattr(node, "body", None)
+        if isinstance(body, list):
+            node.body = [  # type: ignore[attr-defined]
+                each
+                for each in body
+                if not (
+                    isinstance(each, ast.Expr)
+                    and isinstance(each.value, ast.Constant)
+                    and isinstance(each.value.value, str)
+                )
+            ]
+    return tree
+
+
+@cache
+def versions() -> dict[str, str]:
+    """The versions of what computes results."""
+    installed = {name: version(name) for name in _PACKAGES}
+    return {"acl-gym": acl_gym.__version__, **installed}
+
+
+def circumstances(workers: int) -> dict[str, Any]:
+    """Where, when and with what a run is made.
+
+    Args:
+        workers: how many processes work at the same time.
+    """
+    return {
+        "date": datetime.date.today().isoformat(),
+        "python": platform.python_version(),
+        "cpu": _cpu_name(),
+        "cores": os.cpu_count(),
+        "processes": workers,
+        "commit": _commit(),
+        **versions(),
+    }
+
+
+@cache
+def _commit() -> str | None:
+    """The commit of a checkout, with a plus sign if files differ; None elsewhere."""
+    try:
+        _, found, changes = (
+            subprocess.run(
+                ["git", "-C", str(ROOT), *arguments],
+                capture_output=True,
+                text=True,
+                check=True,
+                timeout=10,
+            ).stdout.strip()
+            for arguments in (
+                # First, whether it is this package's checkout, and not one around it.
+                ("ls-files", "--error-unmatch", "__init__.py"),
+                ("rev-parse", "HEAD"),
+                ("status", "--porcelain", "."),  # new files count as changes
+            )
+        )
+    except (OSError, subprocess.SubprocessError):
+        return None
+    return f"{found}+" if changes else found
+
+
+@cache
+def _cpu_name() -> str:
+    try:
+        lines = Path("/proc/cpuinfo").read_text().splitlines()
+    except OSError:
+        return platform.processor() or "unknown"
+    names = (line.split(":", 1)[1].strip() for line in lines if "model name" in line)
+    return next(names, platform.processor() or "unknown")

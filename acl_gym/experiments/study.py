@@ -1,0 +1,263 @@
+"""What is run, as data: a study is a method with its settings on a task, and a budget.
+
+All of a study is JSON types, so that it can be kept beside its results, compared, and
+sent to other processes. An experiment is a few studies and how they are shown.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, replace
+from functools import cached_property
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+from gymnasium.vector import VectorEnv
+
+from acl_gym.envs.control.environments import ControlVectorEnv
+from acl_gym.envs.wrappers.perturbations import perturbed
+from acl_gym.evaluation import control_env
+from acl_gym.experiments.episode_costs import EPISODE_COSTS
+from acl_gym.partitions import Crisp, Fuzzy, Partition
+from acl_gym.partitions.automatic import thesis_partition
+from acl_gym.utils.typing import FloatArray
+
+PENDULUM = "acl_gym/Pendulum-v0"
+NAVIGATION = "acl_gym/Navigation-v0"
+GRID_1D = "acl_gym/GridSearch1D-v0"
+GRID_2D = "acl_gym/GridSearch2D-v0"
+TWO_STATE = "acl_gym/TwoState-v0"
+
+KINDS = {"crisp": Crisp, "fuzzy": Fuzzy}
+
+CURVE_POINTS = 120
+"""Points of a curve whose policies are evaluated ever more seldom."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Task:
+    """A system as a learner meets it, and how its policies are judged.
+
+    Attributes:
+        env_id: the environment.
+        env: its keyword arguments.
+        perturbations: what lies between system and learner, see
+            `envs.wrappers.perturbations.perturbed`.
+        cost: a key of `EPISODE_COSTS`; None takes the sum of the stage costs.
+        evaluation_steps: T of an evaluation; None takes that of the system.
+        repeats: how often an evaluation starts from each state, where the system is
+            random.
+    """
+
+    env_id: str
+    env: dict[str, Any] = field(default_factory=dict)
+    perturbations: dict[str, Any] = field(default_factory=dict)
+    cost: str | None = None
+    evaluation_steps: int | None = None
+    repeats: int = 1
+
+    @property
+    def short_name(self) -> str:
+        """The name in files: Pendulum of acl_gym/Pendulum-v0."""
+        return self.env_id.rpartition("/")[2].rpartition("-")[0]
+
+    def make_system_env(self, slots: int) -> ControlVectorEnv:
+        """The environment itself, without perturbations."""
+        return control_env(gym.make_vec(self.env_id, num_envs=slots, **self.env))
+
+    def make_env(self, slots: int) -> VectorEnv[Any, Any, Any]:
+        """The environment that learners see."""
+        return perturbed(self.make_system_env(slots), self.perturbations)
+
+    def make_partition(self, kind: str, cells: Any = None) -> Partition:
+        """A partition of what learners see, with the centres of the thesis.
+
+        Args:
+            kind: "crisp" or "fuzzy"; not used where a state is a cell.
+            cells: see `partitions.automatic.thesis_partition`.
+        """
+        env = self.make_system_env(1)
+        partition = thesis_partition(env, cells, kind=KINDS.get(kind, Fuzzy))
+        hidden = self.perturbations.get("hidden", ())
+        if not hidden:
+            return partition
+        shown = [
+            line
+            for axis, line in enumerate(partition.centres)  # type: ignore[attr-defined]
+            if axis not in hidden
+        ]
+        return KINDS[kind](shown)
+
+    def evaluation_states(self) -> FloatArray:
+        """The initial states of an evaluation, `(n, state_size)`."""
+        states = self.make_system_env(1).system.evaluation_states()
+        return np.repeat(states, self.repeats, axis=0)
+
+    @cached_property
+    def longest_evaluation(self) -> int:
+        """T of an evaluation."""
+        if self.evaluation_steps is not None:
+            return self.evaluation_steps
+        return int(self.make_system_env(1).system.evaluation_steps)
+
+    @property
+    def highest_cost(self) -> float:
+        """No policy costs more; this is the cost of a run that breaks down."""
+        if self.cost is not None:
+            return EPISODE_COSTS[self.cost].ceiling
+        system = self.make_system_env(1).system
+        return float(self.longest_evaluation * system.max_stage_cost)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Study:
+    """A method with its settings on a task: all that a run depends on but its seed.
+
+    Attributes:
+        task: what is learned.
+        method: a key of `methods.METHODS`.
+        settings: keyword arguments of the agent; for DQN, of `DQNSettings`; for
+            planning, of `fuzzy_q_iteration`. Of Q-learning, "reward" is "stage", the
+            stage costs, or "steps", 1 a step.
+        slots: slots of the environment; of a colony M, the number of ants.
+        kind: "crisp" or "fuzzy"; not used where a state is a cell.
+        cells: see `Task.make_partition`.
+        trials: K, how many trials are made; None: `steps` decides.
+        steps: how many interactions of all slots together; None: `trials` decides.
+        evaluate_every: interactions between two evaluations of DQN.
+        spacing: the factor by which interactions grow from one evaluation to the next;
+            1 evaluates the policy after each trial.
+        watched: names of columns, and the (cell, action) whose level they hold after
+            each evaluation.
+        reversed_slots: whether the slots are in reverse order, each with the random
+            numbers that it has otherwise.
+        most_runs: how many runs are made at most. No result depends on it.
+    """
+
+    task: Task
+    method: str
+    settings: dict[str, Any] = field(default_factory=dict)
+    slots: int = 1
+    kind: str = "fuzzy"
+    cells: Any = None
+    trials: int | None = None
+    steps: int | None = None
+    evaluate_every: int | None = None
+    spacing: float = 1.0
+    watched: dict[str, tuple[int, int]] = field(default_factory=dict)
+    reversed_slots: bool = False
+    most_runs: int | None = None
+
+    @property
+    def inputs(self) -> dict[str, Any]:
+        """All that a result depends on but the seed, JSON types."""
+        inputs = asdict(self)
+        del inputs["most_runs"]
+        return inputs
+
+    @cached_property
+    def key(self) -> str:
+        """A short name that is a function of `inputs`."""
+        text = json.dumps(self.inputs, sort_keys=True)
+        return hashlib.sha256(text.encode()).hexdigest()[:12]
+
+    @property
+    def kernels(self) -> tuple[Any, ...]:
+        """Two studies for which this is the same need the same compiled kernels."""
+        task, settings = self.task, self.settings
+        return (
+            *(task.env_id, len(task.env), bool(task.perturbations), task.cost),
+            *(self.method, self.kind, str(settings.get("update"))),
+            *(settings.get("trace_decay", 0) > 0, settings.get("tabu")),
+            *(settings.get("selection"), self.reversed_slots),
+        )
+
+    def brief(self) -> Study:
+        """The same for a few steps: to compile its kernels, or to try it out."""
+        if self.method == "planning":
+            return replace(self, settings={**self.settings, "max_iterations": 1})
+        if self.method == "dqn":
+            settings = {**self.settings, "learning_starts": 16}
+            return replace(self, settings=settings, steps=64, evaluate_every=32)
+        task = replace(self.task, evaluation_steps=2)
+        settings = {**self.settings, "max_steps": 2}
+        return replace(
+            self, task=task, settings=settings, slots=2, trials=1, steps=None
+        )
+
+    def with_settings(self, **settings: Any) -> Study:
+        """The same with some settings of the agent changed."""
+        return replace(self, settings={**self.settings, **settings})
+
+    def make_partition(self) -> Partition:
+        """The partition of a method that keeps a table."""
+        return self.task.make_partition(self.kind, self.cells)
+
+    def curve_points(self) -> list[int] | None:
+        """The interactions at which curves have their points; None: after each trial."""
+        if self.method == "planning":
+            return [0]
+        if self.spacing == 1.0 and self.evaluate_every is None:
+            return None
+        steps = self.steps or 1
+        at = np.geomspace(max(1.0, steps / 1_000), steps, CURVE_POINTS)
+        return [int(each) for each in np.unique(np.rint(at))]
+
+    def __str__(self) -> str:
+        """All of it in one line."""
+        budget = (
+            f"{self.trials} trials" if self.steps is None else f"{self.steps:,} steps"
+        )
+        parts = [self.method, f"{self.slots} slots", budget, self.kind]
+        if isinstance(self.cells, str):
+            parts.append(self.cells)
+        elif self.cells is not None and np.ndim(self.cells[0]) == 0:
+            parts.append(" x ".join(map(str, self.cells)))
+        values = {**self.settings, **self.task.env, **self.task.perturbations}
+        if self.task.cost is not None:
+            values["cost"] = self.task.cost
+        parts += [f"{name} = {_short(value)}" for name, value in values.items()]
+        return ", ".join(parts + ["slots in reverse order"] * self.reversed_slots)
+
+
+def _short(value: Any) -> str:
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Experiment:
+    """A figure of the thesis, a trial beside it, or a comparison of methods.
+
+    Attributes:
+        name: for instance "fig5.4".
+        title: what it shows.
+        section: of the thesis.
+        studies: what is run, under the label that figures and tables give it.
+        references: what these are held against, such as dynamic programming.
+        plots: the figures, keys of `plots.PLOTS`.
+        table: the table beside the figures, a key of `tables.TABLES`; "" for none.
+        claims: the claims of the thesis that it decides.
+        explains: the claims that it was tried for, because they do not hold.
+        text: what the thesis says and what is decided here, in this project's words.
+        options: more that figures and table need.
+    """
+
+    name: str
+    title: str
+    section: str
+    studies: Mapping[str, Study]
+    references: Mapping[str, Study] = field(default_factory=dict)
+    plots: tuple[str, ...] = ()
+    table: str = ""
+    claims: tuple[str, ...] = ()
+    explains: tuple[str, ...] = ()
+    text: str = ""
+    options: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def everything(self) -> list[Study]:
+        """All that is run."""
+        return [*self.studies.values(), *self.references.values()]

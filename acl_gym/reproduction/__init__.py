@@ -1,1 +1,0 @@
-"""The thesis put to the test: its experiments, its claims, figures and a report."""

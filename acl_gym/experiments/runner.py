@@ -67,8 +67,8 @@ def run_studies(
     with alone_in(directory):
         for half in directory.glob(".*.tmp"):
             half.unlink()  # of a runner that was killed while it wrote
-        runs: dict[Job, Run | None] = {job: store.read(job) for job in jobs}
-        missing = [job for job in jobs if runs[job] is None]
+        runs: dict[str, Run | None] = {job.name: store.read(job) for job in jobs}
+        missing = [job for job in jobs if runs[job.name] is None]
         unusable = sum(store.path(job).exists() for job in missing)
         if unusable:
             logger.warning(
@@ -77,16 +77,13 @@ def run_studies(
                 *(unusable, len(jobs), directory),
             )
         if missing:
-            # Here once, not in every process: Numba's cache is no place for a race.
-            with console.status("Compiling the kernels (half a minute, the first time)"):
-                for study in {job.study.kernels: job.study for job in missing}.values():
-                    if study.method != "dqn":  # it would load torch
-                        warm_up(study)
+            _compile_kernels(missing, console)
             execute = in_ray if executor == "ray" else partial(in_processes, workers=workers)
             _make(missing, store, execute, console, len(jobs))
-            runs |= {job: store.read(job) for job in missing}
+            runs |= {job.name: store.read(job) for job in missing}
     found: dict[str, list[Run]] = {}
-    for job, run in runs.items():
+    for job in jobs:
+        run = runs[job.name]
         if run is None:
             raise RunFailedError(f"{store.path(job)} was changed while runs were made.")
         found.setdefault(job.study.key, []).append(run)
@@ -137,6 +134,17 @@ def alone_in(directory: Path) -> Iterator[None]:
         yield
     finally:
         lock.release()
+
+
+def _compile_kernels(jobs: list[Job], console: Console) -> None:
+    """Compile here once, not in every process: Numba's cache is no place for a race."""
+    kinds = {job.study.kernels: job for job in jobs if job.study.method != "dqn"}
+    with console.status("Compiling the kernels (half a minute, the first time)"):
+        for job in kinds.values():
+            try:
+                warm_up(job.study)
+            except Exception as error:
+                raise RunFailedError(f"{job.name} failed: {error}") from error
 
 
 def _make(

@@ -135,8 +135,9 @@ def running(tmp_path: Path) -> Iterator[subprocess.Popen[str]]:
     )
     give_up = time.monotonic() + 120
     while len(times_of(tmp_path / "runs")) < 2 and time.monotonic() < give_up:
+        assert process.poll() is None, process.communicate()[1]
         time.sleep(0.05)
-    assert len(times_of(tmp_path / "runs")) == 2, process.poll()
+    assert len(times_of(tmp_path / "runs")) == 2
     yield process
     process.kill()
     process.communicate()

@@ -228,10 +228,10 @@ from dataclasses import replace
 from tests.experiments.test_runner import SHORT
 
 if __name__ == "__main__":
-    large = replace(pendulum("crisp", 2, (60, 61), max_steps=40), trials=2)
+    large = replace(pendulum("crisp", 50, (60, 61)), trials=20)
     run_studies([large.brief(), SHORT.brief()], [0], Path(sys.argv[1]) / "warm", workers=1)
     # No file may grow beyond this: writing fails as on a full disk.
-    resource.setrlimit(resource.RLIMIT_FSIZE, (12_000, 12_000))
+    resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000))
     try:
         run_studies([SHORT, large], [0], Path(sys.argv[1]), workers=1)
     except RunFailedError as error:

@@ -1,0 +1,43 @@
+"""The experiments of the thesis by chapter, each with its claims and what was tried.
+
+The parameters are those of Tables 4.1 and 5.2; what the thesis leaves open is decided in
+`experiments.systems`, and said in the text of the experiment.
+"""
+
+from acl_gym.experiments.claims import Claim
+from acl_gym.experiments.study import Experiment
+from acl_gym.experiments.thesis import (
+    chapter3,
+    chapter3_claims,
+    chapter4,
+    chapter5,
+    chapter5_claims,
+    theory,
+)
+
+RUNS = 30
+"""Runs of each study, as in the thesis; their seeds are 0 to 29."""
+
+EXPERIMENTS: tuple[Experiment, ...] = (
+    *theory.EXPERIMENTS,
+    *chapter3.EXPERIMENTS,
+    *chapter4.EXPERIMENTS,
+    *chapter5.EXPERIMENTS,
+)
+
+CLAIMS: tuple[Claim, ...] = (
+    *chapter3_claims.CLAIMS,
+    *chapter4.CLAIMS,
+    *chapter5_claims.CLAIMS,
+    *theory.CLAIMS,
+)
+
+
+def experiments_of(claim: str) -> list[str]:
+    """The names of the experiments that decide a claim, such as "C5"."""
+    return [each.name for each in EXPERIMENTS if claim in each.claims]
+
+
+def trials_of(claim: str) -> list[str]:
+    """The names of the experiments that were tried to understand a claim."""
+    return [each.name for each in EXPERIMENTS if claim in each.explains]

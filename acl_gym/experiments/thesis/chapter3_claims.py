@@ -1,0 +1,316 @@
+"""The claims C1 to C8 on the grid searches of §3.6, and what was tried beside them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from acl_gym.evaluation import control_env
+from acl_gym.experiments.claims import Part, Tried, settled_from
+from acl_gym.experiments.methods import restore_policy
+from acl_gym.experiments.results import Results
+from acl_gym.experiments.statistics import estimate, rank_correlation, ratio
+from acl_gym.experiments.study import Study
+from acl_gym.experiments.systems import GRID_STATES, grid_1d, grid_2d
+from acl_gym.experiments.thesis.chapter3 import (
+    CHOICES,
+    COVERED,
+    GAMMAS,
+    ONE_ANT,
+    PROBABILITIES,
+    READ_AS,
+    SHARES,
+    TWO_PROBABILITIES,
+)
+from acl_gym.experiments.thesis.common import (
+    LATE,
+    Attempt,
+    at_least,
+    at_most,
+    centres,
+    claim,
+    listed,
+)
+from acl_gym.planning.model import TabularModel
+from acl_gym.planning.value_iteration import policy_value, value_iteration
+from acl_gym.utils.typing import BoolArray, FloatArray, IntArray
+
+OPTIMUM_1D = 5.0
+"""J* of the 1-D grid of ten states."""
+
+
+def optimal(results: Results, study: Study) -> BoolArray:
+    """On the 1-D grid, whether the policy is optimal, `(runs, trials)`."""
+    return np.asarray(results.values(study) <= OPTIMUM_1D + 1e-9)
+
+
+def solved(study: Study) -> tuple[TabularModel, Any, IntArray]:
+    """The model of a grid, its value iteration, and the states that are not goals."""
+    env = study.task.make_system_env(1)
+    model = TabularModel.from_env(env)
+    optimum = value_iteration(model)
+    goals = control_env(env).system.goal_states  # type: ignore[attr-defined]
+    return model, optimum, np.setdiff1d(np.arange(len(optimum.values)), goals)
+
+
+def optimal_cost(study: Study) -> float:
+    """J* of a grid, the mean over the states that are not goals."""
+    _, optimum, free = solved(study)
+    return float(-optimum.values[free].mean())
+
+
+def best_actions(results: Results, study: Study) -> IntArray:
+    """The last policy of each run, `(runs, cells)`."""
+    runs = results.runs(study)
+    return np.array([restore_policy(study, run).best_actions() for run in runs])
+
+
+def exact_costs(results: Results, study: Study) -> FloatArray:
+    """The cost of each run's last policy; infinite if a state never gets to the goal."""
+    model, _, free = solved(study)
+    policies = best_actions(results, study)
+    return np.array([-policy_value(model, each)[free].mean() for each in policies])
+
+
+def agreement(actions: IntArray) -> float:
+    """How often two runs of a study have the same action in a cell."""
+    return float((actions == np.roll(actions, 1, axis=0)).mean())
+
+
+def trials_to(results: Results, study: Study, share: float) -> FloatArray:
+    """The trial at which the cost of a run first comes within a share of its end."""
+    costs = results.values(study)
+    end = np.median(costs[:, -LATE:], axis=1, keepdims=True)
+    return np.asarray((costs <= (1.0 + share) * end).argmax(axis=1) + 1.0)
+
+
+def _read_as(reading: str, results: Results) -> Tried:
+    found = {
+        gamma: estimate(results.values(study).mean(axis=1))
+        for gamma, study in {0.0: grid_1d(), **READ_AS[reading]}.items()
+    }
+    what = f"the local update read as {reading}: mean cost over the trials, by gamma"
+    return Tried(what, listed(found))
+
+
+def _first_trials(results: Results) -> Tried:
+    studies = {gamma: grid_1d(local_decay=gamma) for gamma in (0.0, *GAMMAS)}
+    firsts = {g: settled_from(optimal(results, s)) for g, s in studies.items()}
+    found = {gamma: f"{np.median(first):g}" for gamma, first in firsts.items()}
+    return Tried("the median trial from which on J = 5, by gamma", listed(found))
+
+
+def _one_ant(results: Results) -> Tried:
+    ends = {c: optimal(results, study)[:, -1] for c, study in ONE_ANT.items()}
+    found = {choice: f"{end.mean():.0%}" for choice, end in ends.items()}
+    return Tried("one ant, runs that end at J = 5 with other choices", listed(found))
+
+
+def _every_run(results: Results) -> Tried:
+    shortest, found = optimal_cost(grid_2d()), {}
+    for p in PROBABILITIES:
+        costs = exact_costs(results, grid_2d(p=p))
+        near, lost = np.mean(costs * p / shortest <= 1.1), np.isinf(costs).mean()
+        found[f"p = {p:g}"] = f"{near:.0%} ({lost:.0%} with a cell that never arrives)"
+    what = "runs whose last policy costs at most 1.1 times the claim"
+    return Tried(what, listed(found))
+
+
+def _costs_with(choice: str, results: Results) -> Tried:
+    found = {
+        f"p = {p:g}": f"{estimate(exact_costs(results, study))} (optimum "
+        f"{optimal_cost(study):.2f})"
+        for p, study in CHOICES[choice].items()
+    }
+    return Tried(f"{choice}: cost of the last policy", listed(found))
+
+
+def _agreement_with(choice: str, results: Results) -> Tried:
+    low, high = (best_actions(results, study) for study in CHOICES[choice].values())
+    return Tried(
+        f"{choice}: cells with the same action at both p, of all cells; and in two "
+        "runs at one p",
+        f"{(low == high).mean():.0%}, and {agreement(low):.0%} (p = 0.5), "
+        f"{agreement(high):.0%} (p = 0.9)",
+    )
+
+
+def _within(share: float, results: Results) -> Tried:
+    trials = {each: trials_to(results, s, share) for each, s in COVERED.items()}
+    found = {f"{s}, {a:.0%}": f"{np.median(t):g}" for (s, a), t in trials.items()}
+    return Tried(f"median trials until within {share:.0%} of the end", listed(found))
+
+
+@claim("C1", "§3.6.3", "rho = 0 never converges.")
+def _c1(results: Results) -> Iterator[Part]:
+    late = optimal(results, grid_1d(global_decay=0.0))[:, -LATE:].all(axis=1)
+    statement = f"no run keeps J = 5 over the last {LATE} trials"
+    yield Part(statement, f"{late.sum()} of {late.size} runs", not late.any())
+
+
+@claim(
+    "C2",
+    "§3.6.3",
+    "rho = 0.1 with gamma = 0 converges to the optimum, J = 5, in every run.",
+)
+def _c2(results: Results) -> Iterator[Part]:
+    late = optimal(results, grid_1d())[:, -LATE:].all(axis=1)
+    statement = f"every run keeps J = 5 over the last {LATE} trials"
+    yield Part(statement, f"{late.sum()} of {late.size} runs", late.all())
+
+
+@claim(
+    "C3",
+    "§3.6.3",
+    "A large rho (0.9, 1) converges first, and does not settle afterwards.",
+)
+def _c3(results: Results) -> Iterator[Part]:
+    for rho in (0.9, 1.0):
+        reached = optimal(results, grid_1d(global_decay=rho))
+        once = reached.any(axis=1).mean()
+        left = np.mean([run.any() and not run[run.argmax() :].all() for run in reached])
+        statement = f"rho = {rho:g}: at least nine of ten runs reach J = 5 once"
+        yield Part(statement, f"{once:.0%}", once >= 0.9)
+        statement = f"rho = {rho:g}: at least half of the runs leave it again"
+        yield Part(statement, f"{left:.0%}", bool(left >= 0.5))
+
+
+_C4: tuple[Attempt, ...] = (
+    *(partial(_read_as, each) for each in READ_AS),
+    _first_trials,
+)
+
+
+@claim(
+    "C4",
+    "§3.6.4",
+    "gamma = 0 is best; the larger gamma, the worse.",
+    _C4,
+    "Up to gamma = 0.1 every value finds the optimum within two or three trials, and "
+    "their order is chance; from 0.2 on a larger gamma is worse, as the thesis says. If "
+    "the local update is made once an ant or once a trial, gamma hardly matters, even at "
+    "0.5.",
+)
+def _c4(results: Results) -> Iterator[Part]:
+    # The mean over the trials is low where learning is both fast and good.
+    means = {
+        gamma: results.values(grid_1d(local_decay=gamma)).mean(axis=1)
+        for gamma in (0.0, *GAMMAS)
+    }
+    costs = centres(means)
+    yield Part(
+        "no gamma has a lower mean cost over the trials than gamma = 0: no interval of "
+        "its ratio to that of gamma = 0 lies below 1",
+        listed(costs),
+        all(not ratio(each, means[0.0]).high < 1 for each in means.values()),
+    )
+    rank = rank_correlation(list(costs), list(costs.values()))
+    statement = "the mean cost rises with gamma: rank correlation of at least 0.9"
+    yield Part(statement, f"{rank:.2f}", rank >= 0.9)
+
+
+@claim(
+    "C5",
+    "§3.6.5",
+    "More ants need fewer trials; 1, 5 and 9 ants all reach the optimum.",
+    (_one_ant,),
+    "A single ant settles on the first path that it finds, because no other ant finds a "
+    "better one. A weaker preference (alpha = 1) or exploration (epsilon = 0.1, a tabu "
+    "list) prevents that; a smaller tau0 or ten times as many trials do not.",
+)
+def _c5(results: Results) -> Iterator[Part]:
+    reached = [optimal(results, grid_1d(ants)) for ants in (1, 5, 9)]
+    first = [float(np.median(settled_from(each))) for each in reached]
+    ends = [float(each[:, -1].mean()) for each in reached]
+    yield Part(
+        "the median trial from which on J = 5 falls from 1 to 5 to 9 ants",
+        ", ".join(f"{each:g}" for each in first),
+        first[0] > first[1] > first[2],
+    )
+    yield Part(
+        "with each number of ants at least 95% of the runs end at J = 5",
+        ", ".join(f"{each:.0%}" for each in ends),
+        min(ends) >= 0.95,
+    )
+
+
+@claim(
+    "C6",
+    "§3.6.7",
+    "In the interquartile mean of the runs, the last policy costs about the mean "
+    "shortest path divided by p.",
+    (_every_run, *(partial(_costs_with, choice) for choice in CHOICES)),
+)
+def _c6(results: Results) -> Iterator[Part]:
+    shortest = optimal_cost(grid_2d())
+    for p in PROBABILITIES:
+        found = estimate(exact_costs(results, grid_2d(p=p)))
+        yield Part(
+            f"p = {p:g}: the last policies cost {shortest / p:.2f} within 10% in the "
+            "interquartile mean",
+            str(found),
+            abs(found.value * p / shortest - 1) <= 0.1,
+        )
+
+
+@claim(
+    "C7",
+    "§3.6.7",
+    "p = 0.5 and p = 0.9 give nearly the same policy.",
+    [partial(_agreement_with, choice) for choice in CHOICES],
+    "The policies at two values of p differ no more than those of two runs at one: the "
+    "rest is chance, and cells in which the ants settle on a path that is one step too "
+    "long.",
+)
+def _c7(results: Results) -> Iterator[Part]:
+    _, optimum, free = solved(grid_2d())
+    values = optimum.action_values[free]
+    best = values >= values.max(axis=1, keepdims=True) - 1e-6
+    cells = free[best.sum(axis=1) == 1]
+    low, high = (
+        best_actions(results, grid_2d(p=p))[:, cells] for p in TWO_PROBABILITIES
+    )
+    between = float((low == high).mean())
+    within = (agreement(low) + agreement(high)) / 2
+    yield Part(
+        "where one action is best, the policies agree in at least 90% of the cells",
+        f"{between:.0%}",
+        between >= 0.9,
+    )
+    yield Part(
+        "they agree as often as two runs at one p, within 5 percentage points",
+        f"{between:.0%} against {within:.0%}",
+        between >= within - 0.05,
+    )
+
+
+@claim(
+    "C8",
+    "§3.6.8",
+    "The number of trials depends on the coverage by ants, and hardly on the size.",
+    (partial(_within, 0.1), partial(_within, 0.25)),
+    "We first took the trial from which on the cost stays within 5% of its end. In many "
+    "runs that is infinite, because single cells lose their path for a trial.",
+)
+def _c8(results: Results) -> Iterator[Part]:
+    trials = {each: trials_to(results, s, 0.05) for each, s in COVERED.items()}
+    for size in GRID_STATES:
+        statement = (
+            f"{size}: a fifth of the ants needs at least 1.5 times as many trials until "
+            "the cost first comes within 5% of its end"
+        )
+        found = ratio(trials[size, 0.2], trials[size, 1.0])
+        yield at_least(1.5, statement, found)
+    for share in SHARES:
+        statement = (
+            f"ants as {share:.0%} of the states: 7.4 times as many states need at most "
+            "twice as many trials"
+        )
+        found = ratio(trials["31x31", share], trials["11x11", share])
+        yield at_most(2.0, statement, found)
+
+
+CLAIMS = (_c1, _c2, _c3, _c4, _c5, _c6, _c7, _c8)

@@ -1,0 +1,139 @@
+"""What the chapters share: sweeps, and how claims and attempts are put together."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import replace
+from typing import Any, TypeVar
+
+from acl_gym.experiments.claims import Claim, Part, Tried
+from acl_gym.experiments.results import Results
+from acl_gym.experiments.statistics import Estimate, digits, estimate, ratio
+from acl_gym.experiments.study import Experiment, Study
+from acl_gym.utils.typing import FloatArray
+
+T = TypeVar("T")
+
+Attempt = Callable[[Results], Tried]
+Decide = Callable[[Results], Iterator[Part]]
+
+NEARLY_ONE = 0.999999
+"""Stands for gamma = 1, which lies outside [0, 1), the range of eq. (3.11)."""
+
+KINDS = ("crisp", "fuzzy")
+FUZZY_FIRST = ("fuzzy", "crisp")
+
+READINGS = {
+    "in turn": "in_turn",
+    "once an ant": "once_per_ant",
+    "once a trial": "once_per_trial",
+}
+"""Other readings of the local update than "each visit", as settings of the agent."""
+
+FEWER = 10
+"""Runs of studies beside those of the thesis that take long."""
+
+LATE = 20
+"""How many trials at the end count as late."""
+
+
+def number(value: Any) -> str:
+    """The value of a parameter as labels show it; words stay as they are."""
+    if isinstance(value, str):
+        return value
+    return "1" if value == NEARLY_ONE else f"{value:g}"
+
+
+def sweep(symbol: str, values: Iterable[Any], make: Callable[[Any], T]) -> dict[str, T]:
+    """What is made of each value of a parameter, by its label in figures."""
+    return {f"{symbol} = {number(value)}": make(value) for value in values}
+
+
+def fewer(studies: Mapping[str, Study]) -> dict[str, Study]:
+    """The same studies with at most `FEWER` runs."""
+    return {label: replace(s, most_runs=FEWER) for label, s in studies.items()}
+
+
+def experiment(
+    name: str,
+    title: str,
+    section: str,
+    studies: Mapping[str, Study],
+    claims: str = "",
+    plot: str = "bands",
+    explains: str = "",
+    **more: Any,
+) -> Experiment:
+    """An experiment with one figure; the names of claims are separated by spaces."""
+    return Experiment(
+        name=name,
+        title=title,
+        section=section,
+        studies=studies,
+        plots=(plot,),
+        claims=tuple(claims.split()),
+        explains=tuple(explains.split()),
+        **more,
+    )
+
+
+def late_cost(results: Results, study: Study, trials: int = LATE) -> FloatArray:
+    """The mean policy cost over the last trials of each run, `(runs,)`."""
+    late: FloatArray = results.values(study)[:, -trials:].mean(axis=1)
+    return late
+
+
+def centres(values: Mapping[Any, FloatArray]) -> dict[Any, float]:
+    """The interquartile mean over the runs, for each value of a parameter."""
+    return {key: estimate(each).value for key, each in values.items()}
+
+
+def listed(values: Mapping[Any, Any], between: str = ", ") -> str:
+    """Figures in one line, each after the value of the parameter that was varied."""
+    texts = {
+        key: digits(each) if isinstance(each, float) else each
+        for key, each in values.items()
+    }
+    return between.join(f"{number(key)}: {text}" for key, text in texts.items())
+
+
+def below_one(statement: str, first: FloatArray, second: FloatArray) -> Part:
+    """A statement that holds if the interval of a ratio lies below 1."""
+    found = ratio(first, second)
+    words = f"{statement}: the interval of the ratio lies below 1"
+    return Part(words, str(found), found.high < 1)
+
+
+def above_one(statement: str, first: FloatArray, second: FloatArray) -> Part:
+    """A statement that holds if the interval of a ratio lies above 1."""
+    found = ratio(first, second)
+    words = f"{statement}: the interval of the ratio lies above 1"
+    return Part(words, str(found), found.low > 1)
+
+
+def at_least(bound: float, statement: str, found: Estimate) -> Part:
+    """A statement that holds if an estimate is at least a bound, named in its words."""
+    return Part(statement, str(found), found.value >= bound)
+
+
+def at_most(bound: float, statement: str, found: Estimate) -> Part:
+    """A statement that holds if an estimate is at most a bound, named in its words."""
+    return Part(statement, str(found), found.value <= bound)
+
+
+def claim(
+    name: str,
+    section: str,
+    text: str,
+    tried: Iterable[Attempt] = (),
+    understanding: str = "",
+) -> Callable[[Decide], Claim]:
+    """Make a claim of the function that yields its statements; see `claims.Claim`."""
+
+    def made(decide: Decide) -> Claim:
+        def parts(results: Results) -> list[Part]:
+            return list(decide(results))
+
+        return Claim(name, text, section, parts, tuple(tried), understanding)
+
+    return made

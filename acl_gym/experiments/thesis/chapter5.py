@@ -132,6 +132,7 @@ _GAMMA_ONE = (
     "rho = 0.1, 250 ants. gamma = 1 lies outside the range that the thesis gives it; "
     "0.999999 is used instead."
 )
+_FIG15 = ", policies of 2000 crisp and 250 fuzzy ants"
 _MANY = {
     "crisp, M = 2000": CRISP_SWINGS["M = 2000"],
     "fuzzy, M = 250": pendulum("fuzzy"),
@@ -153,11 +154,7 @@ EXPERIMENTS = (
     _sweep(12, "crisp", "M", "C17", "rho = 0.1, gamma = 0.01."),
     _swing_up(13, "crisp", "M = 2000", CRISP_SWINGS["M = 2000"]),
     _sweep(14, "fuzzy", "M", "C17", "rho = 0.1, gamma = 0.01."),
-    _figure(
-        *(15, ", policies of 2000 crisp and 250 fuzzy ants"),
-        *(_MANY, "C20", "policies"),
-        text=_GREYS,
-    ),
+    _figure(15, _FIG15, _MANY, "C20", "policies", text=_GREYS),
     _cells(16, "crisp"),
     _cells(17, "fuzzy"),
     experiment(

@@ -11,38 +11,22 @@ from acl_gym.experiments.claims import Tried
 from acl_gym.experiments.results import Results
 from acl_gym.experiments.statistics import estimate
 from acl_gym.experiments.systems import pendulum
-from acl_gym.experiments.thesis.chapter5 import (
-    CHANGED,
-    CRISP_SWINGS,
-    LONG,
-    MANY_ANTS,
-    TWO_GAMMAS,
-    partitions,
-    varied,
-)
-from acl_gym.experiments.thesis.chapter5_measures import (
-    OPTIMUM,
-    SETTLED,
-    best_swing_up,
-    convergence,
-    late_cost,
-    swing_ups,
-    torque_maps,
-)
+from acl_gym.experiments.thesis import chapter5
+from acl_gym.experiments.thesis import chapter5_measures as measures
 from acl_gym.experiments.thesis.common import KINDS, Attempt, listed, sweep
 from acl_gym.utils.typing import FloatArray
 
 
 def _by_rho(kind: str, results: Results) -> dict[str, FloatArray]:
-    studies = varied(kind, "rho")
+    studies = chapter5.varied(kind, "rho")
     positive = [rho for rho in studies if rho > 0]
     return sweep("rho", positive, lambda rho: results.values(studies[rho]))
 
 
 def _longer(kind: str, results: Results) -> Tried:
     found = {
-        f"{kind}, rho = {rho:g}": convergence(results, study)[1]
-        for (partition, rho), study in LONG.items()
+        f"{kind}, rho = {rho:g}": measures.convergence(results, study)[1]
+        for (partition, rho), study in chapter5.LONG.items()
         if partition == kind
     }
     what = "K = 300 instead of 100; the share that has settled"
@@ -54,7 +38,7 @@ def _spikes(kind: str, results: Results) -> Tried:
     for rho, costs in _by_rho(kind, results).items():
         late = costs[:, -20:]
         away = np.abs(late / np.median(late, axis=1, keepdims=True) - 1.0)
-        steady = (away <= SETTLED / 2).mean(axis=1) >= 0.9
+        steady = (away <= measures.SETTLED / 2).mean(axis=1) >= 0.9
         found[rho] = f"{steady.mean():.0%}"
     return Tried(
         "without single trials (policies that hover beside the goal, docs/hovering.md): "
@@ -67,7 +51,7 @@ def _spikes(kind: str, results: Results) -> Tried:
 def _first_below(kind: str, results: Results) -> Tried:
     found = {}
     for rho, costs in _by_rho(kind, results).items():
-        below = np.flatnonzero(costs.mean(axis=0) <= 3 * OPTIMUM)
+        below = np.flatnonzero(costs.mean(axis=0) <= 3 * measures.OPTIMUM)
         found[rho] = str(below[0] + 1) if below.size else "never"
     return Tried(
         "the trial at which the mean cost is first at most 3 J*", listed(found)
@@ -76,7 +60,8 @@ def _first_below(kind: str, results: Results) -> Tried:
 
 def _gammas(kind: str, name: str, results: Results) -> Tried:
     small, large = (
-        estimate(late_cost(results, CHANGED[name][kind, gamma])) for gamma in TWO_GAMMAS
+        estimate(measures.late_cost(results, chapter5.CHANGED[name][kind, gamma]))
+        for gamma in chapter5.TWO_GAMMAS
     )
     better = "better" if large.high < small.low else "no better"
     found = f"gamma = 0.1 is {better}: cost {large} against {small} for gamma = 0.01"
@@ -84,28 +69,34 @@ def _gammas(kind: str, name: str, results: Results) -> Tried:
 
 
 def _best_of_run(kind: str, results: Results) -> Tried:
-    studies = varied(kind, "gamma")
+    studies = chapter5.varied(kind, "gamma")
     found = {g: estimate(results.values(s).min(axis=1)) for g, s in studies.items()}
     return Tried("the cheapest policy of each run, by gamma", listed(found))
 
 
 def _swung_with(name: str, results: Results) -> Tried:
-    ups = {g: best_swing_up(results, CHANGED[name]["fuzzy", g]) for g in TWO_GAMMAS}
+    ups = {
+        g: measures.best_swing_up(results, chapter5.CHANGED[name]["fuzzy", g])
+        for g in chapter5.TWO_GAMMAS
+    }
     found = {f"gamma = {g:g}": f"{up.seconds:.1f} s" for g, up in ups.items()}
     return Tried(f"{name}: the best policy is upright after", listed(found))
 
 
 def _all_turns(results: Results) -> Tried:
     found = {}
-    for label, study in {**CRISP_SWINGS, "fuzzy": pendulum("fuzzy")}.items():
-        turns = [each.turns for each in swing_ups(results, study)]
+    for label, study in {**chapter5.CRISP_SWINGS, "fuzzy": pendulum("fuzzy")}.items():
+        turns = [each.turns for each in measures.swing_ups(results, study)]
         found[label] = f"{np.median(turns):g} [{min(turns)}, {max(turns)}]"
     what = "turns of all runs instead of the best one: median and range"
     return Tried(what, listed(found))
 
 
 def _more_ants(results: Results) -> Tried:
-    found = {f"N = {n}": estimate(late_cost(results, s)) for n, s in MANY_ANTS.items()}
+    found = {
+        f"N = {n}": estimate(measures.late_cost(results, s))
+        for n, s in chapter5.MANY_ANTS.items()
+    }
     return Tried("624 fuzzy ants on every partition", listed(found))
 
 
@@ -113,7 +104,7 @@ def _median_trials(results: Results) -> Tried:
     found = {
         f"{kind}, N = {n}": estimate(np.median(results.values(s)[:, -10:], axis=1))
         for kind in KINDS
-        for n, s in partitions(kind).items()
+        for n, s in chapter5.partitions(kind).items()
     }
     what = "the median of the last ten trials instead of their mean"
     return Tried(what, listed(found))
@@ -123,10 +114,12 @@ def _structures(results: Results) -> Tried:
     found = {}
     for label, study in (
         ("fuzzy, gamma = 0.1", pendulum("fuzzy", local_decay=0.1)),
-        ("crisp, gamma = 0.1", CRISP_SWINGS["gamma = 0.1"]),
-        ("crisp, M = 2000", CRISP_SWINGS["M = 2000"]),
+        ("crisp, gamma = 0.1", chapter5.CRISP_SWINGS["gamma = 0.1"]),
+        ("crisp, M = 2000", chapter5.CRISP_SWINGS["M = 2000"]),
     ):
-        shares = np.mean([m.structure for m in torque_maps(results, study)], axis=0)
+        shares = np.mean(
+            [m.structure for m in measures.torque_maps(results, study)], axis=0
+        )
         found[label] = ", ".join(f"{share:.0%}" for share in shares)
     return Tried(
         "same action as the neighbour, drives near hanging, brakes near upright, in "
@@ -136,7 +129,7 @@ def _structures(results: Results) -> Tried:
 
 
 def _coasting(results: Results) -> Tried:
-    maps = torque_maps(results, pendulum("fuzzy"))
+    maps = measures.torque_maps(results, pendulum("fuzzy"))
     idle = [(each.along <= 0)[each.leaving_upright].mean() for each in maps]
     slow = [
         (each.along < 0)[each.leaving_upright & (each.speed <= 3.0)].mean()
@@ -155,7 +148,7 @@ def _for(kind: str, *functions: Callable[[str, Results], Tried]) -> tuple[Attemp
 
 
 def _for_each_change(kind: str) -> tuple[Attempt, ...]:
-    return tuple(partial(_gammas, kind, name) for name in CHANGED)
+    return tuple(partial(_gammas, kind, name) for name in chapter5.CHANGED)
 
 
 C13 = _for("crisp", _longer, _first_below, _spikes)
@@ -163,7 +156,7 @@ C14 = _for("fuzzy", _spikes, _longer, _first_below)
 C15 = (*_for_each_change("crisp"), *_for("crisp", _best_of_run))
 C16 = (*_for_each_change("fuzzy"), *_for("fuzzy", _best_of_run))
 C18: tuple[Attempt, ...] = (
-    *(partial(_swung_with, name) for name in CHANGED),
+    *(partial(_swung_with, name) for name in chapter5.CHANGED),
     _all_turns,
 )
 C19 = (_more_ants, _median_trials)

@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 
 from acl_gym.experiments.claims import Claim, Part, Tried
 from acl_gym.experiments.results import Results
-from acl_gym.experiments.statistics import Estimate, digits, estimate, ratio
+from acl_gym.experiments.statistics import digits, estimate, ratio
 from acl_gym.experiments.study import Experiment, Study
 from acl_gym.utils.typing import FloatArray
 
@@ -100,40 +100,30 @@ def listed(values: Mapping[Any, Any], between: str = ", ") -> str:
 def below_one(statement: str, first: FloatArray, second: FloatArray) -> Part:
     """A statement that holds if the interval of a ratio lies below 1."""
     found = ratio(first, second)
-    words = f"{statement}: the interval of the ratio lies below 1"
-    return Part(words, str(found), found.high < 1)
+    statement += ": the interval of the ratio lies below 1"
+    return Part(statement, str(found), found.high < 1)
 
 
 def above_one(statement: str, first: FloatArray, second: FloatArray) -> Part:
     """A statement that holds if the interval of a ratio lies above 1."""
     found = ratio(first, second)
-    words = f"{statement}: the interval of the ratio lies above 1"
-    return Part(words, str(found), found.low > 1)
-
-
-def at_least(bound: float, statement: str, found: Estimate) -> Part:
-    """A statement that holds if an estimate is at least a bound, named in its words."""
-    return Part(statement, str(found), found.value >= bound)
-
-
-def at_most(bound: float, statement: str, found: Estimate) -> Part:
-    """A statement that holds if an estimate is at most a bound, named in its words."""
-    return Part(statement, str(found), found.value <= bound)
+    statement += ": the interval of the ratio lies above 1"
+    return Part(statement, str(found), found.low > 1)
 
 
 def claim(
-    name: str,
-    section: str,
-    text: str,
-    tried: Iterable[Attempt] = (),
-    understanding: str = "",
+    section: str, text: str, tried: Iterable[Attempt] = (), understanding: str = ""
 ) -> Callable[[Decide], Claim]:
-    """Make a claim of the function that yields its statements; see `claims.Claim`."""
+    """Make a claim, see `claims.Claim`, of a function that yields its statements.
+
+    Its name is that of the function: C1 of `_c1`.
+    """
 
     def made(decide: Decide) -> Claim:
         def parts(results: Results) -> list[Part]:
             return list(decide(results))
 
+        name = decide.__name__.lstrip("_").upper()
         return Claim(name, text, section, parts, tuple(tried), understanding)
 
     return made

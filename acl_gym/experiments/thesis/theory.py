@@ -93,7 +93,7 @@ def _one_ant() -> list[tuple[float, Study, float]]:
     return found
 
 
-@claim("C21", "§3.4.5", "The levels stay between tau0 and the bound of eq. (3.23).")
+@claim("§3.4.5", "The levels stay between tau0 and the bound of eq. (3.23).")
 def _c21(results: Results) -> Iterator[Part]:
     lowest, highest = math.inf, 0.0
     for study in (*_BAND.values(), *_GAPS.values()):
@@ -119,7 +119,6 @@ def _over_more_trials(results: Results) -> Tried:
 
 
 @claim(
-    "C22",
     "§3.4.7",
     "For one ant the mean level converges to the limit of §3.4.7.",
     (_over_more_trials,),
@@ -151,7 +150,6 @@ def _each_gap(results: Results) -> Tried:
 
 
 @claim(
-    "C23",
     "§3.4.8",
     "Delta > 0 predicts a settled policy on the two-state system of Figure 3.2.",
     (_each_gap,),

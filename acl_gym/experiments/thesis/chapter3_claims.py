@@ -16,7 +16,7 @@ from acl_gym.experiments.statistics import estimate, rank_correlation, ratio
 from acl_gym.experiments.study import Study
 from acl_gym.experiments.systems import GRID_STATES, grid_1d, grid_2d
 from acl_gym.experiments.thesis import chapter3
-from acl_gym.experiments.thesis.common import LATE, centres, claim, listed
+from acl_gym.experiments.thesis.common import LATE, centres, claim, listed, percentages
 from acl_gym.planning.model import TabularModel
 from acl_gym.planning.value_iteration import policy_value, value_iteration
 from acl_gym.utils.typing import BoolArray, FloatArray, IntArray
@@ -75,7 +75,7 @@ def _read_as(reading: str, results: Results) -> Tried:
         gamma: estimate(results.values(study).mean(axis=1))
         for gamma, study in {0.0: grid_1d(), **chapter3.READ_AS[reading]}.items()
     }
-    what = f"the local update read as {reading}: mean cost over the trials, by gamma"
+    what = f"local update {reading}: mean cost over the trials, by gamma"
     return Tried(what, listed(found))
 
 
@@ -103,18 +103,16 @@ def _every_run(results: Results) -> Tried:
 
 
 def _costs_with(choice: str, results: Results) -> Tried:
-    found = {
-        f"p = {p:g}": f"{estimate(exact_costs(results, study))} (optimum "
-        f"{optimal_cost(study):.2f})"
-        for p, study in chapter3.CHOICES[choice].items()
-    }
+    found = {}
+    for p, study in chapter3.CHOICES[choice].items():
+        cost, optimum = estimate(exact_costs(results, study)), optimal_cost(study)
+        found[f"p = {p:g}"] = f"{cost} (optimum {optimum:.2f})"
     return Tried(f"{choice}: cost of the last policy", listed(found))
 
 
 def _agreement_with(choice: str, results: Results) -> Tried:
-    low, high = (
-        best_actions(results, study) for study in chapter3.CHOICES[choice].values()
-    )
+    studies = chapter3.CHOICES[choice].values()
+    low, high = (best_actions(results, study) for study in studies)
     return Tried(
         f"{choice}: cells with the same action at both p, of all cells; and in two "
         "runs at one p",
@@ -124,9 +122,8 @@ def _agreement_with(choice: str, results: Results) -> Tried:
 
 
 def _within(share: float, results: Results) -> Tried:
-    trials = {
-        each: trials_to(results, s, share) for each, s in chapter3.COVERED.items()
-    }
+    studies = chapter3.COVERED
+    trials = {each: trials_to(results, s, share) for each, s in studies.items()}
     found = {f"{s}, {a:.0%}": f"{np.median(t):g}" for (s, a), t in trials.items()}
     return Tried(f"median trials until within {share:.0%} of the end", listed(found))
 
@@ -171,11 +168,9 @@ def _c3(results: Results) -> Iterator[Part]:
     "0.5.",
 )
 def _c4(results: Results) -> Iterator[Part]:
+    studies = {gamma: grid_1d(local_decay=gamma) for gamma in (0.0, *chapter3.GAMMAS)}
     # The mean over the trials is low where learning is both fast and good.
-    means = {
-        gamma: results.values(grid_1d(local_decay=gamma)).mean(axis=1)
-        for gamma in (0.0, *chapter3.GAMMAS)
-    }
+    means = {gamma: results.values(s).mean(axis=1) for gamma, s in studies.items()}
     costs = centres(means)
     yield Part(
         "no gamma has a lower mean cost over the trials than gamma = 0: no interval of "
@@ -200,16 +195,11 @@ def _c5(results: Results) -> Iterator[Part]:
     reached = [optimal(results, grid_1d(ants)) for ants in (1, 5, 9)]
     first = [float(np.median(settled_from(each))) for each in reached]
     ends = [float(each[:, -1].mean()) for each in reached]
-    yield Part(
-        "the median trial from which on J = 5 falls from 1 to 5 to 9 ants",
-        ", ".join(f"{each:g}" for each in first),
-        first[0] > first[1] > first[2],
-    )
-    yield Part(
-        "with each number of ants at least 95% of the runs end at J = 5",
-        ", ".join(f"{each:.0%}" for each in ends),
-        min(ends) >= 0.95,
-    )
+    statement = "the median trial from which on J = 5 falls from 1 to 5 to 9 ants"
+    measured = ", ".join(f"{each:g}" for each in first)
+    yield Part(statement, measured, first[0] > first[1] > first[2])
+    statement = "with each number of ants at least 95% of the runs end at J = 5"
+    yield Part(statement, percentages(ends), min(ends) >= 0.95)
 
 
 @claim(
@@ -243,22 +233,14 @@ def _c7(results: Results) -> Iterator[Part]:
     values = optimum.action_values[free]
     best = values >= values.max(axis=1, keepdims=True) - 1e-6
     cells = free[best.sum(axis=1) == 1]
-    low, high = (
-        best_actions(results, grid_2d(p=p))[:, cells]
-        for p in chapter3.TWO_PROBABILITIES
-    )
+    low, high = (best_actions(results, grid_2d(p=p))[:, cells] for p in (0.5, 0.9))
     between = float((low == high).mean())
     within = (agreement(low) + agreement(high)) / 2
-    yield Part(
-        "where one action is best, the policies agree in at least 90% of the cells",
-        f"{between:.0%}",
-        between >= 0.9,
-    )
-    yield Part(
-        "they agree as often as two runs at one p, within 5 percentage points",
-        f"{between:.0%} against {within:.0%}",
-        between >= within - 0.05,
-    )
+    statement = "where one action is best, the policies agree in at least 90% of cells"
+    yield Part(statement, f"{between:.0%}", between >= 0.9)
+    statement = "they agree as often as two runs at one p, within 5 percentage points"
+    measured = f"{between:.0%} against {within:.0%}"
+    yield Part(statement, measured, between >= within - 0.05)
 
 
 @claim(
@@ -271,19 +253,21 @@ def _c7(results: Results) -> Iterator[Part]:
 def _c8(results: Results) -> Iterator[Part]:
     trials = {each: trials_to(results, s, 0.05) for each, s in chapter3.COVERED.items()}
     for size in GRID_STATES:
-        statement = (
-            f"{size}: a fifth of the ants needs at least 1.5 times as many trials until "
-            "the cost first comes within 5% of its end"
-        )
         found = ratio(trials[size, 0.2], trials[size, 1.0])
-        yield Part(statement, str(found), found.value >= 1.5)
-    for share in chapter3.SHARES:
-        statement = (
-            f"ants as {share:.0%} of the states: 7.4 times as many states need at most "
-            "twice as many trials"
+        yield Part(
+            f"{size}: a fifth of the ants needs at least 1.5 times as many trials until "
+            "the cost first comes within 5% of its end",
+            str(found),
+            found.value >= 1.5,
         )
+    for share in chapter3.SHARES:
         found = ratio(trials["31x31", share], trials["11x11", share])
-        yield Part(statement, str(found), found.value <= 2.0)
+        yield Part(
+            f"ants as {share:.0%} of the states: 7.4 times as many states need at most "
+            "twice as many trials",
+            str(found),
+            found.value <= 2.0,
+        )
 
 
 CLAIMS = (_c1, _c2, _c3, _c4, _c5, _c6, _c7, _c8)

@@ -59,15 +59,20 @@ _PLANNED = (
 )
 
 
-def reference(cost: str, rule: str = "bounds") -> Study:
-    """Fuzzy Q-iteration on the cells of the fuzzy study."""
-    return planned(navigation(cost, "fuzzy", rule))
+def reference(cost: str, kind: str = "fuzzy", rule: str = "bounds") -> Study:
+    """Fuzzy Q-iteration on the cells of a study."""
+    return planned(navigation(cost, kind, rule))
 
 
 def _figure(
-    number: int, cost: str, title: str, text: str, claims: str = "", **options: str
+    number: int,
+    cost: str,
+    title: str,
+    text: str,
+    claims: str = "",
+    plot: str = "bands",
+    **options: str,
 ) -> Experiment:
-    plot = {_POLICIES: "policies", _PLANNED: "baseline"}.get(text, "bands")
     kinds = ("fuzzy",) if plot == "baseline" else KINDS
     compared = "C11" in claims or "C12" in claims
     return experiment(
@@ -89,12 +94,12 @@ EXPERIMENTS = (
     _figure(6, "quadratic", "cost of the policy", _GOAL, "C9 C11"),
     _variation(7, "quadratic", text=_VARIATION, claims="C10"),
     _sensitivity(8, "quadratic", text=_SENSITIVITY, claims="C10"),
-    _figure(9, "quadratic", "best policies", _POLICIES),
-    _figure(10, "quadratic", "fuzzy Q-iteration", _PLANNED, "C11"),
+    _figure(9, "quadratic", "best policies", _POLICIES, plot="policies"),
+    _figure(10, "quadratic", "fuzzy Q-iteration", _PLANNED, "C11", "baseline"),
     _figure(11, "time", "cost of the policy", _GOAL, "C12"),
     _variation(12, "time", text=_VARIATION),
-    _figure(13, "time", "best policies", _POLICIES, "C12"),
-    _figure(14, "time", "fuzzy Q-iteration", _PLANNED, "C12"),
+    _figure(13, "time", "best policies", _POLICIES, "C12", "policies"),
+    _figure(14, "time", "fuzzy Q-iteration", _PLANNED, "C12", "baseline"),
     experiment(
         *("navigation-rules", "Navigation under the other goal rule", "§4.3.2"),
         studies={
@@ -103,7 +108,7 @@ EXPERIMENTS = (
             for kind in KINDS
         },
         references={
-            "quadratic, fuzzy Q-iteration": reference("quadratic", "membership")
+            "quadratic, fuzzy Q-iteration": reference("quadratic", rule="membership")
         },
         explains="C9 C10 C11 C12",
         text="The goal is reached where its membership function exceeds 0.5 (§4.3.2), "
@@ -177,30 +182,25 @@ def _sensitivities(rule: str, results: Results) -> Tried:
         study = navigation("quadratic", kind, rule)
         mean = results.values(study, "sensitivity").mean(axis=0)
         low = int(mean.argmin())
-        found[kind] = (
-            f"{mean[0]:.2f} at first, lowest {mean[low]:.2f} after {low + 1} trials, "
-            f"{mean[-1]:.2f} at the end"
-        )
+        lowest = f"lowest {mean[low]:.2f} after {low + 1} trials"
+        found[kind] = f"{mean[0]:.2f} at first, {lowest}, {mean[-1]:.2f} at the end"
     return Tried(f"the course of the sensitivity, {RULES[rule]}", listed(found, "; "))
 
 
 def _cheapest(results: Results) -> Tried:
     found = {}
     for rule in RULES:
+        study, planner = (
+            f("quadratic", "fuzzy", rule) for f in (navigation, reference)
+        )
+        cost = results.last(planner)[0]
+        last = estimate(late_cost(results, study) / cost)
+        best = estimate(results.values(study).min(axis=1) / cost)
         ours, theirs = (
-            navigation("quadratic", "fuzzy", rule),
-            reference("quadratic", rule),
+            results.last(s, "success_rate").mean() for s in (study, planner)
         )
-        cost = results.last(theirs)[0]
-        last = estimate(late_cost(results, ours) / cost)
-        best = estimate(results.values(ours).min(axis=1) / cost)
-        arrive, planned_ones = (
-            results.last(study, "success_rate").mean() for study in (ours, theirs)
-        )
-        found[rule] = (
-            f"last {last}, best {best}; {arrive:.0%} of the starts arrive against "
-            f"{planned_ones:.0%}"
-        )
+        arrive = f"{ours:.0%} of the starts arrive against {theirs:.0%}"
+        found[rule] = f"last {last}, best {best}; {arrive}"
     return Tried(
         "both goal rules; cost of the last and of the best policies over that of fuzzy "
         "Q-iteration",
@@ -225,9 +225,10 @@ def _arrivals(results: Results) -> Tried:
         f"{kind}, {rule}": navigation("time", kind, rule)
         for rule in RULES
         for kind in FUZZY_FIRST
-    } | {"fuzzy Q-iteration": reference("time")}
+    }
+    studies["fuzzy Q-iteration"] = reference("time")
     shares = {s: results.last(each, "success_rate") for s, each in studies.items()}
-    found = {study: f"{share.mean():.0%}" for study, share in shares.items()}
+    found = {label: f"{share.mean():.0%}" for label, share in shares.items()}
     what = "starts from which the last policies arrive, both goal rules"
     return Tried(what, listed(found))
 
@@ -304,19 +305,18 @@ def _c11(results: Results) -> Iterator[Part]:
     "(docs/reproduction.md).",
 )
 def _c12(results: Results) -> Iterator[Part]:
-    study, planned_study = navigation("time", "fuzzy"), reference("time")
-    fuzzy, crisp = (
+    study = navigation("time", "fuzzy")
+    fuzzy, crisp, q_iteration = (
         restore_policy(each, results.runs(each)[results.best_run(each)])
-        for each in (study, navigation("time", "crisp"))
+        for each in (study, navigation("time", "crisp"), reference("time"))
     )
     steps, make_env = study.task.longest_evaluation, study.task.make_system_env
     statement = f"the fuzzy policies of the last {LATE} trials cost less than the crisp"
     yield below_one(statement, *late_costs(results, "time"))
-    arrival = evaluate_policy_cost(fuzzy, make_env(study.slots), max_steps=steps)
     statement = "the best fuzzy policy reaches the goal from at least 90% of the starts"
-    arrive = arrival.success_rate
+    starts = evaluate_policy_cost(fuzzy, make_env(study.slots), max_steps=steps)
+    arrive = starts.success_rate
     yield Part(statement, f"{arrive:.0%}", arrive >= 0.9)
-    q_iteration = restore_policy(planned_study, results.runs(planned_study)[0])
     ours, theirs = (mean_damping(policy, study) for policy in (fuzzy, q_iteration))
     yield Part(
         "the mean damping on the paths of the best fuzzy policy is at most 1.1 times "

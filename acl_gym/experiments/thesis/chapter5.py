@@ -50,7 +50,7 @@ LIMITS = {
     for limit in (7.0, 15.0)
 }
 UPDATES = {
-    f"the local update read as {reading}": {
+    f"local update {reading}": {
         pair: study.with_settings(update=update) for pair, study in _PAIRS.items()
     }
     for reading, update in READINGS.items()
@@ -82,7 +82,7 @@ def _panels(
     changed: Mapping[str, Mapping[tuple[str, float], Study]],
 ) -> dict[str, Study]:
     panels = {
-        f"{kind}, {name.rpartition(' read as ')[2]}, gamma = {gamma:g}": study
+        f"{kind}, {name}, gamma = {gamma:g}": study
         for name, studies in changed.items()
         for (kind, gamma), study in studies.items()
     }

@@ -17,7 +17,6 @@ from acl_gym.experiments.statistics import (
 from acl_gym.experiments.systems import pendulum
 from acl_gym.experiments.thesis import chapter5
 from acl_gym.experiments.thesis import chapter5_measures as measures
-from acl_gym.experiments.thesis import chapter5_tried as tried
 from acl_gym.experiments.thesis.common import (
     FUZZY_FIRST,
     NEARLY_ONE,
@@ -33,7 +32,7 @@ from acl_gym.experiments.thesis.common import (
     "§5.3.1",
     "Crisp ACL does not converge for rho = 0, 0.5 and 1; rho = 0.001 is best; rho = "
     "0.1 settles at a higher cost.",
-    tried.C13,
+    measures.TRIED_C13,
     "With rho = 0.1 a hundred trials are too few: the colony is still improving, and "
     "settles later.",
 )
@@ -57,7 +56,7 @@ def _c13(results: Results) -> Iterator[Part]:
 @claim(
     "§5.3.1",
     "Fuzzy ACL converges for every rho > 0, also for 1.",
-    tried.C14,
+    measures.TRIED_C14,
     "What swings are single trials whose greedy policy hovers beside the goal "
     "(docs/hovering.md); the cost between them stays the same. More trials do not end "
     "that.",
@@ -73,7 +72,7 @@ def _c14(results: Results) -> Iterator[Part]:
 @claim(
     "§5.3.2",
     "For crisp ACL gamma = 0.1 is clearly best; gamma = 0.5 and 1 do not converge.",
-    tried.C15,
+    measures.TRIED_C15,
     "Only one change restores the thesis's result: how often the level of a pair "
     "decays. The local update, eq. (4.12), as it is written decays it at each visit "
     "of each ant. If it decays once for each ant that has been there, as in the total "
@@ -102,7 +101,7 @@ def _c15(results: Results) -> Iterator[Part]:
 @claim(
     "§5.3.2",
     "For fuzzy ACL gamma matters little; 0.1 is slightly best.",
-    tried.C16,
+    measures.TRIED_C16,
     "As for C15: where a pair decays once an ant, or once a trial, gamma matters "
     "little up to 0.1.",
 )
@@ -156,7 +155,7 @@ def _c17(results: Results) -> Iterator[Part]:
     "§5.3",
     "From hanging at rest the best fuzzy policy swings up within about 3 s (gamma = "
     "0.01) and 2 s (gamma = 0.1); the best crisp policies swing more often before.",
-    tried.C18,
+    measures.TRIED_C18,
     "The best of the policies are as fast as the thesis says, and so is the best "
     "crisp one with rho = 0.001, which swings more in the thesis; the typical run "
     "with gamma = 0.1 is slower than in the thesis, see C15.",
@@ -189,7 +188,7 @@ def _c18(results: Results) -> Iterator[Part]:
     "§5.3.4",
     "With finer cells crisp ACL gains little past N = 32; fuzzy ACL gains steadily "
     "and is nearly without spread at N = 64.",
-    tried.C19,
+    measures.TRIED_C19,
     "Past N = 32 fuzzy ACL has nothing more to gain here, also with as many ants on "
     "every partition. With the median of the last ten trials, which leaves out single "
     "trials of hovering policies (docs/hovering.md), a small gain from 32 to 64 "
@@ -218,14 +217,13 @@ def _c19(results: Results) -> Iterator[Part]:
     "§5.3",
     "The fuzzy policy is structured (it destabilises near hanging and stabilises near "
     "upright), the crisp one is noisy.",
-    tried.C20,
+    measures.TRIED_C20,
     "The figure of the thesis shows cells from which the pendulum can be caught: "
     "there the fuzzy policy brakes. Where the pendulum moves away faster than the "
     "torque can stop it, braking gains nothing.",
 )
 def _c20(results: Results) -> Iterator[Part]:
-    maps = [measures.torque_maps(results, pendulum(kind)) for kind in FUZZY_FIRST]
-    fuzzy, crisp = (np.transpose([each.structure for each in of]) for of in maps)
+    fuzzy, crisp = (measures.structure(results, pendulum(kind)) for kind in FUZZY_FIRST)
     statement = "neighbouring cells agree more often in fuzzy than in crisp policies"
     yield above_one(statement, fuzzy[0], crisp[0])
     statement = "fuzzy: near hanging the torque drives the motion in 80% of the cells"

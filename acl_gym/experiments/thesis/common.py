@@ -97,6 +97,11 @@ def listed(values: Mapping[Any, Any], between: str = ", ") -> str:
     return between.join(f"{number(key)}: {text}" for key, text in texts.items())
 
 
+def percentages(shares: Iterable[float]) -> str:
+    """Shares in one line."""
+    return ", ".join(f"{share:.0%}" for share in shares)
+
+
 def below_one(statement: str, first: FloatArray, second: FloatArray) -> Part:
     """A statement that holds if the interval of a ratio lies below 1."""
     found = ratio(first, second)

@@ -12,7 +12,13 @@ from acl_gym.experiments.claims import Part, Tried
 from acl_gym.experiments.results import Results
 from acl_gym.experiments.study import Study
 from acl_gym.experiments.systems import two_state
-from acl_gym.experiments.thesis.common import claim, experiment, listed, sweep
+from acl_gym.experiments.thesis.common import (
+    claim,
+    experiment,
+    listed,
+    percentages,
+    sweep,
+)
 from acl_gym.utils.typing import BoolArray
 
 ANTS = (1, 2, 8)
@@ -75,11 +81,8 @@ def gap(study: Study) -> float:
 
 def kept(results: Results, study: Study) -> BoolArray:
     """Whether the optimal action leads in q' over the last trials, `(runs,)`."""
-    best, second = (
-        results.values(study, name)[:, -LIMIT:]
-        for name in ("level_best", "level_second")
-    )
-    return np.asarray((best > second).all(axis=1))
+    best, second = (results.values(study, f"level_{n}") for n in ("best", "second"))
+    return np.asarray((best > second)[:, -LIMIT:].all(axis=1))
 
 
 def _one_ant() -> list[tuple[float, Study, float]]:
@@ -161,14 +164,11 @@ def _c23(results: Results) -> Iterator[Part]:
     yield Part(
         "where Delta > 0, at least nine of ten runs keep the optimal action in q' over "
         f"the last {LIMIT} trials",
-        ", ".join(f"{each:.0%}" for each in positive) + " of the runs",
+        f"{percentages(positive)} of the runs",
         min(positive) >= 0.9,
     )
-    yield Part(
-        "where Delta < 0, fewer do so in at least one study",
-        ", ".join(f"{each:.0%}" for each in negative) + " of the runs",
-        min(negative) < 0.9,
-    )
+    statement = "where Delta < 0, fewer do so in at least one study"
+    yield Part(statement, f"{percentages(negative)} of the runs", min(negative) < 0.9)
 
 
 CLAIMS = (_c21, _c22, _c23)

@@ -14,6 +14,9 @@ from acl_gym.experiments.thesis import (
     chapter5_claims,
     theory,
 )
+from acl_gym.experiments.thesis.common import FEWER
+
+__all__ = ["CLAIMS", "EXPERIMENTS", "FEWER", "RUNS", "experiments_of", "trials_of"]
 
 RUNS = 30
 """Runs of each study, as in the thesis; their seeds are 0 to 29."""

@@ -238,17 +238,14 @@ def _for(kind: str, *functions: Callable[[str, Results], Tried]) -> tuple[Attemp
     return tuple(partial(function, kind) for function in functions)
 
 
-def _for_each_change(kind: str) -> tuple[Attempt, ...]:
-    return tuple(partial(_gammas, kind, name) for name in chapter5.CHANGED)
+def _for_each_change(function: Callable[..., Tried], *kind: str) -> tuple[Attempt, ...]:
+    return tuple(partial(function, *kind, name) for name in chapter5.CHANGED)
 
 
 TRIED_C13 = _for("crisp", _longer, _first_below, _spikes)
 TRIED_C14 = _for("fuzzy", _spikes, _longer, _first_below)
-TRIED_C15 = (*_for_each_change("crisp"), *_for("crisp", _best_of_run))
-TRIED_C16 = (*_for_each_change("fuzzy"), *_for("fuzzy", _best_of_run))
-TRIED_C18: tuple[Attempt, ...] = (
-    *(partial(_swung_with, name) for name in chapter5.CHANGED),
-    _all_turns,
-)
+TRIED_C15 = (*_for_each_change(_gammas, "crisp"), *_for("crisp", _best_of_run))
+TRIED_C16 = (*_for_each_change(_gammas, "fuzzy"), *_for("fuzzy", _best_of_run))
+TRIED_C18 = (*_for_each_change(_swung_with), _all_turns)
 TRIED_C19 = (_more_ants, _median_trials)
 TRIED_C20 = (_structures, _coasting)

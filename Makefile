@@ -67,10 +67,11 @@ $(PEERS_STAMP): benchmarks/peers-requirements.txt
 test: $(STAMP) ## Run every test
 	$(BIN)/python -m pytest -n $(WORKERS) --dist worksteal $(ARGS)
 
-lint: $(STAMP) ## Check style, format and types
+lint: $(STAMP) ## Check style, format, types and the layers of imports
 	$(BIN)/python -m ruff check .
 	$(BIN)/python -m ruff format --check .
 	$(BIN)/python -m mypy
+	$(BIN)/lint-imports --no-cache --no-logo
 
 format: $(STAMP) ## Put the code into the house format
 	$(BIN)/python -m ruff check --fix-only .

@@ -10,8 +10,7 @@ import numpy as np
 from gymnasium.vector import VectorEnv
 from numpy.typing import ArrayLike
 
-from acl_gym.evaluation import Predictor
-from acl_gym.utils.typing import FloatArray, Row
+from acl_gym.utils.typing import FloatArray, Predictor, Row
 
 
 class Agent(Predictor, Protocol):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from gymnasium.vector import VectorEnv
@@ -15,14 +15,7 @@ from acl_gym.colony.episodes import Episode
 from acl_gym.envs.control.environments import ControlVectorEnv
 from acl_gym.evaluation.rollout import Rollout, require_vector_env
 from acl_gym.policies import PartitionPolicy
-from acl_gym.utils.typing import FloatArray
-
-
-class Predictor(Protocol):
-    """Anything with Stable-Baselines3's `predict`: our agents and theirs."""
-
-    def predict(self, observation: Any, *, deterministic: bool = ...) -> Any:
-        """Return `(actions, state)` for a batch of observations."""
+from acl_gym.utils.typing import FloatArray, Predictor
 
 
 @dataclass(frozen=True)

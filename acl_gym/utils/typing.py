@@ -1,8 +1,8 @@
-"""The kinds of arrays and rows that signatures speak of, each defined once."""
+"""Types that many signatures share: arrays, rows of measures, what predicts."""
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,3 +30,10 @@ Float32Array = NDArray[np.float32]
 
 Row = dict[str, float]
 """The measures of one trial, see `TabularAgent.history`."""
+
+
+class Predictor(Protocol):
+    """Anything with Stable-Baselines3's `predict`: agents and policies, ours or not."""
+
+    def predict(self, observation: Any, *, deterministic: bool = ...) -> Any:
+        """Return `(actions, state)` for a batch of observations."""

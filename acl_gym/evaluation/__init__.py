@@ -1,4 +1,4 @@
-"""Following a policy, and what it costs (3.47)."""
+"""Running a policy and measuring its cost, eq. (3.47)."""
 
 from acl_gym.evaluation.policy_cost import (
     PolicyCost,

@@ -95,7 +95,8 @@ def _train_dqn(
     import torch
     from stable_baselines3.common.callbacks import ConvertCallback
 
-    from acl_gym.sb3.dqn import DQNSettings, PolicyCostCallback, make_dqn, scaled_env
+    from acl_gym.sb3.callback import PolicyCostCallback
+    from acl_gym.sb3.dqn import DQNSettings, make_dqn, scaled_env
 
     torch.set_num_threads(1)  # the fastest for such small networks
     chosen = DQNSettings(**course.settings(method, long_run=budget.long_run))

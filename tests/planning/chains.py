@@ -88,4 +88,4 @@ def vector(table: Table, slots: int, mode: str = "NextStep", **keywords: Any) ->
 
 
 def model(table: Table) -> TabularModel:
-    return TabularModel.of(TableEnv(table))
+    return TabularModel.from_env(TableEnv(table))

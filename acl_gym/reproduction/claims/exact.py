@@ -17,7 +17,7 @@ from acl_gym.utils.typing import FloatArray
 def solved(setting: Setting) -> tuple[Any, Any, Any]:
     """The model, its optimum, and the states that are no goals."""
     env = setting.make_env(1)
-    model = TabularModel.of(env)
+    model = TabularModel.from_env(env)
     optimum = value_iteration(model)
     goals = control_env(env).system.goal_states  # type: ignore[attr-defined]
     return model, optimum, np.setdiff1d(np.arange(len(optimum.values)), goals)

@@ -229,7 +229,8 @@ def _learn_dqn(contest: Contest, seed: int, report: Report) -> Result:
     import torch
     from stable_baselines3.common.callbacks import ConvertCallback
 
-    from acl_gym.sb3.dqn import DQNSettings, PolicyCostCallback, make_dqn, scaled_env
+    from acl_gym.sb3.callback import PolicyCostCallback
+    from acl_gym.sb3.dqn import DQNSettings, make_dqn, scaled_env
 
     torch.set_num_threads(1)  # the fastest for such small networks
     arena = contest.arena

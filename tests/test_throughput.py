@@ -1,4 +1,4 @@
-"""The throughput benchmark runs and prints what was promised; no time is judged."""
+"""The throughput benchmark runs and prints its promised output; no time is judged."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def test_quick_run_prints_json_and_draws(tmp_path: Path) -> None:
     assert figure.stat().st_size > 10_000
 
 
-def test_memory_of_a_trial_is_told() -> None:
+def test_memory_of_a_trial_is_reported() -> None:
     done = run("--memory", "500")
     result = json.loads(done.stdout)
     assert result["n_ants"] == 500

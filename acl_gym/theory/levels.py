@@ -95,7 +95,7 @@ def action_probability_bound(epsilon: ArrayLike, n_actions: ArrayLike) -> FloatA
 
 
 def state_probability_bound(n_states: ArrayLike) -> FloatArray:
-    """1 / |Q|: least probability that an ant visits a state in a trial (Proposition 3.2).
+    """1 / |Q|: least probability that a trial visits a state (Proposition 3.2).
 
     Args:
         n_states: |Q|, the number of possible initial states, >= 1.
@@ -267,7 +267,7 @@ def expected_band(
     global_decay: ArrayLike,
     expected_deposit: ArrayLike,
 ) -> tuple[FloatArray, FloatArray]:
-    """Bounds on the expected level after each update, from tau0 (Propositions 3.8, 3.9).
+    """Bounds on the expected level after each update (Propositions 3.8 and 3.9).
 
     Args:
         n_updates: number of updates, >= 0.

@@ -41,8 +41,8 @@ def set_num_threads(count: int) -> None:
         if count > most:
             raise ValueError(
                 f"count must be at most {most}, got {count}: one thread per core, or "
-                "the value of the environment variable NUMBA_NUM_THREADS; set it before "
-                "Python starts to allow more."
+                "NUMBA_NUM_THREADS where that variable is set; set it before Python "
+                "starts to allow more."
             )
         numba.set_num_threads(count)
     _Setting.count = count

@@ -113,7 +113,11 @@ def test_threads_wake_for_many_ants_only(monkeypatch: pytest.MonkeyPatch) -> Non
     [
         (0, ValueError, "count"),
         (1.5, TypeError, "count"),
-        (10_000, ValueError, r"at most \d+, got 10000: one thread per core, .*NUMBA_NUM"),
+        (
+            10_000,
+            ValueError,
+            r"at most \d+, got 10000: one thread per core, .*NUMBA_NUM",
+        ),
     ],
 )
 def test_a_number_of_threads_that_cannot_be(

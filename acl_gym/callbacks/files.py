@@ -68,8 +68,8 @@ class Checkpoint(Callback):
         )
         trials = sorted(int(match[1]) for match in matches if match)
         # Files of later trials belong to another run and are left alone.
-        ours = [trial for trial in trials if trial <= agent.trials]
-        for trial in ours[: -self.keep]:
+        own = [trial for trial in trials if trial <= agent.trials]
+        for trial in own[: -self.keep]:
             (self.directory / f"trial_{trial:06d}.npz").unlink(missing_ok=True)
 
 

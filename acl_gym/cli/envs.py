@@ -117,7 +117,8 @@ def _docstring(module: str, name: str) -> str:
     spec = importlib.util.find_spec(module)
     if spec is None or spec.origin is None:
         return ""
-    # The package of a system only hands on what its module `env` defines.
+    # The package of a system imports the class from its module `env`. To look up that
+    # module would import the package, and with it Numba.
     source = Path(spec.origin).with_name("env.py")
     tree = ast.parse(source.read_text(encoding="utf-8"))
     for node in tree.body:

@@ -80,11 +80,11 @@ def value_iteration(
     the values that were just computed for the states before it. This needs fewer
     sweeps than (3.42) with two tables and converges to the same values.
 
-    Actions whose values lie within `tolerance` of the best, or within that fraction
-    of it if it exceeds 1, are tied (a decision). Of these the policy takes one from
-    which an end may come soonest, and the first of those. Without a discount this
-    matters: where only the goal is rewarded, to stand still for ever is tied with
-    going there. A policy of best actions that always ends is an optimal one.
+    Actions whose values lie within `tolerance` of the best, or within that fraction of
+    the best if it exceeds 1, count as tied (our choice). The policy takes the tied
+    action from which an episode can end soonest, and the first of several. This matters
+    without a discount: if only the goal is rewarded, standing still forever is tied with
+    going to the goal. A policy of best actions is optimal if its episodes always end.
 
     Args:
         model: the model, or an environment for `TabularModel.from_env`.

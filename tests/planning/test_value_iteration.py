@@ -189,7 +189,7 @@ END = [(1.0, 0, -1.0, True)]
 @pytest.mark.parametrize(
     ("states", "expected"),
     [
-        # 1 stands still for ever at a cost; 2 may come to it, 3 cannot.
+        # 1 stands still forever at a cost; 2 may come to it, 3 cannot.
         (
             [
                 END,
@@ -295,8 +295,8 @@ def test_the_policy_takes_the_actions_found() -> None:
 
 def test_models_of_this_package_are_those_of_the_system() -> None:
     """Any environment whose system has `outcomes()`, single or vector."""
-    told = model(corridor(4, success=0.5))
-    arrays = (told.probability, told.next_state, told.reward, told.terminated)
+    built = model(corridor(4, success=0.5))
+    arrays = (built.probability, built.next_state, built.reward, built.terminated)
     for kind in (gym.Env, gym.vector.VectorEnv):
         env: Any = kind()
         env.system = SimpleNamespace(outcomes=lambda: arrays)
@@ -307,7 +307,7 @@ def test_models_of_this_package_are_those_of_the_system() -> None:
         read = TabularModel.from_env(env)
         assert (read.first_state, read.first_action) == (3, 7)
         for name in ("probability", "next_state", "reward", "terminated"):
-            np.testing.assert_array_equal(getattr(read, name), getattr(told, name))
+            np.testing.assert_array_equal(getattr(read, name), getattr(built, name))
 
 
 def test_tables_are_padded_by_outcomes_that_never_happen() -> None:

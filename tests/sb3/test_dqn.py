@@ -247,7 +247,7 @@ def test_saved_and_loaded_by_stable_baselines(tmp_path: Path) -> None:
 
 
 class TestFiniteObservations:
-    """On the grids a state is a number, and the network is told which."""
+    """On the grids a state is a number, which the network sees one-hot."""
 
     def test_observations_stay_as_they_are(self):
         env = scaled_env("acl_gym/GridSearch1D-v0", 3, n_states=6)

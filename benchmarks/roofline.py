@@ -18,6 +18,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from figure_style import WIDTH, in_style
+from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter, ScalarFormatter
 from numba import njit
 from rich.console import Console
@@ -27,7 +29,6 @@ from acl_gym.colony import selection
 from acl_gym.colony.pheromone import Pheromone
 from acl_gym.colony.solutions import Solutions
 from acl_gym.envs import navigation, pendulum
-from acl_gym.experiments import drawing
 from acl_gym.partitions import Fuzzy
 from acl_gym.partitions.kernels import written_out
 
@@ -240,23 +241,23 @@ def measure(arithmetic: float, bandwidth: float) -> list[Result]:
     return results
 
 
+@in_style
 def draw_roofline(
     results: list[Result], arithmetic: float, bandwidth: float, path: Path
 ) -> None:
     """Draw operations per second over operations per byte, under the two limits."""
-    figure = drawing.new_figure(3.6, 6.4)
+    figure = Figure(figsize=(6.4, 3.6))
     ax = figure.subplots()
-    drawing.prepare(ax)
     x = np.geomspace(0.05, 20, 200)
     ax.loglog(x, np.minimum(arithmetic, x * bandwidth) / 1e9, color="0.2", linewidth=1)
     ax.annotate(
         f"arithmetic: {arithmetic / 1e9:.0f} billion operations per second",
-        (19, arithmetic / 1e9 * 1.12), ha="right", fontsize=drawing.TINY,
+        (19, arithmetic / 1e9 * 1.12), ha="right",
     )  # fmt: skip
     ax.annotate(
         f"cache: {bandwidth / 1e9:.0f} GB/s", (0.06, 0.06 * bandwidth / 1e9),
         xytext=(-4, 8), textcoords="offset points", rotation=45, va="bottom",
-        rotation_mode="anchor", transform_rotates_text=True, fontsize=drawing.TINY,
+        rotation_mode="anchor", transform_rotates_text=True,
     )  # fmt: skip
     colors = ("#D55E00", "#0072B2", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
     for number, result in enumerate(results):
@@ -271,20 +272,18 @@ def draw_roofline(
         left = nearest.kernel.operations / nearest.kernel.nbytes > intensity
         ax.annotate(
             str(number + 1), (intensity, rate), xytext=(-5 if left else 5, -3),
-            ha="right" if left else "left", textcoords="offset points",
-            fontsize=drawing.SMALL, color=color,
+            ha="right" if left else "left", textcoords="offset points", color=color,
         )  # fmt: skip
     ax.set_yticks([1, 2, 5, 10, 20, 50])
     ax.set_ylim(1.0, 1.6 * arithmetic / 1e9)
     for axis in (ax.xaxis, ax.yaxis):
         axis.set_major_formatter(ScalarFormatter())
         axis.set_minor_formatter(NullFormatter())
-    ax.tick_params(labelsize=drawing.TINY)
     names = [f"{n + 1}  {r.kernel.name}" for n, r in enumerate(results)]
-    figure.text(1.01, 0.5, "\n".join(names), fontsize=drawing.TINY, va="center",
+    figure.text(1.01, 0.5, "\n".join(names), va="center",
                 linespacing=1.7)  # fmt: skip
-    ax.set_xlabel("operations per byte", fontsize=drawing.SMALL)
-    ax.set_ylabel("billion operations per second", fontsize=drawing.SMALL)
+    ax.set_xlabel("operations per byte")
+    ax.set_ylabel("billion operations per second")
     figure.savefig(path, dpi=200, bbox_inches="tight")
 
 
@@ -298,21 +297,21 @@ def _apart(one: Result, other: Result) -> float:
     return float(np.hypot(*np.log(ratios)))
 
 
+@in_style
 def draw_scaling(path: Path) -> None:
     """Draw the cost over ants, actions, cells per state, and cells of the table."""
-    figure = drawing.new_figure(4.6)
+    figure = Figure(figsize=(WIDTH, 4.6))
     axes = figure.subplots(2, 2)
     colors = {"locate": "#0072B2", "select": "#D55E00", "decay": "#009E73"}
 
     def panel(ax: Any, unit: str, label: str, xs: Any, make: Any, scale: float) -> None:
-        drawing.prepare(ax)
         made = [make(x) for x in xs]
         runs = [getattr(ants, name) for name in colors for ants in made]
         times = np.reshape(seconds(*runs), (len(colors), len(xs))) * scale
         for (name, color), ys in zip(colors.items(), times, strict=True):
             ax.plot(xs, ys, marker=".", color=color, linewidth=1.2, label=name)
-        ax.set_ylabel(unit, fontsize=drawing.SMALL)
-        ax.set_xlabel(label, fontsize=drawing.SMALL)
+        ax.set_ylabel(unit)
+        ax.set_xlabel(label)
         ax.set_ylim(bottom=0)
         ax.set_xlim(left=0)
 
@@ -323,7 +322,6 @@ def draw_scaling(path: Path) -> None:
     panel(axes[1, 0], "ns per ant-step", "cells per state, 2$^d$", [2, 4, 8, 16],
           lambda k: Ants(k.bit_length() - 1, 3), 1e9 / ANTS)  # fmt: skip
     ax = axes[1, 1]
-    drawing.prepare(ax)
     cells = [20, 40, 100, 200, 400, 800]
     trials = [Trial(n, walked=20) for n in cells] + [Trial(n) for n in cells]
     times = seconds(*(trial.deposit for trial in trials))
@@ -335,14 +333,12 @@ def draw_scaling(path: Path) -> None:
             [n * n for n in cells], np.array(ys) / trials[0].n_steps * 1e9, style,
             marker=".", color="#882255", linewidth=1.2, label=label,
         )  # fmt: skip
-    ax.legend(title="ants walk", fontsize=drawing.TINY, title_fontsize=drawing.TINY,
-              frameon=False)  # fmt: skip
+    ax.legend(title="ants walk")
     ax.set_ylim(bottom=0)
-    ax.set_ylabel("deposit: ns per ant-step", fontsize=drawing.SMALL)
-    ax.set_xlabel("cells of the table", fontsize=drawing.SMALL)
+    ax.set_ylabel("deposit: ns per ant-step")
+    ax.set_xlabel("cells of the table")
     handles, labels = axes[0, 0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper center", ncols=3, frameon=False,
-                  fontsize=drawing.TINY)  # fmt: skip
+    figure.legend(handles, labels, loc="outside upper center", ncols=3)
     figure.savefig(path, dpi=200)
 
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
+from figure_style import WIDTH, in_style
+from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-
-from acl_gym.experiments import drawing
 
 PANELS = ("pendulum", "navigation", "grid-1d", "grid-2d")
 PEER_SLOTS = 2_048  # close to the 2,000 of the curves; measured for the ratios only
@@ -21,6 +21,7 @@ CURVES = {
 }
 
 
+@in_style
 def draw(cases: list[dict[str, Any]], path: str) -> None:
     """Write the figure; the suffix of the path selects the format."""
     systems = [name for name in PANELS if any(case["system"] == name for case in cases)]
@@ -30,14 +31,13 @@ def draw(cases: list[dict[str, Any]], path: str) -> None:
         )
     rows = (len(systems) + 1) // 2
     columns = min(2, len(systems))
-    figure = drawing.new_figure(0.5 + 2.4 * rows, 3.6 * columns)
+    figure = Figure(figsize=(0.5 * WIDTH * columns, 0.5 + 2.4 * rows))
     axes = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True)
     used: dict[str, Line2D] = {}
     for ax, system in zip(axes.flat, systems, strict=False):
-        drawing.prepare(ax)
         ax.set_xscale("log")
         ax.set_yscale("log")
-        ax.set_title(system, fontsize=drawing.SMALL, loc="left")
+        ax.set_title(system, loc="left")
         own = [case for case in cases if case["system"] == system]
         for pattern, (label, color, dashes) in CURVES.items():
             part = pattern.format(system=system)
@@ -58,23 +58,15 @@ def draw(cases: list[dict[str, Any]], path: str) -> None:
             used[label] = line
         _peers(ax, cases, used, own_panel=system == "pendulum")
     for ax in axes[:, 0]:
-        ax.set_ylabel("slot-steps per second", fontsize=drawing.SMALL)
+        ax.set_ylabel("slot-steps per second")
     for ax in axes[-1]:
-        ax.set_xlabel("ants or slots", fontsize=drawing.SMALL)
+        ax.set_xlabel("ants or slots")
     for ax in axes.flat[len(systems) :]:
         ax.set_visible(False)
-    handles = [
-        Line2D([], [], color=line.get_color(), linestyle=line.get_linestyle(),
-               marker=line.get_marker(), markersize=4, label=label)
-        for label, line in used.items()
-    ]  # fmt: skip
+    for label, line in used.items():
+        line.set_label(label)
     figure.legend(
-        handles=handles,
-        loc="outside lower center",
-        ncols=4,
-        frameon=False,
-        fontsize=drawing.TINY,
-        handlelength=2.6,
+        handles=list(used.values()), loc="outside lower center", ncols=3, fontsize=7.5
     )
     figure.savefig(path, dpi=200)
 

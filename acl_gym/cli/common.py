@@ -64,36 +64,29 @@ JsonOption = Annotated[
 ]
 
 
-class Command(TyperCommand):
+class _OneLineErrors:
+    """Mixin of Typer's commands that reports errors on one line of stderr."""
+
+    def main(
+        self,
+        args: Sequence[str] | None = None,
+        prog_name: str | None = None,
+        complete_var: str | None = None,
+        standalone_mode: bool = True,
+        windows_expand_args: bool = True,
+        **extra: Any,
+    ) -> Any:
+        """Run the command and exit."""
+        main = super().main  # type: ignore[misc]
+        return _run(main, args, prog_name, standalone_mode)
+
+
+class Command(_OneLineErrors, TyperCommand):
     """A command that reports errors on one line of stderr, with an exit code."""
 
-    def main(
-        self,
-        args: Sequence[str] | None = None,
-        prog_name: str | None = None,
-        complete_var: str | None = None,
-        standalone_mode: bool = True,
-        windows_expand_args: bool = True,
-        **extra: Any,
-    ) -> Any:
-        """Run the command and exit."""
-        return _run(super().main, args, prog_name, standalone_mode)
 
-
-class Group(TyperGroup):
+class Group(_OneLineErrors, TyperGroup):
     """A group that reports errors on one line of stderr, with an exit code."""
-
-    def main(
-        self,
-        args: Sequence[str] | None = None,
-        prog_name: str | None = None,
-        complete_var: str | None = None,
-        standalone_mode: bool = True,
-        windows_expand_args: bool = True,
-        **extra: Any,
-    ) -> Any:
-        """Run the command and exit."""
-        return _run(super().main, args, prog_name, standalone_mode)
 
 
 def _run(
@@ -123,8 +116,10 @@ def _explain(name: str, error: Exception) -> int:
         traceback.print_exception(error)
     if isinstance(error, typer.TyperException):  # from the parser
         path = getattr(getattr(error, "ctx", None), "command_path", name)
-        message = error.format_message().rstrip(".")
-        _report(name, f"{message}. See '{path} --help'.")
+        message = error.format_message()
+        if not message.endswith((".", "?")):
+            message += "."
+        _report(name, f"{message} See '{path} --help'.")
         return 2
     if isinstance(error, (BadArgumentError, InterruptedRunError)):
         _report(name, str(error))

@@ -323,7 +323,7 @@ def test_attributes_of_a_native_vector_environment() -> None:
     assert not env.has_attr("no_such_attribute")
     env.set_attr("max_episode_steps", 5)
     assert env.env.unwrapped.max_episode_steps == 5
-    with pytest.raises(ValueError, match="all 3 slots together"):
+    with pytest.raises(ValueError, match="by all 3 slots"):
         env.set_attr("max_episode_steps", 7, indices=[0])
     with pytest.raises(AttributeError, match="no_such_attribute"):
         env.set_attr("no_such_attribute", 1)
@@ -335,7 +335,7 @@ def test_methods_of_a_native_vector_environment() -> None:
     assert len(others) == 3
     assert others[0] is others[2]
     assert others[0].num_envs == 7
-    with pytest.raises(ValueError, match="all 3 slots together"):
+    with pytest.raises(ValueError, match="by all 3 slots"):
         env.env_method("with_slots", 7, indices=1)
     with pytest.raises(AttributeError, match="no_such_method"):
         env.env_method("no_such_method")

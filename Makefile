@@ -1,5 +1,5 @@
-# Everything here runs in .venv, which the first call makes. Beforehand a machine
-# needs Python 3.11 with pip and venv, and no more.
+# Everything here runs in .venv, which the first call makes. All that a machine needs
+# beforehand is Python 3.11 with pip and venv.
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
@@ -31,7 +31,7 @@ help: ## Show this list
 	@echo "  Variables: ARGS (added to the command of compare, bench and test),"
 	@echo "  ENV_ID, PRESET and OUT (compare), WORKERS (test), PYTHON (makes .venv)."
 
-# The stamp is renewed, and pip asked again, only when one of these two has changed.
+# pip runs again only when one of these two files has changed.
 install: $(STAMP) ## Make .venv with the locked dependencies and this package
 
 $(STAMP): requirements.lock pyproject.toml
@@ -47,14 +47,14 @@ $(STAMP): requirements.lock pyproject.toml
 	@$(BIN)/python -m pip check --disable-pip-version-check
 	@touch $@
 
-compare: $(STAMP) ## Train ants, Q-learning and DQN on one task and compare them
+compare: $(STAMP) ## Compare ACL, Q-learning and DQN on one task
 	$(BIN)/python benchmarks/compare_acl_rl.py --env $(ENV_ID) --preset $(PRESET) \
 		$(if $(OUT),--out $(OUT)) $(ARGS)
 
-bench: $(STAMP) ## Measure how fast ants walk and learn, beside others
+bench: $(STAMP) ## Measure the speed of environments and colonies
 	$(BIN)/python benchmarks/throughput.py $(ARGS)
 
-bench-peers: $(STAMP) $(PEERS_STAMP) ## The same beside EnvPool's and gymnax's pendulums
+bench-peers: $(STAMP) $(PEERS_STAMP) ## The same, with EnvPool and gymnax
 	$(BIN)/python benchmarks/throughput.py $(ARGS)
 
 $(PEERS_STAMP): benchmarks/peers-requirements.txt
@@ -67,12 +67,13 @@ $(PEERS_STAMP): benchmarks/peers-requirements.txt
 test: $(STAMP) ## Run every test
 	$(BIN)/python -m pytest -n $(WORKERS) --dist worksteal $(ARGS)
 
-lint: $(STAMP) ## Check style, format and types
+lint: $(STAMP) ## Check style, format, types and the layers of imports
 	$(BIN)/python -m ruff check .
 	$(BIN)/python -m ruff format --check .
 	$(BIN)/python -m mypy
+	$(BIN)/lint-imports --no-cache --no-logo
 
-format: $(STAMP) ## Put the code into the house format
+format: $(STAMP) ## Repair style and format
 	$(BIN)/python -m ruff check --fix-only .
 	$(BIN)/python -m ruff format .
 
@@ -80,17 +81,17 @@ build: $(STAMP) ## Build the sdist, and from it the wheel, into dist/
 	@rm -rf dist
 	$(BIN)/python -m build --no-isolation
 
-check-wheel: build ## Install the wheel into an empty environment and try it there
+check-wheel: build ## Test the wheel in an empty environment
 	@rm -rf $(WHEEL_VENV)
 	@$(BIN)/python -m venv $(WHEEL_VENV)
-	@echo "Installing the wheel and what it asks for into $(WHEEL_VENV)"
+	@echo "Installing the wheel and its dependencies into $(WHEEL_VENV)"
 	@$(WHEEL_VENV)/bin/python $(PIP_INSTALL) -c requirements.lock dist/acl_gym-*.whl
 	cd $(WHEEL_VENV) && bin/python -c "import acl_gym"
 	$(WHEEL_VENV)/bin/python -I .ci/check_wheel.py
 	@rm -rf $(WHEEL_VENV)
 
-clean: ## Remove what builds and tests have left, compiled kernels too
-	rm -rf build dist .hypothesis .mypy_cache .numba_cache .pytest_cache .ruff_cache
+clean: ## Remove builds and caches, including compiled kernels
+	rm -rf build dist .grimp_cache .hypothesis .mypy_cache .numba_cache .pytest_cache .ruff_cache
 	find . -name '$(VENV)*' -prune -o -name __pycache__ -type d -prune \
 		-exec rm -rf {} +
 

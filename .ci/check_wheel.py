@@ -1,13 +1,16 @@
 """Check the installed wheel; run with the interpreter of the environment it is in."""
 
 import importlib.metadata
+import subprocess
 import sys
 from pathlib import Path
 
 import gymnasium as gym
 
 import acl_gym
-from acl_gym.reproduction.catalogue import EXPERIMENTS
+
+SUFFIXES = {".py", ".typed", ".j2", ".json", ".mplstyle", ".toml", ".txt"}
+LARGEST = 100_000  # bytes; logs, results and figures do not belong in the wheel
 
 package = Path(acl_gym.__file__).parent
 if not package.is_relative_to(sys.prefix):
@@ -15,28 +18,40 @@ if not package.is_relative_to(sys.prefix):
 
 wheel = importlib.metadata.distribution("acl-gym")
 if acl_gym.__version__ != wheel.version:
-    sys.exit(f"acl_gym says {acl_gym.__version__}, its metadata {wheel.version}")
+    sys.exit(f"acl_gym has version {acl_gym.__version__}, its metadata {wheel.version}")
 
 # Beside the package itself pip lists the metadata and the commands ("../../../bin").
-top_levels = {file.parts[0] for file in wheel.files or ()}
+files = [file for file in wheel.files or () if file.parts[0] == "acl_gym"]
 strangers = {
-    name
-    for name in top_levels
-    if name not in ("acl_gym", "..") and not name.endswith(".dist-info")
+    file.parts[0]
+    for file in wheel.files or ()
+    if file.parts[0] not in ("acl_gym", "..")
+    and not file.parts[0].endswith(".dist-info")
 }
 if strangers:
     sys.exit(f"expected only acl_gym in the wheel, found also {sorted(strangers)}")
-if not (package / "py.typed").is_file():
-    sys.exit("the wheel lacks acl_gym/py.typed, without which its types are not seen")
 
-for template in ("experiments/templates/report", "reproduction/templates/page"):
-    if not (package / f"{template}.html.j2").is_file():
-        sys.exit(f"the wheel lacks acl_gym/{template}.html.j2, which a report needs")
+for file in files:
+    if file.suffix in SUFFIXES and (file.size or 0) <= LARGEST:
+        continue
+    if "__pycache__" not in file.parts:
+        sys.exit(f"{file} ({file.size} bytes) is not a file that users need to run")
 
-# Reads what the searches for settings have found, which is data in the package.
-names = {experiment.name for experiment in EXPERIMENTS}
-if "versus-pendulum" not in names:
-    sys.exit(f"expected versus-pendulum among the experiments, got {sorted(names)}")
+# Templates, styles, maps and settings: all that the sources have.
+source = Path(__file__).resolve().parents[1] / "acl_gym"
+wanted = {
+    path.relative_to(source.parent).as_posix()
+    for path in source.rglob("*")
+    if path.suffix in SUFFIXES
+}
+if missing := wanted - {file.as_posix() for file in files}:
+    sys.exit(f"the wheel lacks {sorted(missing)}")
+
+# Reads the experiments and their settings, which are data in the package.
+command = [str(Path(sys.prefix, "bin", "acl-gym")), "reproduce", "--list"]
+listed = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+if "versus-pendulum" not in listed:
+    sys.exit(f"expected versus-pendulum among the experiments, got:\n{listed}")
 
 env = gym.make("acl_gym/Pendulum-v0")
 env.reset(seed=0)

@@ -1,7 +1,7 @@
 """Ant Colony Learning: colonies of ants that learn control policies.
 
-Each slot of a Gymnasium vector environment is one ant; all share one table of
-pheromone over (state, action) pairs (J. M. van Ast, Delft 2010).
+Each slot of a Gymnasium vector environment is one ant, and all ants share one table of
+pheromone over (state, action) pairs (J. M. van Ast, Delft, 2010).
 """
 
 from __future__ import annotations
@@ -34,8 +34,8 @@ if TYPE_CHECKING:
 
 __version__ = "0.1.0"
 
-# Name -> module. Modules are imported on first use: compiled kernels and torch cost
-# seconds that `gym.make` on another environment should not pay.
+# Name -> module. Modules are imported on first use, because compiled kernels and torch
+# take seconds to load, which `gym.make` of another environment should not cost.
 _PUBLIC = {
     "ACL": "acl_gym.agents.acl",
     "CSVLog": "acl_gym.callbacks",

@@ -152,7 +152,7 @@ def train_dqn(
     from stable_baselines3.common.callbacks import ConvertCallback
 
     from acl_gym.sb3.adapter import VectorEnvAdapter
-    from acl_gym.sb3.dqn import PolicyCostCallback
+    from acl_gym.sb3.callback import PolicyCostCallback
 
     torch.set_num_threads(1)  # the fastest for such small networks
     slots, steps, every, net_arch = (

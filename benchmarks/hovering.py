@@ -1,10 +1,9 @@
 """Why some learned policies hover beside the goal, and what helps.
 
-Trains fuzzy colonies on the pendulum and follows, after every trial of the second
-half, the greedy policy (4.16) and the soft one (`ACL.soft_policy`) from the evaluation
-states; and the greedy policy of colonies whose partition is finer around the goal.
-Writes a figure of the worst greedy policy near the goal and of how often each kind of
-policy fails, and prints the figures that docs/hovering.md quotes.
+Trains fuzzy colonies on the pendulum. After every trial of the second half it evaluates
+the greedy policy, eq. (4.16), and the soft one (`ACL.soft_policy`), and the greedy policy
+of colonies with a finer partition around the goal. Draws the worst greedy policy near the
+goal and how often each kind of policy fails, and prints the numbers in docs/hovering.md.
 """
 
 from __future__ import annotations
@@ -32,7 +31,7 @@ TRIALS = 100
 FIRST_TRIAL = 51
 COLOURS = {"greedy": "#0072B2", "soft": "#D55E00", "refined": "#009E73"}
 LABELS = {
-    "greedy": "greedy (4.16)",
+    "greedy": "greedy",
     "soft": "soft, exponent 10",
     "refined": "greedy, finer cells at the goal",
 }
@@ -49,11 +48,11 @@ class Outcome:
 
 
 def study(seeds: int) -> Outcome:
-    """Train colonies and follow every reading of every policy."""
+    """Train colonies and evaluate each kind of policy after every trial."""
     found: dict[str, list[tuple[float, float]]] = {name: [] for name in COLOURS}
     worst: tuple[float, str, TablePolicy] | None = None
 
-    def follow(name: str, policy: Any, env: Any) -> float:
+    def evaluate(name: str, policy: Any, env: Any) -> float:
         result = evaluate_policy_cost(policy, env)
         found[name].append((result.cost, result.success_rate))
         return result.success_rate
@@ -69,9 +68,9 @@ def study(seeds: int) -> Outcome:
         for trial in range(FIRST_TRIAL, TRIALS + 1):
             colony.learn(trials=1)
             refined.learn(trials=1)
-            success = follow("greedy", colony.policy, env)
-            follow("soft", colony.soft_policy(seed=trial), env)
-            follow("refined", refined.policy, env)
+            success = evaluate("greedy", colony.policy, env)
+            evaluate("soft", colony.soft_policy(seed=trial), env)
+            evaluate("refined", refined.policy, env)
             if worst is None or success < worst[0]:
                 worst = success, f"seed {seed}, trial {trial}", colony.policy.copy()
     if worst is None:
@@ -80,8 +79,8 @@ def study(seeds: int) -> Outcome:
     return Outcome(policies, worst[2], worst[0], worst[1])
 
 
-def figures_of(outcome: Outcome) -> dict[str, Any]:
-    """The figures that the text quotes."""
+def numbers_of(outcome: Outcome) -> dict[str, Any]:
+    """The numbers quoted in docs/hovering.md."""
     return {
         "worst": outcome.worst_name,
         "worst_success_rate": outcome.worst_success,
@@ -102,7 +101,7 @@ def figures_of(outcome: Outcome) -> dict[str, Any]:
 
 
 def draw(outcome: Outcome) -> Figure:
-    """The worst greedy policy near the goal, and how often each reading fails."""
+    """Draw the worst greedy policy near the goal, and how often each kind fails."""
     figure = Figure(figsize=(10, 4.2), layout="constrained")
     FigureCanvasAgg(figure)
     near, often = figure.subplots(1, 2, width_ratios=(1.15, 1))
@@ -158,7 +157,7 @@ def draw(outcome: Outcome) -> Figure:
         )
     often.set(
         xlabel="starts that reach the goal (%)",
-        ylabel="policies with no more than that (%)",
+        ylabel="policies with at most that share (%)",
         yscale="log",
         yticks=(0.2, 1, 10, 100),
         yticklabels=("0.2", "1", "10", "100"),
@@ -177,20 +176,20 @@ def _a_start_that_hovers(policy: TablePolicy, env: Any) -> np.ndarray:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Study, draw and print; returns the exit code."""
+    """Train, draw and print; returns the exit code."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--seeds", type=int, default=10, help="colonies to train")
+    parser.add_argument("--seeds", type=int, default=10, help="number of seeds")
     parser.add_argument(
         "--out",
         type=Path,
         default=Path("docs/figures/hovering.png"),
-        help="where the figure goes (default: %(default)s)",
+        help="file of the figure (default: %(default)s)",
     )
     options = parser.parse_args(arguments)
     outcome = study(options.seeds)
     options.out.parent.mkdir(parents=True, exist_ok=True)
     draw(outcome).savefig(options.out, dpi=150)
-    print(json.dumps(figures_of(outcome), indent=1))
+    print(json.dumps(numbers_of(outcome), indent=1))
     return 0
 
 

@@ -1,9 +1,8 @@
-"""The colony on the fuzzy pendulum in vectorised NumPy: what a compiler must beat.
+"""The colony on the fuzzy pendulum in vectorised NumPy, for comparison of speed.
 
-The equations of Algorithm 4.2 as an engineer would write them for speed without a
-compiler: every line works on all walking ants at once. It shares the parameters and
-the initial states with the package, nothing else, and given the same seed it draws
-the same random numbers and lays the same pheromone, but for rounding.
+Algorithm 4.2 written for speed without a compiler: every line works on all walking ants
+at once. It shares only the parameters and initial states with the package. With the same
+seed it draws the same random numbers and gives the same pheromone, except for rounding.
 """
 
 from __future__ import annotations
@@ -24,7 +23,7 @@ class NumpyColony:
         n_ants: M.
         cells: centres of theta and of omega.
         max_steps: T.
-        seed: as that of `ACL`.
+        seed: see `ACL`.
 
     Attributes:
         levels: tau, `(n_cells, n_actions)`.
@@ -46,12 +45,13 @@ class NumpyColony:
         self.levels = np.full((cells[0] * cells[1], self.n_actions), self.tau0)
         self.rng = np.random.default_rng(np.random.SeedSequence(seed).spawn(3)[0])
         self.steps = 0
-        # The union (4.13) of each ant, dense: within a step an ant's pairs differ, so
-        # that plain indexing does what `np.maximum.at` would do slowly.
+        # The union of the cells that each ant has visited, eq. (4.13), as a dense table:
+        # the pairs of an ant within a step differ, so that plain indexing can replace
+        # the slower `np.maximum.at`.
         self._own = np.zeros((n_ants, self.levels.size))
 
     def trial(self) -> None:
-        """Let the ants walk once, and deposit."""
+        """Run one episode with every ant, then deposit."""
         seed = int(self.rng.integers(2**31))
         states = self.system.sample_states(np.random.default_rng(seed), self.n_ants)
         theta, omega = states
@@ -78,7 +78,7 @@ class NumpyColony:
         self.deposit(own, cost)
 
     def fuzzify(self, theta: Array, omega: Array) -> tuple[NDArray[np.int64], Array]:
-        """(4.7), (4.8): cells and degrees, `(4, m)`."""
+        """Cells and degrees of membership, eqs. (4.7) and (4.8), each `(4, m)`."""
         n_theta, n_omega = self.cells
         x = theta * (n_theta / TWO_PI)
         y = (omega + self.system.omega_max) * (
@@ -96,7 +96,7 @@ class NumpyColony:
         return index, degree
 
     def choose(self, index: NDArray[np.int64], degree: Array) -> NDArray[np.int64]:
-        """(3.6), (4.11): Boltzmann, and any action with probability epsilon."""
+        """Max-Boltzmann selection on fuzzy cells, eqs. (3.6) and (4.11)."""
         coin, choice = self.rng.random((2, index.shape[1]))
         ratio = self.levels / self.levels.max(axis=1, keepdims=True)
         weight = ratio * ratio * ratio  # alpha = 3
@@ -112,7 +112,7 @@ class NumpyColony:
     def advance(
         self, theta: Array, omega: Array, action: NDArray[np.int64]
     ) -> tuple[Array, Array]:
-        """(5.1) by one fourth-order Runge-Kutta step."""
+        """One fourth-order Runge-Kutta step of the dynamics, eq. (5.1)."""
         system = self.system
         torque = np.array(system.torques) * (system.motor_gain / system.inertia)
         push = torque[action]
@@ -143,7 +143,7 @@ class NumpyColony:
     def price(
         self, theta: Array, omega: Array, action: NDArray[np.int64]
     ) -> tuple[Array, NDArray[np.bool_]]:
-        """(5.4), and who has reached the goal."""
+        """Stage cost, eq. (5.4), and which ants have reached the goal."""
         system = self.system
         (q_theta, _), (_, q_omega) = system.state_weight
         error = theta - np.pi
@@ -154,14 +154,14 @@ class NumpyColony:
         return cost, reached
 
     def decay(self, pairs: NDArray[np.int64], degree: Array) -> None:
-        """(4.12), (4.18): the factors of all ants multiply."""
+        """Local update, eqs. (4.12) and (4.18): the factors of all ants multiply."""
         flat = self.levels.reshape(-1)
         flat -= self.tau0
         np.multiply.at(flat, pairs.ravel(), (1.0 - self.local_decay * degree).ravel())
         flat += self.tau0
 
     def deposit(self, own: Array, cost: Array) -> None:
-        """(4.14), (4.15)."""
+        """Global update, eqs. (4.14) and (4.15)."""
         flat = self.levels.reshape(-1)
         flat *= 1.0 - self.global_decay * own.max(axis=0)
         flat += self.global_decay * ((1.0 / cost) @ own)

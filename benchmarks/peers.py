@@ -1,8 +1,8 @@
-"""The pendulums of EnvPool and gymnax, measured in an environment of their own.
+"""The pendulums of EnvPool and gymnax, measured in a virtual environment of their own.
 
-`make bench-peers` makes .venv-peers, for their dependencies do not agree with ours.
-throughput.py runs this script there and takes the JSON that it prints: a list of
-cases with `name`, `n_ants` and `rates`, the slot-steps a second of each repetition.
+`make bench-peers` makes .venv-peers, because their dependencies conflict with those of
+acl-gym. throughput.py runs this script there and reads the JSON that it prints: a list of
+cases with `name`, `n_ants` and `rates`, the slot-steps per second of each repetition.
 """
 
 import importlib.metadata
@@ -13,7 +13,7 @@ from collections.abc import Callable
 
 
 def rates(work: Callable[[], int], repetitions: int) -> list[float]:
-    """Slot-steps a second, after one repetition that is not counted."""
+    """Slot-steps per second, after one repetition that is not counted."""
     work()
     results = []
     for _ in range(repetitions):
@@ -24,7 +24,7 @@ def rates(work: Callable[[], int], repetitions: int) -> list[float]:
 
 
 def envpool_pendulum(n: int) -> Callable[[], int]:
-    """EnvPool's synchronous mode, with one thread."""
+    """EnvPool in synchronous mode, with one thread."""
     import envpool
     import numpy as np
 
@@ -41,7 +41,7 @@ def envpool_pendulum(n: int) -> Callable[[], int]:
 
 
 def gymnax_pendulum(n: int) -> Callable[[], int]:
-    """gymnax, vmapped and compiled, stepped call by call on the CPU, all its cores."""
+    """gymnax, vmapped and compiled, one call per step, on all cores of the CPU."""
     import gymnax
     import jax
 
@@ -66,7 +66,7 @@ PEERS = {"envpool": envpool_pendulum, "gymnax": gymnax_pendulum}
 
 
 def main() -> None:
-    """Measure; the arguments are the number of slots and of repetitions."""
+    """Measure; the arguments are the numbers of slots and repetitions."""
     n, repetitions = int(sys.argv[1]), int(sys.argv[2])
     cases = []
     for name, make in PEERS.items():

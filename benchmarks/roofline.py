@@ -1,8 +1,8 @@
-"""How near each kernel is to what the processor can do, and how cost grows.
+"""How close each kernel is to the limits of the processor, and how its cost grows.
 
-Operations and bytes of an ant-step are counted on paper, from the equations; the
-roofs, arithmetic and cache bandwidth of one core, are measured in the same run, and
-so are the kernels. Writes two figures and prints the table of docs/speed.md.
+Operations and bytes of an ant-step are counted from the equations. The limits, arithmetic
+and cache bandwidth of one core, are measured in the same run as the kernels. Writes two
+figures and prints the table in docs/speed.md.
 
     python benchmarks/roofline.py --out docs/figures
 """
@@ -18,6 +18,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from figure_style import WIDTH, in_style
+from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter, ScalarFormatter
 from numba import njit
 from rich.console import Console
@@ -27,7 +29,6 @@ from acl_gym.colony import selection
 from acl_gym.colony.pheromone import Pheromone
 from acl_gym.colony.solutions import Solutions
 from acl_gym.envs import navigation, pendulum
-from acl_gym.experiments import drawing
 from acl_gym.partitions import Fuzzy
 from acl_gym.partitions.kernels import written_out
 
@@ -36,14 +37,14 @@ ANTS = 2_000
 
 @dataclass(frozen=True)
 class Kernel:
-    """A kernel with what an ant-step of it needs.
+    """A kernel and the work of one ant-step.
 
     Attributes:
         name: of the kernel.
         operations: additions, multiplications, divisions, roundings, comparisons.
-        nbytes: read and written, each array counted once.
-        run: one call for `ants` ant-steps.
-        ants: see `run`.
+        nbytes: bytes read and written, each array counted once.
+        run: makes one call of `ants` ant-steps.
+        ants: the ant-steps of one call.
     """
 
     name: str
@@ -55,7 +56,7 @@ class Kernel:
 
 @njit(cache=True)
 def _multiply_add(x: Any) -> None:
-    """Six multiplications and additions an entry, vectorised, in the nearest cache."""
+    """Six multiplications and additions per entry, vectorised, in the first cache."""
     for i in range(x.size):
         y = x[i] * 0.999 + 0.1
         y = y * 0.998 + 0.2
@@ -72,10 +73,10 @@ def _copy(x: Any, y: Any) -> None:
 
 
 def seconds(*runs: Callable[[], Any], rounds: int = 15) -> list[float]:
-    """Median seconds of one call of each, in batches of about two milliseconds.
+    """Median seconds per call of each function, in batches of about two milliseconds.
 
-    Each round goes through all of them, so that a slow moment of the machine hits them
-    alike.
+    Each round goes through all functions, so that a slow period of the machine affects
+    all of them alike.
     """
     batches = []
     for run in runs:
@@ -94,15 +95,15 @@ def seconds(*runs: Callable[[], Any], rounds: int = 15) -> list[float]:
 
 
 def roofs() -> tuple[float, float]:
-    """Operations and bytes a second of one core: arithmetic, and a copy in cache."""
+    """Operations and bytes per second of one core: arithmetic, and copying in cache."""
     x = np.random.default_rng(0).random(2_048)
-    a, b = np.ones((2, 12_000))  # 192 kB together: within the second cache
+    a, b = np.ones((2, 12_000))  # 192 kB together: fits the second-level cache
     arithmetic, copying = seconds(lambda: _multiply_add(x), lambda: _copy(a, b))
     return 12 * x.size / arithmetic, 16 * a.size / copying
 
 
 class Ants:
-    """Ants all over a grid of `d` dimensions, and a table of pheromone for them."""
+    """Ants spread over a grid of some dimensions, and a table of pheromone."""
 
     def __init__(
         self, dimensions: int, n_actions: int, ants: int = ANTS, cells: int = 0
@@ -154,11 +155,11 @@ class Ants:
 
 
 class Trial:
-    """A trial of random walks over a grid, ready to be deposited.
+    """A trial of random walks over a grid, ready for the deposit.
 
     Args:
         cells: centres of each of the two axes.
-        walked: over how many of them, from the first, the ants walk; all if 0.
+        walked: centres per axis, from the first, that the ants visit; 0 means all.
         ants: M.
         steps: T.
     """
@@ -185,7 +186,7 @@ class Trial:
 
 
 def kernels() -> list[Kernel]:
-    """The kernels of a fuzzy learning step, with what the equations ask of them."""
+    """The kernels of a fuzzy learning step, with the work counted from the equations."""
     two, four = Ants(2, 3), Ants(4, 9)
     moving = pendulum.Pendulum()
     rng = np.random.default_rng(2)
@@ -195,7 +196,8 @@ def kernels() -> list[Kernel]:
     few, many = rng.integers(0, 3, ANTS), rng.integers(0, 9, ANTS)
     rewards, reached = np.empty(ANTS), np.empty(ANTS, dtype=np.bool_)
     trial = Trial(40)
-    # A sine: 13 to reduce, 17 of the series, 4 to end. An exponential: 9, 28, 3.
+    # Operations of a sine: 13 (reduction) + 17 (series) + 4 (end); of an exponential:
+    # 9 + 28 + 3.
     sine, exponential = 34, 40
     swing = 4 * (sine + 4) + 24 + 24
     drive = 2 * (4 * (2 * (exponential + 8) + 4) + 60) + 45
@@ -204,8 +206,8 @@ def kernels() -> list[Kernel]:
                lambda: moving.advance(swings, few, None, rewards, reached)),
         Kernel("navigation: move, 2 substeps", drive, 8 * 10 + 1,
                lambda: vehicle.advance(drives, many, None, rewards, reached)),
-        Kernel("locate, 4 cells a state", 2 * 10 + 8, 8 * 3 + 12 * 4, two.locate),
-        Kernel("locate, 16 cells a state", 4 * 10 + 34, 8 * 5 + 12 * 16, four.locate),
+        Kernel("locate, 4 cells per state", 2 * 10 + 8, 8 * 3 + 12 * 4, two.locate),
+        Kernel("locate, 16 cells per state", 4 * 10 + 34, 8 * 5 + 12 * 16, four.locate),
         Kernel("probabilities, 3 actions", 15, 12 * 4 + 2 * 24, two.repair),
         Kernel("draw, 4 cells x 3 actions", 2 * (2 * 4 + 2) + 3,
                12 * 4 + 4 * 16 + 24, two.draw),
@@ -215,13 +217,13 @@ def kernels() -> list[Kernel]:
         Kernel("decay, 16 cells", 16 * 5, 16 * (12 + 17) + 8, four.decay),
         Kernel("deposit, 4 cells", 28 + 4 * 6, 17 * 3 + 4 * (12 + 3 * 16),
                trial.deposit, trial.n_steps),
-        Kernel("random numbers, 2 an ant", 2 * 8, 16, lambda: rng.random((2, ANTS))),
+        Kernel("random numbers, 2 per ant", 2 * 8, 16, lambda: rng.random((2, ANTS))),
     ]  # fmt: skip
 
 
 @dataclass(frozen=True)
 class Result:
-    """A measured kernel: nanoseconds an ant-step, and the bound on them."""
+    """A measured kernel: nanoseconds per ant-step, and the lower bound on them."""
 
     kernel: Kernel
     ns: float
@@ -229,7 +231,7 @@ class Result:
 
 
 def measure(arithmetic: float, bandwidth: float) -> list[Result]:
-    """Every kernel with its bound: what its operations or its bytes must take."""
+    """Measure every kernel; its bound is the time of its operations or its bytes."""
     results, all_kernels = [], kernels()
     times = seconds(*(kernel.run for kernel in all_kernels))
     for kernel, time_of_call in zip(all_kernels, times, strict=True):
@@ -239,23 +241,23 @@ def measure(arithmetic: float, bandwidth: float) -> list[Result]:
     return results
 
 
+@in_style
 def draw_roofline(
     results: list[Result], arithmetic: float, bandwidth: float, path: Path
 ) -> None:
-    """Operations a second over operations a byte, under the two roofs."""
-    figure = drawing.new_figure(3.6, 6.4)
+    """Draw operations per second over operations per byte, under the two limits."""
+    figure = Figure(figsize=(6.4, 3.6))
     ax = figure.subplots()
-    drawing.prepare(ax)
     x = np.geomspace(0.05, 20, 200)
     ax.loglog(x, np.minimum(arithmetic, x * bandwidth) / 1e9, color="0.2", linewidth=1)
     ax.annotate(
-        f"arithmetic: {arithmetic / 1e9:.0f} billion operations a second",
-        (19, arithmetic / 1e9 * 1.12), ha="right", fontsize=drawing.TINY,
+        f"arithmetic: {arithmetic / 1e9:.0f} billion operations per second",
+        (19, arithmetic / 1e9 * 1.12), ha="right",
     )  # fmt: skip
     ax.annotate(
         f"cache: {bandwidth / 1e9:.0f} GB/s", (0.06, 0.06 * bandwidth / 1e9),
         xytext=(-4, 8), textcoords="offset points", rotation=45, va="bottom",
-        rotation_mode="anchor", transform_rotates_text=True, fontsize=drawing.TINY,
+        rotation_mode="anchor", transform_rotates_text=True,
     )  # fmt: skip
     colors = ("#D55E00", "#0072B2", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
     for number, result in enumerate(results):
@@ -264,31 +266,29 @@ def draw_roofline(
         rate = kernel.operations / result.ns
         color = colors[number % len(colors)]
         ax.plot(intensity, rate, marker="o", markersize=5, color=color)
-        # On the side on which its nearest neighbour is not.
+        # On the side away from its nearest neighbour.
         others = [r for r in results if r is not result]
         nearest = min(others, key=lambda r: _apart(r, result))
         left = nearest.kernel.operations / nearest.kernel.nbytes > intensity
         ax.annotate(
             str(number + 1), (intensity, rate), xytext=(-5 if left else 5, -3),
-            ha="right" if left else "left", textcoords="offset points",
-            fontsize=drawing.SMALL, color=color,
+            ha="right" if left else "left", textcoords="offset points", color=color,
         )  # fmt: skip
     ax.set_yticks([1, 2, 5, 10, 20, 50])
     ax.set_ylim(1.0, 1.6 * arithmetic / 1e9)
     for axis in (ax.xaxis, ax.yaxis):
         axis.set_major_formatter(ScalarFormatter())
         axis.set_minor_formatter(NullFormatter())
-    ax.tick_params(labelsize=drawing.TINY)
     names = [f"{n + 1}  {r.kernel.name}" for n, r in enumerate(results)]
-    figure.text(1.01, 0.5, "\n".join(names), fontsize=drawing.TINY, va="center",
+    figure.text(1.01, 0.5, "\n".join(names), va="center",
                 linespacing=1.7)  # fmt: skip
-    ax.set_xlabel("operations a byte", fontsize=drawing.SMALL)
-    ax.set_ylabel("billion operations a second", fontsize=drawing.SMALL)
+    ax.set_xlabel("operations per byte")
+    ax.set_ylabel("billion operations per second")
     figure.savefig(path, dpi=200, bbox_inches="tight")
 
 
 def _apart(one: Result, other: Result) -> float:
-    """How far apart two points of the figure are, on its logarithmic axes."""
+    """Distance of two points of the figure on its logarithmic axes."""
     ratios = (
         one.kernel.operations / one.kernel.nbytes * other.kernel.nbytes
         / other.kernel.operations,
@@ -297,32 +297,31 @@ def _apart(one: Result, other: Result) -> float:
     return float(np.hypot(*np.log(ratios)))
 
 
+@in_style
 def draw_scaling(path: Path) -> None:
-    """Cost over ants, actions, cells a state, and cells of the table."""
-    figure = drawing.new_figure(4.6)
+    """Draw the cost over ants, actions, cells per state, and cells of the table."""
+    figure = Figure(figsize=(WIDTH, 4.6))
     axes = figure.subplots(2, 2)
     colors = {"locate": "#0072B2", "select": "#D55E00", "decay": "#009E73"}
 
     def panel(ax: Any, unit: str, label: str, xs: Any, make: Any, scale: float) -> None:
-        drawing.prepare(ax)
         made = [make(x) for x in xs]
         runs = [getattr(ants, name) for name in colors for ants in made]
         times = np.reshape(seconds(*runs), (len(colors), len(xs))) * scale
         for (name, color), ys in zip(colors.items(), times, strict=True):
             ax.plot(xs, ys, marker=".", color=color, linewidth=1.2, label=name)
-        ax.set_ylabel(unit, fontsize=drawing.SMALL)
-        ax.set_xlabel(label, fontsize=drawing.SMALL)
+        ax.set_ylabel(unit)
+        ax.set_xlabel(label)
         ax.set_ylim(bottom=0)
         ax.set_xlim(left=0)
 
-    panel(axes[0, 0], "microseconds a step of all", "ants",
+    panel(axes[0, 0], "microseconds per step of all ants", "ants",
           [250, 1_000, 2_000, 4_000, 8_000], lambda n: Ants(2, 3, n), 1e6)  # fmt: skip
-    panel(axes[0, 1], "ns an ant-step", "actions",
+    panel(axes[0, 1], "ns per ant-step", "actions",
           [2, 4, 6, 8, 12, 16], lambda u: Ants(2, u), 1e9 / ANTS)  # fmt: skip
-    panel(axes[1, 0], "ns an ant-step", "cells a state, 2$^d$", [2, 4, 8, 16],
+    panel(axes[1, 0], "ns per ant-step", "cells per state, 2$^d$", [2, 4, 8, 16],
           lambda k: Ants(k.bit_length() - 1, 3), 1e9 / ANTS)  # fmt: skip
     ax = axes[1, 1]
-    drawing.prepare(ax)
     cells = [20, 40, 100, 200, 400, 800]
     trials = [Trial(n, walked=20) for n in cells] + [Trial(n) for n in cells]
     times = seconds(*(trial.deposit for trial in trials))
@@ -334,14 +333,12 @@ def draw_scaling(path: Path) -> None:
             [n * n for n in cells], np.array(ys) / trials[0].n_steps * 1e9, style,
             marker=".", color="#882255", linewidth=1.2, label=label,
         )  # fmt: skip
-    ax.legend(title="ants walk", fontsize=drawing.TINY, title_fontsize=drawing.TINY,
-              frameon=False)  # fmt: skip
+    ax.legend(title="ants walk")
     ax.set_ylim(bottom=0)
-    ax.set_ylabel("deposit: ns an ant-step", fontsize=drawing.SMALL)
-    ax.set_xlabel("cells of the table", fontsize=drawing.SMALL)
+    ax.set_ylabel("deposit: ns per ant-step")
+    ax.set_xlabel("cells of the table")
     handles, labels = axes[0, 0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper center", ncols=3, frameon=False,
-                  fontsize=drawing.TINY)  # fmt: skip
+    figure.legend(handles, labels, loc="outside upper center", ncols=3)
     figure.savefig(path, dpi=200)
 
 
@@ -351,7 +348,9 @@ def main(arguments: list[str] | None = None) -> int:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument(
-        "--out", default="docs/figures", help="folder of the figures  [%(default)s]"
+        "--out",
+        default="docs/figures",
+        help="folder of the figures  [default: %(default)s]",
     )
     options = parser.parse_args(arguments)
     out = Path(options.out)

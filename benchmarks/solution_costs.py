@@ -1,8 +1,8 @@
-"""What a cost of whole solutions brings on the pendulum (§7.3 asks for it).
+"""The benefit of an episode cost on the pendulum, as suggested in §7.3.
 
 Colonies learn from the quadratic stage cost, from the number of steps, and from the
-settling time with a price on overshoot, which no reward per step expresses; Q-learning
-learns from the first two. Every last policy is then held to all the measures.
+settling time plus a weighted overshoot, which no reward per step expresses; Q-learning
+learns from the first two. Every final policy is then evaluated by all measures.
 """
 
 from __future__ import annotations
@@ -53,8 +53,8 @@ def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--seeds", type=int, default=5, help="runs of each learner")
-    parser.add_argument("--trials", type=int, default=100, help="trials of each run")
+    parser.add_argument("--seeds", type=int, default=5, help="runs of each method")
+    parser.add_argument("--trials", type=int, default=100, help="trials per run")
     options = parser.parse_args(arguments)
     learners = [*LEARNERS, "Q(lambda), quadratic cost", "Q(lambda), number of steps"]
     env = gym.make_vec("acl_gym/Pendulum-v0", num_envs=100)

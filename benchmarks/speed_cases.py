@@ -1,4 +1,4 @@
-"""What throughput.py measures: each case is some work that says how many steps it did."""
+"""The cases of throughput.py: each does some work and returns its number of steps."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from acl_gym.agents.acl import ACL
 from acl_gym.partitions import Crisp, Discrete, Fuzzy, Partition, named
 
 Work = Callable[[], int]
-"""Does some steps of all slots together and returns their number."""
+"""Makes some steps and returns their number, all slots counted."""
 
 PENDULUM = "acl_gym/Pendulum-v0"
 SYSTEMS = {
@@ -37,8 +37,8 @@ class Plan:
         system: one of `SYSTEMS`, or "peers".
         n_ants: slots of the environment.
         make: builds the work; building is not measured.
-        reference: the name of the case that the ratio is to; "" for none.
-        by_seconds: the ratio is that of the seconds of one repetition, not of steps.
+        reference: the case to which the ratio is taken, by name; "" for none.
+        by_seconds: take the ratio of the seconds of one repetition, not of steps.
     """
 
     name: str
@@ -65,7 +65,7 @@ def partition_of(system: str, kind: str, env: Any) -> Partition:
 
 
 def kinds_of(system: str) -> tuple[str, ...]:
-    """The kinds of cells that make sense for a system."""
+    """The kinds of cells that apply to a system."""
     return ("discrete",) if system.startswith("grid") else ("fuzzy", "crisp")
 
 
@@ -75,7 +75,7 @@ def steps_for(n_ants: int) -> int:
 
 
 def step_alone(env: gym.vector.VectorEnv[Any, Any, Any], steps: int) -> Work:
-    """Step a vector environment with actions drawn beforehand."""
+    """Step a vector environment with actions that were drawn in advance."""
     env.reset(seed=0)
     rng = np.random.default_rng(0)
     n_actions = int(env.single_action_space.n)  # type: ignore[attr-defined]
@@ -106,13 +106,15 @@ def step_selecting(system: str, kind: str, n_ants: int) -> Work:
 
 
 def learn(system: str, kind: str, n_ants: int, trials: int) -> Work:
-    """Make trials of a new colony: all of Algorithm 4.2, deposit included."""
+    """Make trials of a new colony: all of Algorithm 4.2, including the deposit."""
     env = make_env(system, n_ants)
     partition = partition_of(system, kind, env)
 
     def work() -> int:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # tau0 is the thesis's, bound or no bound
+            warnings.simplefilter(
+                "ignore"
+            )  # tau0 is that of the thesis, even above the bound
             tau0 = TAU0.get(system, 1e-3)
             agent = ACL(env, partition, tau0=tau0, seed=0, max_steps=300)
         return agent.learn(trials=trials).num_timesteps
@@ -149,7 +151,7 @@ def train_dqn(steps: int) -> Work:
 
 
 def cart_pole(n: int) -> str:
-    """The name of the case that environments are held against."""
+    """The name of the case with which environments are compared."""
     return f"CartPole-v1 of Gymnasium, {n:,} slots"
 
 
@@ -159,7 +161,7 @@ def alone(system: str, n: int) -> str:
 
 
 def loop(system: str, kind: str, n: int) -> str:
-    """The name of the case of a whole learning loop."""
+    """The name of the case of a complete learning loop."""
     return f"{kind} {system} learning, {n:,} ants"
 
 
@@ -168,16 +170,16 @@ def in_numpy(n: int) -> str:
     return f"fuzzy pendulum learning in NumPy, {n:,} ants"
 
 
-WHOLE_RUN = f"fuzzy pendulum, whole run of {TRIALS_OF_A_RUN} trials, 250 ants"
+COMPLETE_RUN = f"fuzzy pendulum, complete run of {TRIALS_OF_A_RUN} trials, 250 ants"
 
 
 def trials_for(n_ants: int) -> int:
-    """Trials of a learning case: the first ones are the longest."""
+    """Trials of a learning case; the first trials are the longest."""
     return 1 if n_ants > 2_000 else 4
 
 
 def plan(systems: list[str], sizes: list[int], dqn_steps: int) -> Iterator[Plan]:
-    """Every case, references before what is held against them."""
+    """Every case, each reference before the cases compared with it."""
     alone_sizes = sorted({*sizes, 2_048})
     for n in alone_sizes:
         yield Plan(
@@ -216,7 +218,7 @@ def plan(systems: list[str], sizes: list[int], dqn_steps: int) -> Iterator[Plan]
                 )
     if "pendulum" not in systems:
         return
-    for n in (n for n in sizes if n <= 2_000):  # its memory grows by the table an ant
+    for n in (n for n in sizes if n <= 2_000):  # its memory grows by one table per ant
         yield Plan(
             in_numpy(n),
             "pendulum",
@@ -241,7 +243,7 @@ def plan(systems: list[str], sizes: list[int], dqn_steps: int) -> Iterator[Plan]
     )
     yield Plan(dqn, "peers", dqn_slots, lambda: train_dqn(dqn_steps))
     yield Plan(
-        WHOLE_RUN,
+        COMPLETE_RUN,
         "pendulum",
         250,
         lambda: learn("pendulum", "fuzzy", 250, TRIALS_OF_A_RUN),

@@ -1,4 +1,4 @@
-"""What the project asks of its own speed, as ratios within one run."""
+"""The project's targets for its speed, as ratios within one run."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ ALONE = alone("pendulum", 2_048)
 
 
 def criteria(rates: dict[str, float]) -> list[dict[str, Any]]:
-    """Hold the steps a second of the cases against what is asked.
+    """Compare the steps per second of the cases with the targets.
 
     Args:
-        rates: by name of the case; what is not there is left out.
+        rates: steps per second by name of the case; missing cases are skipped.
 
     Returns:
-        One row a criterion: `what`, `measured`, `asked` ("at least" or "at most"),
+        One row per criterion: `what`, `measured`, `asked` ("at least" or "at most"),
         `bound`, `met`.
     """
     gymnax = next((name for name in rates if "gymnax" in name), "")
@@ -61,7 +61,7 @@ def _row(what: str, measured: float, asked: str, bound: float) -> dict[str, Any]
     }
 
 
-def whole_run_row(seconds: float) -> dict[str, Any]:
-    """The criterion that is a time: a whole run, in seconds."""
-    what = "whole run, 100 trials of 250 ants on the fuzzy pendulum, seconds"
+def complete_run_row(seconds: float) -> dict[str, Any]:
+    """The criterion in seconds: a complete run."""
+    what = "complete run, 100 trials of 250 ants on the fuzzy pendulum, seconds"
     return _row(what, seconds, "at most", 2.0)

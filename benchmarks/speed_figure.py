@@ -1,41 +1,43 @@
-"""The figure of throughput.py: steps a second over the number of ants."""
+"""The figure of throughput.py: steps per second over the number of ants."""
 
 from __future__ import annotations
 
 from typing import Any
 
+from figure_style import WIDTH, in_style
+from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from acl_gym.experiments import drawing
-
 PANELS = ("pendulum", "navigation", "grid-1d", "grid-2d")
-PEER_SLOTS = 2_048  # beside the 2,000 of the curves; measured for the ratios
-# What the name of a case contains: label, colour, dashes.
+PEER_SLOTS = 2_048  # close to the 2,000 of the curves; measured for the ratios only
+# Part of the name of a case -> label, colour, dashes.
 CURVES = {
     " alone": ("environment alone", "#333333", (0, (1, 1))),
-    "fuzzy {system} selecting": ("and selection, fuzzy", "#56B4E9", (0, (4, 1.2))),
+    "fuzzy {system} selecting": ("with selection, fuzzy", "#56B4E9", (0, (4, 1.2))),
     "fuzzy {system} learning,": ("learning, fuzzy", "#D55E00", "-"),
     "crisp {system} learning,": ("learning, crisp", "#E69F00", (0, (4, 1.2))),
-    "discrete {system} learning,": ("learning, a cell a state", "#CC79A7", "-"),
+    "discrete {system} learning,": ("learning, discrete", "#CC79A7", "-"),
     "learning in NumPy": ("learning, fuzzy, NumPy", "#009E73", (0, (6, 1, 1, 1))),
 }
 
 
+@in_style
 def draw(cases: list[dict[str, Any]], path: str) -> None:
-    """Write the figure; its suffix says the kind of file."""
+    """Write the figure; the suffix of the path selects the format."""
     systems = [name for name in PANELS if any(case["system"] == name for case in cases)]
     if not systems:
-        raise SystemExit("no case of a system was measured, so there is no figure.")
+        raise SystemExit(
+            "no system was measured, so there is nothing to draw; add --systems."
+        )
     rows = (len(systems) + 1) // 2
     columns = min(2, len(systems))
-    figure = drawing.new_figure(0.5 + 2.4 * rows, 3.6 * columns)
+    figure = Figure(figsize=(0.5 * WIDTH * columns, 0.5 + 2.4 * rows))
     axes = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True)
     used: dict[str, Line2D] = {}
     for ax, system in zip(axes.flat, systems, strict=False):
-        drawing.prepare(ax)
         ax.set_xscale("log")
         ax.set_yscale("log")
-        ax.set_title(system, fontsize=drawing.SMALL, loc="left")
+        ax.set_title(system, loc="left")
         own = [case for case in cases if case["system"] == system]
         for pattern, (label, color, dashes) in CURVES.items():
             part = pattern.format(system=system)
@@ -56,23 +58,15 @@ def draw(cases: list[dict[str, Any]], path: str) -> None:
             used[label] = line
         _peers(ax, cases, used, own_panel=system == "pendulum")
     for ax in axes[:, 0]:
-        ax.set_ylabel("slot-steps a second", fontsize=drawing.SMALL)
+        ax.set_ylabel("slot-steps per second")
     for ax in axes[-1]:
-        ax.set_xlabel("ants, or slots", fontsize=drawing.SMALL)
+        ax.set_xlabel("ants or slots")
     for ax in axes.flat[len(systems) :]:
         ax.set_visible(False)
-    handles = [
-        Line2D([], [], color=line.get_color(), linestyle=line.get_linestyle(),
-               marker=line.get_marker(), markersize=4, label=label)
-        for label, line in used.items()
-    ]  # fmt: skip
+    for label, line in used.items():
+        line.set_label(label)
     figure.legend(
-        handles=handles,
-        loc="outside lower center",
-        ncols=4,
-        frameon=False,
-        fontsize=drawing.TINY,
-        handlelength=2.6,
+        handles=list(used.values()), loc="outside lower center", ncols=3, fontsize=7.5
     )
     figure.savefig(path, dpi=200)
 
@@ -80,7 +74,7 @@ def draw(cases: list[dict[str, Any]], path: str) -> None:
 def _peers(
     ax: Any, cases: list[dict[str, Any]], used: dict[str, Line2D], *, own_panel: bool
 ) -> None:
-    """Gymnasium's CartPole in every panel, the others' pendulums with ours."""
+    """Draw Gymnasium's CartPole in every panel, other pendulums in our pendulum's."""
     points = sorted(
         (case["n_ants"], case["steps_per_second"])
         for case in cases

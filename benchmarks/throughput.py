@@ -1,9 +1,9 @@
-"""How fast the colony walks and learns, beside others in the same run.
+"""The throughput of environments and colonies, with other software in the same run.
 
-Every figure is a median of several repetitions, on one thread unless its name says
-otherwise. A repetition goes through all cases, EnvPool's and gymnax's last, before the
-next one begins, so that a slow moment of the machine hits them alike. Only the ratios
-mean something on another day or another machine.
+Every value is the median of several repetitions, on one thread unless its name says
+otherwise. A repetition goes through all cases, with EnvPool and gymnax last, before the
+next one begins, so that a slow period of the machine affects all cases alike. Only ratios
+can be compared between days or machines.
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ from typing import Any
 
 from rich.console import Console
 from rich.table import Table
-from speed_cases import SYSTEMS, WHOLE_RUN, Plan, learn, plan
-from speed_criteria import criteria, whole_run_row
+from speed_cases import COMPLETE_RUN, SYSTEMS, Plan, learn, plan
+from speed_criteria import complete_run_row, criteria
 from tqdm.auto import tqdm
 
 import acl_gym
@@ -40,21 +40,21 @@ PEER_SLOTS = 2_048
 
 @dataclass(frozen=True)
 class Case:
-    """One measured figure.
+    """A measured case.
 
     Attributes:
         name: what was measured.
-        system: whose row it is.
+        system: one of `SYSTEMS`, or "peers".
         n_ants: slots of the environment.
-        steps_per_second: slot-steps a second, median.
-        slowest: steps a second in the slowest repetition.
-        fastest: steps a second in the fastest repetition.
+        steps_per_second: slot-steps per second, median.
+        slowest: steps per second in the slowest repetition.
+        fastest: steps per second in the fastest repetition.
         seconds: of one repetition, median.
-        reference: the name of the case that the ratio is to; its own if none.
-        ratio_to_reference: how many times the reference's steps a second; of a whole
-            run, how many times it fits into the time of the reference.
-        load: tasks that wanted to run on the machine while it was measured, its own
-            included: the mean of what `os.getloadavg` said.
+        reference: the case to which the ratio is taken, by name; its own if none.
+        ratio_to_reference: ratio of the steps per second to those of the reference;
+            for a complete run, the time of the reference over that of the run.
+        load: mean number of running tasks during the measurement, including the
+            measurement itself, from `os.getloadavg`.
     """
 
     name: str
@@ -70,13 +70,13 @@ class Case:
 
 
 Peers = dict[str, dict[str, Any]]
-"""By name of a case of another project: `n_ants`, and lists of `rates` and `loads`."""
+"""By case of another project: `n_ants`, and lists of `rates` and `loads`."""
 
 
 def measure(
     plans: list[Plan], repetitions: int, progress: bool, with_peers: bool
 ) -> tuple[dict[str, list[tuple[int, float, float]]], Peers]:
-    """Steps, seconds and load of each repetition of each case; and what peers do."""
+    """Steps, seconds and load of each repetition of each case; and the peers' rates."""
     found: dict[str, list[tuple[int, float, float]]] = defaultdict(list)
     works, peers = {}, Peers()
     with tqdm(total=len(plans) * (repetitions + 1), disable=not progress) as bar:
@@ -101,7 +101,7 @@ def measure(
 
 
 def measure_peers() -> list[dict[str, Any]]:
-    """One repetition of peers.py, where `make bench-peers` has made its environment."""
+    """One repetition of peers.py, if `make bench-peers` has made its environment."""
     if not PEERS_PYTHON.exists():
         return []
     script = Path(__file__).with_name("peers.py")
@@ -124,7 +124,7 @@ def as_cases(
     found: dict[str, list[tuple[int, float, float]]],
     peers: Peers,
 ) -> list[Case]:
-    """Medians, spread and ratios."""
+    """Compute medians, spreads and ratios."""
     rates = {
         name: [steps / seconds for steps, seconds, _ in results]
         for name, results in found.items()
@@ -207,13 +207,13 @@ def startup_seconds(repetitions: int) -> dict[str, float]:
         imports = [seconds(imported, cache) for _ in range(repetitions)]
     return {
         "import acl_gym": statistics.median(imports),
-        "first trial of a machine, kernels compiled": first,
-        "first trial of a process, kernels from the cache": statistics.median(again),
+        "first trial on a machine, kernels compiled": first,
+        "first trial in a process, kernels from the cache": statistics.median(again),
     }
 
 
 def measure_memory(n_ants: int) -> dict[str, float]:
-    """Peak memory of one trial of the fuzzy navigation, 300 steps; in this process."""
+    """Peak memory of one trial of the fuzzy navigation, 300 steps, in this process."""
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     learn("navigation", "fuzzy", 100, trials=1)()
     compiled = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
@@ -229,11 +229,11 @@ def measure_memory(n_ants: int) -> dict[str, float]:
 
 
 def as_table(cases: list[Case]) -> Table:
-    """The cases for the terminal, one section a system."""
+    """The cases as a table for the terminal, one section per system."""
     table = Table(
-        title=f"acl-gym {acl_gym.__version__}: slot-steps a second, medians",
-        caption="ratio: of steps a second; of a whole run, how often it fits into the "
-        "time of the other",
+        title=f"acl-gym {acl_gym.__version__}: slot-steps per second, medians",
+        caption="ratio: of steps per second; for a complete run, of the time of the "
+        "reference to that of the run",
     )
     table.add_column("case", no_wrap=True)
     for heading in ("steps/s", "ns/step", "spread", "load", "ratio"):
@@ -257,7 +257,7 @@ def as_table(cases: list[Case]) -> Table:
 
 
 def machine() -> dict[str, Any]:
-    """What the figures were measured on."""
+    """The machine and the versions of the software."""
     names = ("numpy", "numba", "gymnasium", "stable-baselines3", "torch")
     cpu = platform.processor() or platform.machine()
     info = Path("/proc/cpuinfo")
@@ -275,15 +275,32 @@ def machine() -> dict[str, Any]:
 def parse(arguments: list[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__)
     add = parser.add_argument
-    add("--json", action="store_true", help="print JSON, no table")
-    add("--figure", metavar="FILE", help="draw steps a second over ants (.png, .svg)")
-    add("--quick", action="store_true", help="few repetitions and sizes, to see it go")
+    add("--json", action="store_true", help="print JSON instead of a table")
+    add(
+        "--figure",
+        metavar="FILE",
+        help="draw steps per second over ants (.png, .svg, .pdf)",
+    )
+    add(
+        "--quick",
+        action="store_true",
+        help="few repetitions and sizes, for a quick check",
+    )
     add("--systems", nargs="+", choices=SYSTEMS, default=list(SYSTEMS))
     add("--ants", nargs="+", type=int, metavar="N", default=None)
     add("--repetitions", type=int, metavar="N", default=None, help="default: 5")
-    add("--only", metavar="PATTERN", help="cases whose name matches, and references")
-    add("--no-peers", action="store_true", help="leave .venv-peers alone")
-    add("--memory", type=int, metavar="ANTS", help="only one trial of navigation: RAM")
+    add(
+        "--only",
+        metavar="PATTERN",
+        help="only cases whose name matches, and their references",
+    )
+    add("--no-peers", action="store_true", help="do not measure EnvPool and gymnax")
+    add(
+        "--memory",
+        type=int,
+        metavar="ANTS",
+        help="only measure the memory of one trial of the navigation",
+    )
     options = parser.parse_args(arguments)
     if options.ants is not None and min(options.ants) < 1:
         parser.error("--ants must be 1 or more")
@@ -297,11 +314,11 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
         except re.error as error:
             parser.error(f"--only must be a regular expression, got {error}")
     if options.figure:
-        # Now, and not after minutes of measuring.
+        # Checked now, not after minutes of measuring.
         path = Path(options.figure)
         if path.suffix not in (".png", ".svg", ".pdf") or not path.parent.is_dir():
             parser.error(
-                "--figure must be a .png, .svg or .pdf in a folder that is there, got "
+                "--figure must be a .png, .svg or .pdf file in an existing folder, got "
                 f"{options.figure}"
             )
     return options
@@ -330,7 +347,9 @@ def main(arguments: list[str] | None = None) -> int:
     found, peers = measure(plans, repetitions, not options.json, with_peers)
     cases = as_cases(plans, found, peers)
     rows = criteria({case.name: case.steps_per_second for case in cases})
-    rows += [whole_run_row(case.seconds) for case in cases if case.name == WHOLE_RUN]
+    rows += [
+        complete_run_row(case.seconds) for case in cases if case.name == COMPLETE_RUN
+    ]
     result = {
         "cases": [asdict(case) for case in cases],
         "criteria": rows,

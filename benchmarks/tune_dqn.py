@@ -19,7 +19,8 @@ from typing import Any
 import torch
 from tqdm import tqdm
 
-from acl_gym.sb3.dqn import DQNSettings, PolicyCostCallback, make_dqn, scaled_env
+from acl_gym.sb3.callback import PolicyCostCallback
+from acl_gym.sb3.dqn import DQNSettings, make_dqn, scaled_env
 
 ENV_ID = "acl_gym/Pendulum-v0"
 NEAR_OPTIMUM = 1.1 * 38.4

@@ -1,4 +1,4 @@
-"""The README's Python runs as it stands and does what its comments promise."""
+"""The README's Python runs as printed and does what its comments promise."""
 
 from __future__ import annotations
 
@@ -36,14 +36,7 @@ def test_a_newcomers_environment_is_learned() -> None:
     assert result.cost < 30.0  # type: ignore[attr-defined]
 
 
-def test_twenty_lines_of_theirs_and_five_of_ours() -> None:
-    lines = [line for line in BLOCKS[1].splitlines() if line.strip()]
-    start = next(i for i, line in enumerate(lines) if line.startswith("class"))
-    ours = next(i for i, line in enumerate(lines) if line.startswith("env ="))
-    assert ours - start <= 20
-    assert len(lines) - ours == 5
-
-
+@pytest.mark.skipif(not PAGES, reason="a source distribution has no documentation")
 @pytest.mark.parametrize("page", ["README.md", "CONTRIBUTING.md", *PAGES])
 def test_links_within_the_project_lead_somewhere(page: str) -> None:
     source = README.parent / page

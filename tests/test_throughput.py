@@ -1,4 +1,4 @@
-"""The throughput benchmark runs and prints what was promised; no time is judged."""
+"""The throughput benchmark runs and prints its promised output; no time is judged."""
 
 from __future__ import annotations
 
@@ -39,7 +39,14 @@ def test_quick_run_prints_json_and_draws(tmp_path: Path) -> None:
         assert case["ratio_to_reference"] > 0
         assert case["load"] >= 0
         assert case["reference"] in names
-    for words in ("DQN", "whole run", "in NumPy", "synchronous", "CartPole", "crisp"):
+    for words in (
+        "DQN",
+        "complete run",
+        "in NumPy",
+        "synchronous",
+        "CartPole",
+        "crisp",
+    ):
         assert any(words in name for name in names), words
     for criterion in result["criteria"]:
         measured, bound = criterion["measured"], criterion["bound"]
@@ -52,7 +59,7 @@ def test_quick_run_prints_json_and_draws(tmp_path: Path) -> None:
     assert figure.stat().st_size > 10_000
 
 
-def test_memory_of_a_trial_is_told() -> None:
+def test_memory_of_a_trial_is_reported() -> None:
     done = run("--memory", "500")
     result = json.loads(done.stdout)
     assert result["n_ants"] == 500
@@ -82,7 +89,7 @@ def test_bad_arguments_are_refused_in_a_line(arguments: tuple[str, ...]) -> None
 
 
 def test_the_numpy_colony_is_the_colony(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Same draws, same pheromone: the denominator of the ratio does the same work."""
+    """Same random numbers, same pheromone: both sides of the ratio do the same work."""
     monkeypatch.syspath_prepend(str(FOLDER))
     from numpy_colony import NumpyColony
 
@@ -96,15 +103,15 @@ def test_the_numpy_colony_is_the_colony(monkeypatch: pytest.MonkeyPatch) -> None
 
 
 def test_every_criterion_is_judged(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A case that gets another name must not take its criterion away."""
+    """Renaming a case must not silently drop its criterion."""
     monkeypatch.syspath_prepend(str(FOLDER))
-    from speed_cases import SYSTEMS, WHOLE_RUN, plan
-    from speed_criteria import criteria, whole_run_row
+    from speed_cases import COMPLETE_RUN, SYSTEMS, plan
+    from speed_criteria import complete_run_row, criteria
 
     plans = list(plan(list(SYSTEMS), [250, 2_000], 5_000))
     rates = {each.name: 1e6 * (1 + n) for n, each in enumerate(plans)}
     rates |= {"pendulum of envpool 1, 2,048 slots": 2e6, "pendulum of gymnax 1": 3e6}
-    rows = [*criteria(rates), whole_run_row(1.9)]
+    rows = [*criteria(rates), complete_run_row(1.9)]
     assert len(rows) == 10
     assert len({row["what"] for row in rows}) == 10
     assert rows[0]["measured"] == (
@@ -112,5 +119,5 @@ def test_every_criterion_is_judged(monkeypatch: pytest.MonkeyPatch) -> None:
         / rates["fuzzy pendulum learning in NumPy, 2,000 ants"]
     )
     assert rows[-1]["met"]
-    assert not whole_run_row(2.1)["met"]
-    assert WHOLE_RUN in rates
+    assert not complete_run_row(2.1)["met"]
+    assert COMPLETE_RUN in rates

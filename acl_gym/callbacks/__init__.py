@@ -1,4 +1,4 @@
-"""What may happen between trials: your own function, or one of these objects."""
+"""Callbacks of `learn`: evaluation, early stopping, files and TensorBoard."""
 
 from acl_gym.callbacks.base import (
     Agent,

@@ -1,4 +1,4 @@
-"""What a callback is, and the forms that `learn` takes it in."""
+"""The base class of callbacks, and the forms in which `learn` accepts them."""
 
 from __future__ import annotations
 
@@ -10,12 +10,11 @@ import numpy as np
 from gymnasium.vector import VectorEnv
 from numpy.typing import ArrayLike
 
-from acl_gym.evaluation import Predictor
-from acl_gym.utils.typing import FloatArray, Row
+from acl_gym.utils.typing import FloatArray, Predictor, Row
 
 
 class Agent(Predictor, Protocol):
-    """What callbacks see of an agent; `TabularAgent` says what it means."""
+    """What callbacks see of an agent; `TabularAgent` documents each member."""
 
     env: VectorEnv[Any, Any, Any] | None
     num_timesteps: int
@@ -27,44 +26,44 @@ class Agent(Predictor, Protocol):
 
     @property
     def table(self) -> FloatArray:
-        """The table as it is now, `(n_cells, n_actions)`."""
+        """The current table, `(n_cells, n_actions)`."""
 
     @property
     def policy(self) -> Predictor:
-        """The policy as it is now."""
+        """The current policy."""
 
     @property
     def max_steps(self) -> int:
-        """T, the longest an episode may last."""
+        """T, the most steps of an episode."""
 
     def set_table(self, table: ArrayLike) -> None:
         """Replace the table."""
 
     def save(self, path: str | Path) -> Path:
-        """Write the agent to one file, and return its path."""
+        """Write the agent to one file and return its path."""
 
 
 class Callback:
-    """Base class: override what you need."""
+    """Base class of callbacks: override the methods you need."""
 
     def on_training_start(self, agent: Agent) -> None:
         """Called once before the first trial."""
 
     def on_trial_end(self, agent: Agent, row: Row) -> bool | None:
-        """Called after every trial; it may add measures to `row`.
+        """Called after every trial; may add measures to `row`.
 
         Returns:
-            False to stop training; anything else goes on.
+            False to stop training; any other value continues it.
         """
         return True
 
     def on_training_end(self, agent: Agent) -> None:
-        """Called once after the last trial, also after an exception."""
+        """Called once after the last trial, and after an exception."""
 
 
 Function = Callable[[Agent, Row], Any]
 Callbacks = None | Callback | Function | Iterable[Callback | Function]
-"""What `learn` takes: nothing, one of these, or several."""
+"""What `learn` accepts: None, one callback or function, or several."""
 
 
 class _FunctionCallback(Callback):
@@ -76,15 +75,15 @@ class _FunctionCallback(Callback):
 
 
 def is_stop(result: Any) -> bool:
-    """Whether what a callback returned means to stop: False, Python's or NumPy's."""
+    """Whether a callback returned False, Python's or NumPy's, in order to stop."""
     return isinstance(result, (bool, np.bool_)) and not result
 
 
 def as_callbacks(callback: Callbacks) -> list[Callback]:
-    """Bring every accepted form of `callback` into a list of objects.
+    """Turn every accepted form of `callback` into a list of `Callback` objects.
 
     Raises:
-        TypeError: something in it is neither a `Callback` nor callable.
+        TypeError: an element is neither a `Callback` nor callable.
     """
     if callback is None:
         return []

@@ -1,4 +1,4 @@
-"""Evaluating between trials, and stopping when it no longer pays to go on."""
+"""Evaluation between trials, and early stopping."""
 
 from __future__ import annotations
 
@@ -12,47 +12,43 @@ from gymnasium.vector import VectorEnv
 from numpy.typing import NDArray
 
 from acl_gym.callbacks.base import Agent, Callback
-from acl_gym.evaluation import (
-    PolicyCost,
-    Predictor,
-    evaluate_policy_cost,
-    with_slots_for,
-)
+from acl_gym.evaluation import PolicyCost, evaluate_policy_cost, with_slots_for
 from acl_gym.evaluation.rollout import require_vector_env
 from acl_gym.policies import TablePolicy
 from acl_gym.utils import files, validation
-from acl_gym.utils.typing import Row
+from acl_gym.utils.typing import Predictor, Row
 
 
 class PolicyEvaluation(Callback):
-    """Evaluates the policy every few trials, and keeps the best one.
+    """Evaluates the policy every few trials and keeps the best one.
 
-    Adds `policy_cost` (3.47) and `success_rate` to the trial's row; the cost is that
-    which the agent learns to lower, `agent.cost` where it has one. Evaluation draws
-    nothing from the agent's generator and its time is not counted: learning is the
-    same with it and without it.
+    Adds `policy_cost` (eq. (3.47)) and `success_rate` to the trial's row. If the agent
+    has an episode cost of its own (`agent.cost`), that is the cost evaluated.
+    Evaluation draws no numbers from the agent's generator and its time is not counted,
+    so that learning is the same with it as without it.
 
     Args:
         env: where to evaluate, see `evaluate_policy_cost`.
-        states: initial states; None takes those of the environment.
-        every: evaluate after each so many trials, and after the last, >= 1.
+        states: initial states, `(n, state_size)`; None takes those of the environment.
+        every: trials between evaluations, >= 1; the last trial is always evaluated.
         max_steps: T of the evaluation; None takes that of the environment.
-        seed: of an environment that is random: every evaluation is from the same
-            initial states, with the same luck.
-        policy: what to evaluate, a function of the agent, for instance
-            `lambda colony: colony.soft_policy(seed=0)`; None takes the agent's own
-            greedy policy.
+        seed: of the environment, >= 0: every evaluation has the same initial states
+            and the same random numbers. None continues the environment's stream.
+        policy: a function of the agent that returns the policy to evaluate, for
+            instance `lambda colony: colony.soft_policy(seed=0)`; None takes the
+            agent's greedy policy.
         save_best: write the agent to this file whenever its policy is the best so
-            far; None writes nothing. Where the file is there, an agent that goes on
-            does not replace it by one worse than its `history` has seen.
+            far; None writes nothing. If the file exists, an agent that continues
+            learning replaces it only by a policy better than all in its `history`.
 
     Attributes:
-        best: the evaluation of the best policy so far: the lowest cost.
-        best_policy: that policy, unchanged by what the agent learns afterwards.
+        best: the evaluation with the lowest cost so far.
+        best_policy: the policy of that evaluation; further learning does not change
+            it.
 
     Raises:
         TypeError: `env` is not a vector environment, or `policy` not a function.
-        FileNotFoundError: there is no folder for `save_best`.
+        FileNotFoundError: the folder of `save_best` does not exist.
     """
 
     def __init__(
@@ -81,7 +77,7 @@ class PolicyEvaluation(Callback):
         self.seed = seed
         self.policy = policy
         self.env = env
-        self._env: VectorEnv[Any, Any, Any] | None = None  # with a slot a state
+        self._env: VectorEnv[Any, Any, Any] | None = None  # with one slot per state
         self.states = states
         self.every = validation.integer("every", every, at_least=1)
         if max_steps is not None:
@@ -91,20 +87,20 @@ class PolicyEvaluation(Callback):
         self.best_policy: Predictor | None = None
 
     def on_training_start(self, agent: Agent) -> None:
-        """Look up what the agent in the file has reached."""
+        """Look up the cost of the agent in the file."""
         self._saved_cost = math.inf
         if self.save_best is not None and self.save_best.exists():
             costs = (row.get("policy_cost", math.inf) for row in agent.history)
             self._saved_cost = min(costs, default=math.inf)
 
     def on_trial_end(self, agent: Agent, row: Row) -> bool | None:
-        """Evaluate if it is time to."""
+        """Evaluate if an evaluation is due."""
         if row["trial"] % self.every == 0:
             self._evaluate(agent, row)
         return True
 
     def on_training_end(self, agent: Agent) -> None:
-        """Evaluate the last policy if the last trial was not, and is whole."""
+        """Evaluate the last policy, unless that was done or its trial is unfinished."""
         if agent.in_trial:
             return
         if agent.history and "policy_cost" not in agent.history[-1]:
@@ -137,27 +133,26 @@ class PolicyEvaluation(Callback):
 
 
 class EarlyStop(Callback):
-    """Stops when a measure has not improved for a while, or is good enough.
+    """Stops when a measure has not improved for some time, or is good enough.
 
-    Put it after the `PolicyEvaluation` that adds the measure. It begins anew with
-    every call of `learn`, and counts only trials whose row has the measure.
+    Place it after the `PolicyEvaluation` that adds the measure. It starts afresh with
+    every call of `learn`, and counts only trials whose row contains the measure.
 
     Args:
-        patience: stop after so many such trials in a row without improvement, >= 1.
-        measure: a key of the rows of `history`; less is better.
-        min_improvement: what is less than the best so far by no more than this is no
-            improvement, >= 0.
-        threshold: stop as well once the measure is at most this; None sets no such
-            goal.
+        patience: stop after this many such trials in a row without improvement, >= 1.
+        measure: a key of the rows of `history`; lower is better.
+        min_improvement: a value counts as an improvement only if it is lower than the
+            best so far by more than this, >= 0.
+        threshold: also stop once the measure is at most this; None sets no threshold.
 
     Attributes:
         best: the lowest value so far, infinite before the first.
-        waited: trials with the measure since then.
+        waited: trials with the measure since the best one.
 
     Raises:
-        TypeError: a parameter is of the wrong kind.
-        ValueError: a parameter is out of range; while learning, the rows lack the
-            measure.
+        TypeError: a parameter has the wrong type.
+        ValueError: a parameter is out of range; or, while learning, no row contains
+            the measure.
     """
 
     best: float
@@ -172,7 +167,7 @@ class EarlyStop(Callback):
     ) -> None:
         self.patience = validation.integer("patience", patience, at_least=1)
         if not isinstance(measure, str):
-            raise TypeError(f"measure must be the name of one, got {measure!r}.")
+            raise TypeError(f"measure must be the name of a measure, got {measure!r}.")
         self.measure = measure
         self.min_improvement = validation.number(
             "min_improvement", min_improvement, at_least=0
@@ -183,11 +178,11 @@ class EarlyStop(Callback):
         self._begin(0)
 
     def on_training_start(self, agent: Agent) -> None:
-        """Begin to count."""
+        """Start counting."""
         self._begin(len(agent.history))
 
     def on_trial_end(self, agent: Agent, row: Row) -> bool | None:
-        """Look at the measure, if the row has it."""
+        """Read the measure if the row contains it."""
         value = row.get(self.measure)
         if value is None:
             # The rows before this one are complete.
@@ -201,15 +196,15 @@ class EarlyStop(Callback):
         return not reached and self.waited < self.patience
 
     def on_training_end(self, agent: Agent) -> None:
-        """Refuse to have watched a measure that was never there."""
+        """Raise an error if no row contained the measure."""
         rows = agent.history[self._first :]
         if self._seen or agent.in_trial or not rows:
             return
         if not any(self.measure in row for row in rows):
             raise ValueError(
                 f"EarlyStop needs rows with {self.measure!r}, got only "
-                f"{', '.join(rows[-1])}; put a PolicyEvaluation before it in the list "
-                "of callbacks."
+                f"{', '.join(rows[-1])}; place a PolicyEvaluation before it in the "
+                "list of callbacks."
             )
 
     def _begin(self, first: int) -> None:
@@ -222,5 +217,5 @@ class EarlyStop(Callback):
         if not self._seen and rows and self.measure in rows[-1]:
             raise ValueError(
                 f"EarlyStop must come after the callback that adds {self.measure!r}; "
-                "put it behind that one in the list of callbacks."
+                "move it behind that one in the list of callbacks."
             )

@@ -1,4 +1,4 @@
-"""What is left on disk while an agent learns: agents to go on from, and its log."""
+"""Files written while an agent learns: checkpoints and a CSV log."""
 
 from __future__ import annotations
 
@@ -17,18 +17,18 @@ _CHECKPOINT = re.compile(r"trial_(\d{6,})\.npz")
 
 
 class Checkpoint(Callback):
-    """Saves the agent every few trials, to go on from if the run is cut short.
+    """Saves the agent every few trials, so that an interrupted run can be resumed.
 
-    `ACL.load(directory / "trial_000010.npz", env).learn(trials=10)` is then what
-    learning on would have been, bit for bit. Put it after the callbacks that add
-    measures, so that these are in the file.
+    `ACL.load(directory / "trial_000010.npz", env).learn(trials=10)` gives bit for bit
+    the result of an uninterrupted run. Place it after the callbacks that add measures,
+    so that the file contains these.
 
     Args:
-        directory: receives `trial_000010.npz` and so on; made if it is not there. One
-            run, one directory: of another run in it, files of the same trials are
-            replaced, and those of earlier trials count as old.
-        every: save after each so many trials, and after the last, >= 1.
-        keep: leave only so many of the newest, >= 1; None leaves all.
+        directory: receives `trial_000010.npz` and so on; made if missing. Use one
+            directory per run: files of another run are replaced when a trial has the
+            same number, and `keep` may delete those of earlier trials.
+        every: trials between saves, >= 1; the last trial is always saved.
+        keep: keep only this many of the newest files, >= 1; None keeps all.
 
     Raises:
         TypeError: a number is not an integer.
@@ -49,13 +49,13 @@ class Checkpoint(Callback):
         self.directory.mkdir(parents=True, exist_ok=True)
 
     def on_trial_end(self, agent: Agent, row: Row) -> bool | None:
-        """Save if it is time to."""
+        """Save if a checkpoint is due."""
         if row["trial"] % self.every == 0:
             self._save(agent)
         return True
 
     def on_training_end(self, agent: Agent) -> None:
-        """Save the last trial if it is whole, with what its row has gained since."""
+        """Save the last trial if it is complete, with measures added to its row."""
         if not agent.in_trial and agent.trials:
             self._save(agent)
 
@@ -67,46 +67,45 @@ class Checkpoint(Callback):
             _CHECKPOINT.fullmatch(path.name) for path in self.directory.iterdir()
         )
         trials = sorted(int(match[1]) for match in matches if match)
-        # Later trials are those of another run, and none of our business.
-        ours = [trial for trial in trials if trial <= agent.trials]
-        for trial in ours[: -self.keep]:
+        # Files of later trials belong to another run and are left alone.
+        own = [trial for trial in trials if trial <= agent.trials]
+        for trial in own[: -self.keep]:
             (self.directory / f"trial_{trial:06d}.npz").unlink(missing_ok=True)
 
 
 class CSVLog(Callback):
-    """Keeps a CSV file that holds the agent's whole `history`, one row a trial.
+    """Keeps a CSV file with the agent's complete `history`, one row per trial.
 
-    A row is in the file as soon as its trial is over. The file begins with the rows
-    that a loaded agent brings with it, so that going on with the same path continues
-    it and repeats no trial. Cells of measures that a trial lacks are empty; numbers are
-    written so that reading gives the same ones. Put it after the callbacks that add
-    measures.
+    A row is written as soon as its trial is over. The file starts with the rows in the
+    history of a loaded agent, so that a resumed run with the same path continues the
+    log without repeating trials. Measures that a trial lacks are empty cells. Numbers
+    are written with full precision. Place it after the callbacks that add measures.
 
     Args:
-        path: the file; a log that is there is replaced by that of the agent.
+        path: the file; an existing log is replaced by that of the agent.
 
     Raises:
-        FileNotFoundError: there is no such folder.
-        ValueError: the file is there and is no such log.
+        FileNotFoundError: its folder does not exist.
+        ValueError: the file exists and is not a log of this class.
     """
 
     def __init__(self, path: str | Path) -> None:
         self.path = files.checked_target(Path(path))
         if self.path.exists() and not _is_log(self.path):
             raise ValueError(
-                f"{self.path} is there already and is not a log of acl-gym, whose "
-                "first column is 'trial'; choose another path or remove it."
+                f"{self.path} exists and is not a log of acl-gym, whose first column "
+                "is 'trial'; choose another path or remove the file."
             )
         self._columns: list[str] = []
         self._last: Row = {}
 
     def on_training_start(self, agent: Agent) -> None:
-        """Write the rows that are there already, or an empty file."""
+        """Write the rows of the history, or an empty file."""
         self._columns = []
         self._write_all(agent.history)
 
     def on_trial_end(self, agent: Agent, row: Row) -> bool | None:
-        """Append the row; a new column, which is rare, means writing all anew."""
+        """Append the row; a new column, which is rare, means rewriting the file."""
         if any(name not in self._columns for name in row):
             self._write_all(agent.history)
         else:
@@ -116,12 +115,12 @@ class CSVLog(Callback):
         return True
 
     def on_training_end(self, agent: Agent) -> None:
-        """Write the last row again if it has gained a measure since."""
+        """Rewrite the file if a measure was added to the last row."""
         if agent.history and agent.history[-1] != self._last:
             self._write_all(agent.history)
 
     def _write_all(self, rows: list[Row]) -> None:
-        """Write the file anew, whole or not at all."""
+        """Replace the file in one atomic step."""
         self._columns = list(dict.fromkeys(name for row in rows for name in row))
         header = [dict(zip(self._columns, self._columns, strict=True))] if rows else []
         text = self._lines([*header, *rows])
@@ -138,7 +137,7 @@ class CSVLog(Callback):
 
 
 def _plain(value: Any) -> Any:
-    """A NumPy number, which a callback may have left, as Python's; csv writes `repr`."""
+    """Turn a NumPy number, which a callback may have added, into a Python number."""
     return value.item() if hasattr(value, "item") else value
 
 

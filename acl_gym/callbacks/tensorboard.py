@@ -1,4 +1,4 @@
-"""The log of a run for TensorBoard."""
+"""A log of scalars for TensorBoard."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 from acl_gym.callbacks.base import Agent, Callback
 from acl_gym.utils.typing import Row
 
-# Column of a row -> tag; TensorBoard groups tags by what stands before the slash.
+# Column of a row -> tag; TensorBoard groups tags by the part before the slash.
 _TAGS = {
     "ants_cost": "cost/ants",
     "policy_cost": "cost/policy",
@@ -24,13 +24,13 @@ _TAGS = {
 class TensorBoardLog(Callback):
     """Writes the measures of each trial as scalars over environment steps.
 
-    Look at them with `tensorboard --logdir DIRECTORY`. Tags are `cost/policy`,
-    `cost/ants`, `success/policy` and so on, `other/NAME` for measures of your own. An
-    agent that goes on after being loaded hides what the directory holds of later
-    steps. Put it after the callbacks that add measures.
+    View them with `tensorboard --logdir DIRECTORY`. Tags are `cost/policy`,
+    `cost/ants`, `success/policy` and so on, and `other/NAME` for measures of your own.
+    When a loaded agent continues learning, scalars of later steps from an earlier run
+    are hidden. Place it after the callbacks that add measures.
 
     Args:
-        directory: receives the event files; made if it is not there. One a run.
+        directory: receives the event files; made if missing. Use one per run.
 
     Raises:
         ModuleNotFoundError: tensorboard is not installed.
@@ -57,7 +57,7 @@ class TensorBoardLog(Callback):
         return True
 
     def on_training_end(self, agent: Agent) -> None:
-        """Write what the last row has gained since, and close the file."""
+        """Write measures added to the last row since, and close the file."""
         if agent.history:
             row = agent.history[-1]
             self._write(
@@ -75,7 +75,7 @@ class TensorBoardLog(Callback):
 
 
 def _import_writer() -> Any:
-    # Only here: torch takes seconds to import.
+    # Imported here because torch takes seconds to import.
     try:
         from torch.utils.tensorboard import SummaryWriter
     except ImportError as error:

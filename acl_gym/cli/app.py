@@ -1,4 +1,4 @@
-"""The commands put together."""
+"""The command `acl-gym` with its subcommands."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ HELP = """Ant Colony Learning: colonies of ants that learn control policies.
 
 \b
 Examples:
-  acl-gym envs                                    what there is to learn
-  acl-gym train acl_gym/Pendulum-v0 --out a.npz   learn, a few seconds
-  acl-gym evaluate a.npz                          what the policy costs
-  acl-gym compare                                 ants, Q-learning and DQN
-  acl-gym reproduce fig5.4 --runs 3               a figure of the thesis
+  acl-gym envs                                    list the environments
+  acl-gym train acl_gym/Pendulum-v0 --out a.npz   learn, in a few seconds
+  acl-gym evaluate a.npz                          evaluate the saved policy
+  acl-gym compare                                 compare ACL, Q-learning, DQN
+  acl-gym reproduce fig5.4 --runs 3               repeat a figure of the thesis
 
-Each command explains itself: acl-gym train --help. It ends with exit code 0 for
-success, 1 for a run that failed, 2 for bad arguments, 130 for Ctrl-C.
+For the options of a command: acl-gym train --help. Exit codes are 0 for success, 1 for
+a run that failed, 2 for bad arguments, and 130 for Ctrl-C.
 """
 
 app = typer.Typer(cls=Group, add_completion=False, rich_markup_mode=None)
@@ -53,7 +53,7 @@ def _main(
     ] = False,
     debug: DebugOption = False,
 ) -> None:
-    """Show the help if there is no command."""
+    """Show the help if no command is given."""
     if context.invoked_subcommand is None:
         typer.echo(context.get_help())
         raise typer.Exit(2)

@@ -1,4 +1,4 @@
-"""What the commands share: errors on one line, `NAME=VALUE`, environments, tables."""
+"""Shared by the commands: errors on one line, `NAME=VALUE`, environments, tables."""
 
 from __future__ import annotations
 
@@ -23,23 +23,23 @@ if TYPE_CHECKING:
     from acl_gym.agents.base import TabularAgent
 
 INTERRUPTED = 130
-"""The exit code of a program that Ctrl-C has ended, as shells have it."""
+"""The exit code of a program ended by Ctrl-C, by convention of the shells."""
 
 AGENTS = {"acl": "ACL", "q-learning": "QLearning"}
-"""What `--agent` calls them -> their class in `acl_gym`."""
+"""Value of `--agent` -> name of the class in `acl_gym`."""
 
 AgentName = Literal["acl", "q-learning"]
 
 FOREIGN_EPISODES = 100
-"""Episodes of an evaluation where the environment names no initial states."""
+"""Episodes of an evaluation if the environment has no evaluation states."""
 
 
 class BadArgumentError(Exception):
-    """What the user has typed cannot be done; exit code 2."""
+    """An error in the arguments; exit code 2."""
 
 
 class InterruptedRunError(Exception):
-    """Ctrl-C came, and there is something to say about it; exit code 130."""
+    """Ctrl-C was pressed, with a message about the results; exit code 130."""
 
 
 class _Flags:
@@ -56,16 +56,16 @@ DebugOption = Annotated[
         "--debug",
         callback=_set_debug,
         is_eager=True,
-        help="Show the whole traceback of an error.",
+        help="Show the full traceback of an error.",
     ),
 ]
 JsonOption = Annotated[
-    bool, typer.Option("--json", help="Print figures as JSON, and nothing else.")
+    bool, typer.Option("--json", help="Print the results as JSON and nothing else.")
 ]
 
 
-class Command(TyperCommand):
-    """A command whose errors are one line on stderr and an exit code."""
+class _OneLineErrors:
+    """Mixin of Typer's commands that reports errors on one line of stderr."""
 
     def main(
         self,
@@ -77,23 +77,16 @@ class Command(TyperCommand):
         **extra: Any,
     ) -> Any:
         """Run the command and exit."""
-        return _run(super().main, args, prog_name, standalone_mode)
+        main = super().main  # type: ignore[misc]
+        return _run(main, args, prog_name, standalone_mode)
 
 
-class Group(TyperGroup):
-    """Commands whose errors are one line on stderr and an exit code."""
+class Command(_OneLineErrors, TyperCommand):
+    """A command that reports errors on one line of stderr, with an exit code."""
 
-    def main(
-        self,
-        args: Sequence[str] | None = None,
-        prog_name: str | None = None,
-        complete_var: str | None = None,
-        standalone_mode: bool = True,
-        windows_expand_args: bool = True,
-        **extra: Any,
-    ) -> Any:
-        """Run the command and exit."""
-        return _run(super().main, args, prog_name, standalone_mode)
+
+class Group(_OneLineErrors, TyperGroup):
+    """A group that reports errors on one line of stderr, with an exit code."""
 
 
 def _run(
@@ -107,27 +100,29 @@ def _run(
     _Flags.debug = False
     name = prog_name or "acl-gym"
     with warnings.catch_warnings():
-        warnings.showwarning = lambda message, *_: _tell(name, f"warning: {message}")
+        warnings.showwarning = lambda message, *_: _report(name, f"warning: {message}")
         try:
             code = main(args, prog_name, standalone_mode=False)
-            if code == INTERRUPTED:  # what Typer makes of Ctrl-C
-                _tell(name, "interrupted; what is in files already is kept.")
+            if code == INTERRUPTED:  # what Typer returns after Ctrl-C
+                _report(name, "interrupted; files written so far are kept.")
         except Exception as error:
             code = _explain(name, error)
     sys.exit(code if isinstance(code, int) else 0)
 
 
 def _explain(name: str, error: Exception) -> int:
-    """Tell what has gone wrong; the exit code."""
+    """Report an error; returns the exit code."""
     if _Flags.debug:
         traceback.print_exception(error)
-    if isinstance(error, typer.TyperException):  # of the parser
+    if isinstance(error, typer.TyperException):  # from the parser
         path = getattr(getattr(error, "ctx", None), "command_path", name)
-        message = error.format_message().rstrip(".")
-        _tell(name, f"{message}. See '{path} --help'.")
+        message = error.format_message()
+        if not message.endswith((".", "?")):
+            message += "."
+        _report(name, f"{message} See '{path} --help'.")
         return 2
     if isinstance(error, (BadArgumentError, InterruptedRunError)):
-        _tell(name, str(error))
+        _report(name, str(error))
         return 2 if isinstance(error, BadArgumentError) else INTERRUPTED
     message = str(error)
     plain = isinstance(
@@ -135,17 +130,17 @@ def _explain(name: str, error: Exception) -> int:
     )
     if not (plain and message):
         message = f"{type(error).__name__}: {message}"
-    _tell(name, message)
+    _report(name, message)
     return 1
 
 
-def _tell(name: str, message: str) -> None:
+def _report(name: str, message: str) -> None:
     typer.echo(f"{name}: {' '.join(message.split())}", err=True)
 
 
 @contextmanager
 def bad_arguments() -> Iterator[None]:
-    """While arguments are turned into objects: their errors are those of the user."""
+    """Turn errors raised while arguments are processed into `BadArgumentError`."""
     import gymnasium as gym
 
     try:
@@ -157,15 +152,15 @@ def bad_arguments() -> Iterator[None]:
 def parse_settings(
     option: str, texts: Iterable[str], allowed: Collection[str] | None = None
 ) -> dict[str, Any]:
-    """Turn `name=value` into a dict; a value that is JSON is read as such.
+    """Parse `name=value` pairs into a dict; values that are JSON are read as JSON.
 
     Args:
-        option: the option they were given to.
-        texts: `name=value` each.
-        allowed: names that there are; None allows all.
+        option: the option, for messages.
+        texts: the pairs, each `name=value`.
+        allowed: the valid names; None allows all.
 
     Raises:
-        BadArgumentError: a text has no `=`, a name is not allowed or there twice.
+        BadArgumentError: a text has no `=`, or a name is unknown or repeated.
     """
     settings: dict[str, Any] = {}
     for text in texts:
@@ -174,7 +169,7 @@ def parse_settings(
             raise BadArgumentError(f"{option} must be name=value, got {text!r}.")
         if allowed is not None and name not in allowed:
             raise BadArgumentError(
-                f"{option} knows no {name!r}; there are {', '.join(sorted(allowed))}."
+                f"{option} has no {name!r}; choose from {', '.join(sorted(allowed))}."
             )
         if name in settings:
             raise BadArgumentError(f"{option} sets {name!r} twice.")
@@ -188,10 +183,11 @@ def parse_settings(
 def make_env(env_id: str, num_envs: int, env_args: dict[str, Any]) -> VectorEnv:
     """Make any registered vector environment; `module:id` imports the module first.
 
-    The module may lie in the working directory, as for `python -m`.
+    The module may be in the working directory, as with `python -m`.
 
     Raises:
-        BadArgumentError: there is no such id, or it cannot be made so.
+        BadArgumentError: the id is unknown, or the environment cannot be made with
+            these arguments.
     """
     import gymnasium as gym
 
@@ -204,7 +200,7 @@ def make_env(env_id: str, num_envs: int, env_args: dict[str, Any]) -> VectorEnv:
     with bad_arguments():
         if module:
             import_module(module)
-        # A first one without arguments tells which there are.
+        # Make one without arguments first, to learn which arguments there are.
         plain = gym.make_vec(env_id, num_envs=1) if env_args else None
         if plain is not None:
             if isinstance(plain.unwrapped, ControlVectorEnv):
@@ -221,12 +217,12 @@ def _check_names(env_id: str, system: type, env_args: dict[str, Any]) -> None:
     names = [*(field.name for field in fields(system)), "max_episode_steps"]
     if unknown := [name for name in env_args if name not in names]:
         raise ValueError(
-            f"{env_id} has no parameter {unknown[0]!r}; there are {', '.join(names)}."
+            f"{env_id} has no parameter {unknown[0]!r}; choose from {', '.join(names)}."
         )
 
 
 def default_steps(env: VectorEnv) -> int:
-    """T: that of the environment, 300 if it has none."""
+    """T: the limit of the environment, or 300 if it has none."""
     from acl_gym.agents.base import DEFAULT_MAX_STEPS, time_limit
     from acl_gym.envs.control.environments import ControlVectorEnv
 
@@ -237,10 +233,10 @@ def default_steps(env: VectorEnv) -> int:
 
 
 def load_agent(path: str) -> TabularAgent:
-    """Load an agent of whatever kind the file holds.
+    """Load an agent of any kind from a file.
 
     Raises:
-        BadArgumentError: there is no such file, or it is not one of ours.
+        BadArgumentError: there is no such file, or it holds no agent of this package.
     """
     import acl_gym
     from acl_gym.utils import files
@@ -256,12 +252,12 @@ def load_agent(path: str) -> TabularAgent:
 
 
 def print_json(value: Any) -> None:
-    """Print JSON, with numbers so that reading gives the same ones."""
+    """Print JSON, with numbers in full precision."""
     typer.echo(json.dumps(value, indent=1))
 
 
 def console(stderr: bool = False) -> Console:
-    """Where tables go; a file or a pipe is given a width, a terminal knows its own."""
+    """The console for tables; a file or a pipe gets a fixed width."""
     from rich.console import Console
 
     stream = sys.stderr if stderr else sys.stdout

@@ -1,7 +1,7 @@
 """`acl-gym envs`: the environments of this package and their parameters.
 
-The list is read from the docstrings of the source files, not from the modules: those
-import Numba, which takes a second.
+The list is read from the docstrings in the source files, because importing the modules
+imports Numba, which takes a second.
 """
 
 from __future__ import annotations
@@ -26,10 +26,10 @@ from acl_gym.cli.common import (
 )
 from acl_gym.envs import ENVIRONMENTS
 
-HELP = """List the environments of acl-gym, or the parameters of one.
+HELP = """List the environments of acl-gym, or show the parameters of one.
 
-Each parameter is a keyword of gym.make and gym.make_vec, and an --env-arg of acl-gym
-train, as is max_episode_steps.
+Parameters and max_episode_steps are keywords of gym.make and gym.make_vec, and can be
+set with --env-arg of acl-gym train.
 
 \b
 Examples:
@@ -42,13 +42,15 @@ Examples:
 def envs(
     env_id: Annotated[
         str | None,
-        typer.Argument(metavar="[ID]", help="Show its parameters.", show_default=False),
+        typer.Argument(
+            metavar="[ID]",
+            help="Show the parameters of this environment.",
+            show_default=False,
+        ),
     ] = None,
     seed: Annotated[
         int,
-        typer.Option(
-            min=0, metavar="N", help="Of the example observation that ID shows."
-        ),
+        typer.Option(min=0, metavar="N", help="Seed of the example observation."),
     ] = 0,
     as_json: JsonOption = False,
     debug: DebugOption = False,
@@ -63,7 +65,7 @@ def envs(
         return
     if env_id not in ENVIRONMENTS:
         raise BadArgumentError(
-            f"acl-gym has no environment {env_id!r}; there are "
+            f"acl-gym has no environment {env_id!r}; choose from "
             f"{', '.join(ENVIRONMENTS)}."
         )
     found = {**describe(env_id), **_example(env_id, seed)}
@@ -74,7 +76,7 @@ def envs(
 
 
 def describe(env_id: str) -> dict[str, Any]:
-    """What the docstring of an environment says in short, read without importing it."""
+    """A summary of an environment from its docstring, read without importing it."""
     module, name = ENVIRONMENTS[env_id][0].split(":")
     text = _docstring(module, name)
     section = re.search(r"§[\d.]*\d|Chapter \d+", text)
@@ -115,7 +117,8 @@ def _docstring(module: str, name: str) -> str:
     spec = importlib.util.find_spec(module)
     if spec is None or spec.origin is None:
         return ""
-    # The package of a system only hands on what its module `env` defines.
+    # The package of a system imports the class from its module `env`. To look up that
+    # module would import the package, and with it Numba.
     source = Path(spec.origin).with_name("env.py")
     tree = ast.parse(source.read_text(encoding="utf-8"))
     for node in tree.body:
@@ -125,7 +128,7 @@ def _docstring(module: str, name: str) -> str:
 
 
 def _first_sentence(text: str, head: str) -> str:
-    """The first sentence under a head of a docstring, without backquotes."""
+    """The first sentence under a heading of a docstring, without backquotes."""
     match = re.search(rf"^## {head}\n+((?:.+\n?)+)", text, re.MULTILINE)
     if match is None:
         return ""
@@ -134,7 +137,7 @@ def _first_sentence(text: str, head: str) -> str:
 
 
 def _attributes(text: str) -> dict[str, str]:
-    """The entries of the section `Attributes:` of a Google docstring."""
+    """The entries in the section `Attributes:` of a Google docstring."""
     _, _, section = text.partition("Attributes:\n")
     entries: dict[str, str] = {}
     name = ""

@@ -1,4 +1,4 @@
-"""`acl-gym evaluate`: what the policy in a file costs."""
+"""`acl-gym evaluate`: the cost of a saved policy."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ from acl_gym.cli.common import (
 if TYPE_CHECKING:
     from acl_gym.evaluation import PolicyCost
 
-HELP = """Print what the policy of a saved agent costs.
+HELP = """Evaluate the policy of a saved agent.
 
-The greedy policy is followed, without exploring. A file of acl-gym train knows its
-environment and how it was evaluated: without options the same is done again, and gives
-the same cost. A file saved from Python needs --env-id.
+The greedy policy is run without exploration. A file written by acl-gym train records
+its environment and how it was evaluated; without options the evaluation is repeated and
+gives the same cost. A file saved from Python needs --env-id.
 
 \b
 Examples:
@@ -45,7 +45,7 @@ def evaluate(
         str | None,
         typer.Option(
             metavar="ID",
-            help="Another environment.  [default: that of the file]",
+            help="Evaluate in this environment.  [default: the one in the file]",
             show_default=False,
         ),
     ] = None,
@@ -54,8 +54,9 @@ def evaluate(
         typer.Option(
             min=1,
             metavar="N",
-            help="So many episodes from random initial states.  [default: those of the "
-            f"environment for evaluation, else {FOREIGN_EPISODES} random ones]",
+            help="Number of episodes, from random initial states.  [default: the "
+            "evaluation states of the environment, or "
+            f"{FOREIGN_EPISODES} random ones if it has none]",
             show_default=False,
         ),
     ] = None,
@@ -64,8 +65,8 @@ def evaluate(
         typer.Option(
             min=0,
             metavar="N",
-            help="Of initial states and of an environment that is random.  [default: "
-            "that of the file, else 0]",
+            help="Seed of the initial states and the environment.  [default: that in "
+            "the file, or 0]",
             show_default=False,
         ),
     ] = None,
@@ -74,7 +75,7 @@ def evaluate(
         typer.Option(
             min=1,
             metavar="T",
-            help="The longest an episode may last.  [default: that of the file]",
+            help="The most steps of an episode.  [default: the limit in the file]",
             show_default=False,
         ),
     ] = None,
@@ -86,13 +87,13 @@ def evaluate(
     from acl_gym.evaluation import evaluate_policy_cost
 
     agent = load_agent(file)
-    known_id, env_args, how = _what_the_file_says(agent.metadata)
+    known_id, env_args, how = _recorded_evaluation(agent.metadata)
     if env_id is not None and env_id != known_id:
-        # Another environment: what was said of the first is no guide.
+        # Arguments and evaluation of another environment do not apply.
         known_id, env_args, how = env_id, {}, {}
     if known_id is None:
         raise BadArgumentError(
-            f"{file} does not say which environment it is for; add --env-id ID."
+            f"{file} does not name its environment; add --env-id ID."
         )
     if seed is None:
         seed = how.get("seed", 0)
@@ -127,7 +128,7 @@ def evaluate(
 
 
 def figures(result: PolicyCost) -> dict[str, Any]:
-    """What is printed of an evaluation, JSON types only."""
+    """The printed results of an evaluation, JSON types only."""
     return {
         "policy_cost": result.cost,
         "success_rate": result.success_rate,
@@ -138,7 +139,7 @@ def figures(result: PolicyCost) -> dict[str, Any]:
     }
 
 
-def _what_the_file_says(
+def _recorded_evaluation(
     metadata: dict[str, Any],
 ) -> tuple[str | None, dict[str, Any], dict[str, Any]]:
     env_id = metadata.get("env_id")

@@ -1,4 +1,4 @@
-"""`acl-gym train`: learn on any environment and save the agent."""
+"""`acl-gym train`: learn in any environment and save the agent."""
 
 from __future__ import annotations
 
@@ -31,11 +31,11 @@ if TYPE_CHECKING:
     from acl_gym.callbacks import Callback, PolicyEvaluation
     from acl_gym.partitions import Partition
 
-HELP = """Learn on an environment, print how it went, and save the agent.
+HELP = """Learn in an environment, print the progress, and save the agent.
 
-ENV_ID is any id of Gymnasium that can be a vector environment with Discrete actions;
-"module:id" imports a module first, also one in this folder. Rewards must be negative
-costs for ants, or --param deposit=return where they are never negative.
+ENV_ID is the id of any Gymnasium environment with Discrete actions; "module:id" imports
+a module first, which may be in the working directory. ACL expects rewards that are
+negative costs; use --param deposit=return if rewards are never negative.
 
 \b
 Examples:
@@ -49,9 +49,9 @@ Examples:
 """
 
 RANDOM_STEPS = 10_000
-"""From which bounds are estimated where observations have none."""
+"""Random steps from which missing bounds of observations are estimated."""
 
-_OWN_OPTION = ("env", "partition", "max_steps", "seed", "n_actions")
+_OWN_OPTIONS = ("env", "partition", "max_steps", "seed", "n_actions")
 
 
 def train(
@@ -59,19 +59,26 @@ def train(
         str,
         typer.Argument(metavar="ENV_ID", help="See acl-gym envs.", show_default=False),
     ],
-    agent: Annotated[AgentName, typer.Option(help="Who learns.")] = "acl",
+    agent: Annotated[AgentName, typer.Option(help="The learning algorithm.")] = "acl",
     trials: Annotated[
         int,
-        typer.Option(min=1, metavar="K", help="Trials, one episode of every ant each."),
+        typer.Option(
+            min=1,
+            metavar="K",
+            help="Number of trials; in each, every ant makes one episode.",
+        ),
     ] = 100,
     ants: Annotated[
-        int, typer.Option(min=1, metavar="M", help="Slots of the vector environment.")
+        int,
+        typer.Option(
+            min=1, metavar="M", help="Number of ants: slots of the vector environment."
+        ),
     ] = 250,
     partition: Annotated[
         Literal["auto", "fuzzy", "crisp"],
         typer.Option(
-            help="How observations become cells, where they are not cells already; "
-            "auto is fuzzy. Bounds that are missing are estimated from random steps."
+            help="How continuous observations are partitioned into cells; auto means "
+            "fuzzy. Missing bounds are estimated from random steps."
         ),
     ] = "auto",
     cells: Annotated[
@@ -79,7 +86,7 @@ def train(
         typer.Option(
             metavar="N,N,...",
             help="Cells of each variable, or one number for all.  "
-            "[default: those of the thesis, else a few thousand altogether]",
+            "[default: those of the thesis, or a few thousand in total]",
             show_default=False,
         ),
     ] = None,
@@ -88,8 +95,8 @@ def train(
         typer.Option(
             min=1,
             metavar="T",
-            help="The longest an episode may last, in learning and in evaluation.  "
-            "[default: that of the environment, else 300]",
+            help="The most steps of an episode, in learning and in evaluation.  "
+            "[default: the limit of the environment, or 300]",
             show_default=False,
         ),
     ] = None,
@@ -97,8 +104,8 @@ def train(
         list[str] | None,
         typer.Option(
             metavar="NAME=VALUE",
-            help="A parameter of the agent, such as epsilon=0.2; give it again for "
-            "more. An unknown name lists those there are.",
+            help="A parameter of the agent, such as epsilon=0.2; repeat the option for "
+            "more. An unknown name prints the list of parameters.",
             show_default=False,
         ),
     ] = None,
@@ -106,36 +113,41 @@ def train(
         list[str] | None,
         typer.Option(
             metavar="NAME=VALUE",
-            help="A parameter of the environment, see acl-gym envs ENV_ID; numbers, "
-            "true, false and [lists] are read as JSON.",
+            help="A parameter of the environment, see acl-gym envs ENV_ID. Values are "
+            "read as JSON: numbers, true, false, [lists].",
             show_default=False,
         ),
     ] = None,
     seed: Annotated[
-        int, typer.Option(min=0, metavar="N", help="The run is a function of it.")
+        int,
+        typer.Option(
+            min=0, metavar="N", help="Seed; the same seed gives the same run."
+        ),
     ] = 0,
     threads: Annotated[
         int,
         typer.Option(
-            min=1, metavar="N", help="For many thousand ants; changes no result."
+            min=1,
+            metavar="N",
+            help="Threads; useful with several thousand ants. The result is the same.",
         ),
     ] = 1,
     out: Annotated[
         Path | None,
         typer.Option(
             metavar="FILE.npz",
-            help="Save the agent here.  [default: the name of the environment, with a "
-            "number if there is such a file]",
+            help="Save the agent to this file.  [default: the name of the environment, "
+            "with a number if the file exists]",
             show_default=False,
         ),
     ] = None,
     evaluate_every: Annotated[
-        int, typer.Option(min=1, metavar="N", help="Trials between two evaluations.")
+        int, typer.Option(min=1, metavar="N", help="Trials between evaluations.")
     ] = 10,
     log: Annotated[
         Path | None,
         typer.Option(
-            metavar="FILE.csv", help="Write a row of each trial.", show_default=False
+            metavar="FILE.csv", help="Write one row per trial.", show_default=False
         ),
     ] = None,
     tensorboard: Annotated[
@@ -145,7 +157,7 @@ def train(
         ),
     ] = None,
     quiet: Annotated[
-        bool, typer.Option("--quiet", help="Print no bar and no table.")
+        bool, typer.Option("--quiet", help="Print no progress bar and no table.")
     ] = False,
     as_json: JsonOption = False,
     debug: DebugOption = False,
@@ -190,16 +202,16 @@ def train(
 
 
 def agent_class(name: str) -> Any:
-    """The class that `--agent` means."""
+    """The class that `--agent` selects."""
     import acl_gym
 
     return getattr(acl_gym, AGENTS[name])
 
 
 def parameter_names(kind: type) -> list[str]:
-    """What `--param` may set: the keywords of the constructor without own options."""
+    """Names for `--param`: constructor keywords that have no option of their own."""
     parameters = inspect.signature(kind).parameters
-    return [name for name in parameters if name not in _OWN_OPTION]
+    return [name for name in parameters if name not in _OWN_OPTIONS]
 
 
 def _cells(text: str | None) -> list[int] | None:
@@ -228,7 +240,7 @@ def _make_partition(env: VectorEnv, kind: str, cells: list[int] | None) -> Parti
 def _make_evaluation(
     env: VectorEnv, env_id: str, env_args: dict[str, Any], every: int, steps: int
 ) -> PolicyEvaluation:
-    """From the environment's own initial states, else from random but fixed ones."""
+    """Evaluate from the environment's evaluation states, or from fixed random ones."""
     from acl_gym import PolicyEvaluation
     from acl_gym.envs.control.environments import ControlVectorEnv
 
@@ -285,12 +297,12 @@ def _print_rows(learner: TabularAgent, out: Path) -> None:
             )
     target = console()
     target.print(table)
-    line = f"Saved {out}; acl-gym evaluate {out} evaluates it again."
+    line = f"Saved {out}. To evaluate it again: acl-gym evaluate {out}"
     target.print(line, markup=False, highlight=False, soft_wrap=True)
 
 
 def _free_name(env_id: str) -> Path:
-    """A file in this folder that is not there yet: Pendulum-v0.npz, -2, -3, ..."""
+    """A file name that is not taken in this folder: Pendulum-v0.npz, -2, -3, ..."""
     stem = env_id.rpartition(":")[2].rpartition("/")[2]
     path, number = Path(f"{stem}.npz"), 1
     while path.exists():

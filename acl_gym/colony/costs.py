@@ -292,11 +292,11 @@ class Weighted(Cost):
 
 
 @dataclass(frozen=True)
-class OwnCost(Cost):
-    """A user's function of one whole solution.
+class FunctionCost(Cost):
+    """A user's function of one solution.
 
     Attributes:
-        function: takes a `Episode`, returns its cost.
+        function: takes an `Episode`, returns its cost.
     """
 
     function: Callable[[Episode], float]
@@ -323,7 +323,7 @@ _KINDS = (
     Constant,
     Sum,
     Weighted,
-    OwnCost,
+    FunctionCost,
 )
 
 
@@ -336,7 +336,7 @@ def as_cost(cost: Cost | Callable[[Episode], float] | None) -> Cost | None:
     if cost is None or isinstance(cost, Cost):
         return cost
     if callable(cost) and not isinstance(cost, type):
-        return OwnCost(cost)
+        return FunctionCost(cost)
     raise TypeError(
         "cost must be a Cost such as Steps(), or a function of one solution, got "
         f"{cost!r}."
@@ -364,10 +364,20 @@ def cost_from_settings(settings: Any) -> Cost | None:
     Raises:
         ValueError: it is none.
     """
-    cost = from_settings("cost", settings, _KINDS)
+    cost = from_settings("cost", _with_current_names(settings), _KINDS)
     if cost is not None and not isinstance(cost, Cost):
         raise ValueError(f"cost must be a Cost, got {settings!r:.200}.")
     return cost
+
+
+def _with_current_names(settings: Any) -> Any:
+    """Settings in which costs have the names that their classes have now."""
+    if not isinstance(settings, dict):
+        return settings
+    current = {name: _with_current_names(value) for name, value in settings.items()}
+    if current.get("type") == "OwnCost":
+        current["type"] = FunctionCost.__name__
+    return current
 
 
 def _first_crossing(progress: FloatArray, level: float) -> FloatArray:

@@ -1,8 +1,7 @@
-"""Following a policy, and what it costs (3.47)."""
+"""Running a policy and measuring its cost, eq. (3.47)."""
 
 from acl_gym.evaluation.policy_cost import (
     PolicyCost,
-    Predictor,
     Trajectory,
     actions_in,
     control_env,
@@ -11,6 +10,7 @@ from acl_gym.evaluation.policy_cost import (
     require_predictor,
     with_slots_for,
 )
+from acl_gym.utils.typing import Predictor
 
 __all__ = [
     "PolicyCost",

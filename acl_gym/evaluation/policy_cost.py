@@ -1,10 +1,10 @@
-"""The cost of a policy from given initial states (3.47)."""
+"""The cost of a policy: the mean over given initial states, eq. (3.47)."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from gymnasium.vector import VectorEnv
@@ -15,24 +15,17 @@ from acl_gym.colony.episodes import Episode
 from acl_gym.envs.control.environments import ControlVectorEnv
 from acl_gym.evaluation.rollout import Rollout, require_vector_env
 from acl_gym.policies import PartitionPolicy
-from acl_gym.utils.typing import FloatArray
-
-
-class Predictor(Protocol):
-    """Anything with Stable-Baselines3's `predict`: our agents and theirs."""
-
-    def predict(self, observation: Any, *, deterministic: bool = ...) -> Any:
-        """Return `(actions, state)` for a batch of observations."""
+from acl_gym.utils.typing import FloatArray, Predictor
 
 
 @dataclass(frozen=True)
 class PolicyCost:
-    """What a policy costs from each initial state.
+    """The cost of a policy from each initial state.
 
     Attributes:
         costs: J of each episode, `(n,)`.
-        success: whether each ended in a terminal state, `(n,)`.
-        lengths: steps of each, `(n,)`.
+        success: whether each episode ended in a terminal state, `(n,)`.
+        lengths: steps of each episode, `(n,)`.
     """
 
     costs: FloatArray
@@ -41,7 +34,7 @@ class PolicyCost:
 
     @property
     def cost(self) -> float:
-        """J^h, the mean cost over the initial states (3.47)."""
+        """Policy cost J^h, the mean over the initial states, eq. (3.47)."""
         return float(self.costs.mean())
 
     @property
@@ -76,26 +69,27 @@ def evaluate_policy_cost(
     seed: int | None = None,
     cost: Cost | Callable[[Episode], float] | None = None,
 ) -> PolicyCost:
-    """Follow the policy of `model`, without exploring, once from each initial state.
+    """Run the policy of `model` once from each initial state, without exploration.
 
     Args:
-        model: an agent with `predict(observation, deterministic=True)`.
-        env: where to follow it. An unwrapped environment of this package is given as
-            many slots as there are states; any other must have that many already.
+        model: an agent or policy with `predict(observation, deterministic=True)`.
+        env: where to run it. An unwrapped environment of this package is copied with
+            one slot per state; any other must have that many slots already.
         states: initial states `(n, ...)`. None takes `evaluation_states()` of an
-            environment of this package, and random ones of any other.
+            environment of this package, and random states of any other.
         max_steps: T, >= 1. None takes the environment's `evaluation_steps`, 300 for
             an environment of another package.
-        seed: seeds the environment where it is random.
-        cost: what a solution costs; None takes the sum of its stage costs, see
-            `acl_gym.colony.costs`.
+        seed: of the environment's random numbers; None continues its stream.
+        cost: the cost of an episode, see `acl_gym.colony.costs`; None takes the sum
+            of its stage costs.
 
     Returns:
-        Costs, successes and lengths, one for each state.
+        Costs, successes and lengths, one per state.
 
     Raises:
         TypeError: `model` has no `predict`, or `env` is not a vector environment.
-        ValueError: the number of slots and of states differ and `env` is wrapped.
+        ValueError: `env` is wrapped and has not one slot per state, or is of another
+            package and `states` are given.
     """
     require_predictor(model)
     require_vector_env(env)
@@ -117,21 +111,26 @@ def evaluate_policy_cost(
             f"got {env.num_envs} slots."
         )
     rollout = Rollout(env, 300 if max_steps is None else max_steps)
-    whole = as_cost(cost)
-    observation = rollout.start(seed=seed, states=states, record=whole is not None)
+    episode_cost = as_cost(cost)
+    observation = rollout.start(
+        seed=seed, states=states, record=episode_cost is not None
+    )
     while rollout.ants.size:
         actions = _chosen(model, observation[rollout.ants], rollout)
         observation = rollout.step(actions).observation
-    costs = rollout.cost if whole is None else solution_costs(whole, rollout.episodes())
+    costs = rollout.cost
+    if episode_cost is not None:
+        costs = solution_costs(episode_cost, rollout.episodes())
     return PolicyCost(costs, rollout.success, rollout.length)
 
 
 def with_slots_for(
     env: VectorEnv[Any, Any, Any], states: FloatArray | None = None
 ) -> VectorEnv[Any, Any, Any]:
-    """An environment that has a slot for each initial state of an evaluation.
+    """An environment that has one slot per initial state of an evaluation.
 
-    Who evaluates often asks once, and hands it to `evaluate_policy_cost` each time.
+    To evaluate often, call this once and pass the result to `evaluate_policy_cost`
+    each time.
 
     Args:
         env: where to evaluate.
@@ -139,8 +138,8 @@ def with_slots_for(
             this package.
 
     Returns:
-        A new environment of the same system, or `env` itself where it has as many
-        slots already, is wrapped, or is of another package.
+        A new environment of the same system; or `env` itself if it has the right
+        number of slots already, is wrapped, or is of another package.
     """
     base = env.unwrapped
     if base is not env or not isinstance(base, ControlVectorEnv):
@@ -151,7 +150,7 @@ def with_slots_for(
 
 
 def _chosen(model: Predictor, observation: Any, rollout: Rollout) -> NDArray[np.int64]:
-    """Indices of the actions that `model` takes for the walking slots."""
+    """Indices of the actions that `model` takes in the active slots."""
     allowed = rollout.allowed()
     if allowed is not None and isinstance(model, PartitionPolicy):
         actions, _ = model.predict(observation, action_masks=allowed)
@@ -167,7 +166,7 @@ def record_trajectory(
     *,
     max_steps: int | None = None,
 ) -> Trajectory:
-    """Follow the policy of `model` once and keep every state, action and cost.
+    """Run the policy of `model` once and record every state, action and cost.
 
     Args:
         model: see `evaluate_policy_cost`.
@@ -207,7 +206,7 @@ def actions_in(
 
     Args:
         model: see `evaluate_policy_cost`.
-        env: an environment of this package with one slot a state, wrapped or not.
+        env: an environment of this package with one slot per state, wrapped or not.
         states: `(n, state_size)`.
 
     Raises:
@@ -220,7 +219,7 @@ def actions_in(
 
 
 def require_predictor(model: Any) -> None:
-    """Refuse what cannot choose actions.
+    """Check that an object can choose actions.
 
     Raises:
         TypeError: `model` has no method `predict`.
@@ -241,7 +240,7 @@ def control_env(env: VectorEnv[Any, Any, Any]) -> ControlVectorEnv:
     base = env.unwrapped
     if not isinstance(base, ControlVectorEnv):
         raise TypeError(
-            "env must be a vector environment of acl_gym, which can be put into any "
-            f"state; got {type(base).__name__}."
+            "env must be a vector environment of acl_gym, which can start from any "
+            f"state, got {type(base).__name__}."
         )
     return base

@@ -1,9 +1,9 @@
 """One episode in each slot of any vector environment.
 
-Algorithms 4.1 and 4.2 let every ant walk until it reaches the goal or has made T
-steps, and wait for the others. Vector environments differ in what they do with a slot
-that has finished; `Rollout` hides the difference, so that an agent sees walking ants and
-nothing else.
+In Algorithms 4.1 and 4.2 every ant walks until it reaches the goal or has made T steps,
+and then waits for the others. Vector environments differ in what they do with a slot
+that has finished. `Rollout` hides the difference: an agent sees only the ants that are
+still walking.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from acl_gym.utils.typing import BoolArray, FloatArray, IntArray
 
 
 class Step(NamedTuple):
-    """What one step brought to the ants that walked it, each array `(m,)`."""
+    """The outcome of one step for the ants that took it, arrays of shape `(m,)`."""
 
     ants: IntArray
     """The slots that took the step."""
@@ -36,7 +36,7 @@ class Step(NamedTuple):
     terminated: BoolArray
     """Whether the episode ended in a terminal state."""
     finished: BoolArray
-    """Whether the ant walks no further, for whatever reason."""
+    """Whether the episode is over: a terminal state, the environment's limit or T."""
 
 
 class _Record:
@@ -56,25 +56,25 @@ class _Record:
 class Rollout:
     """Steps each slot through one episode of at most `max_steps` steps.
 
-    - Environments of this package are told to let finished slots wait
-      (`reset(options={"finished": "wait"})`): idle ants cost nothing. In a
-      `WaitingVectorEnv` they do so by themselves.
-    - Where autoreset is disabled, finished slots are reset by mask, walk on as
-      dummies, and are masked out.
-    - Where the environment resets slots itself, those that have finished are masked
-      out; the last observation is recovered from `infos["final_obs"]`.
+    - In environments of this package finished slots wait, at no cost
+      (`reset(options={"finished": "wait"})`), as they do in a `WaitingVectorEnv`.
+    - Where autoreset is disabled, finished slots are reset by mask and stepped along
+      with the others; their outcomes are ignored.
+    - Where the environment resets slots itself, the outcomes of finished slots are
+      ignored; the last observation is recovered from `infos["final_obs"]`.
 
     Args:
         env: any vector environment with `Discrete` actions.
         max_steps: T, >= 1.
 
     Attributes:
-        ants: the slots that still walk.
-        cost: J so far of each slot, the sum of its stage costs.
+        ants: the slots that are still walking.
+        cost: J of each slot so far, the sum of its stage costs.
         length: steps of each slot so far.
-        success: whether each slot has ended in a terminal state.
-        action_mask: which actions each slot may take now, `(num_envs, n_actions)`:
-            U_q of (3.4). None where the environment gives no `infos["action_mask"]`.
+        success: whether the episode of each slot has ended in a terminal state.
+        action_mask: which actions each slot may take now, `(num_envs, n_actions)`, the
+            set U_q of the selection rule (3.4). None if the environment gives no
+            `infos["action_mask"]`.
 
     Raises:
         TypeError: `env` is not a vector environment.
@@ -92,7 +92,7 @@ class Rollout:
         self.env = env
         self.max_steps = validation.integer("max_steps", max_steps, at_least=1)
         self.n_actions = int(space.n)
-        self._told_to_wait = isinstance(env.unwrapped, ControlVectorEnv)
+        self._asks_to_wait = isinstance(env.unwrapped, ControlVectorEnv)
         self._waits = isinstance(env.unwrapped, (ControlVectorEnv, WaitingVectorEnv))
         self._mode = AutoresetMode(
             env.metadata.get("autoreset_mode", AutoresetMode.NEXT_STEP)
@@ -121,7 +121,7 @@ class Rollout:
             The first observations, `(num_envs, ...)`.
         """
         options: dict[str, Any] = {}
-        if self._told_to_wait:
+        if self._asks_to_wait:
             options["finished"] = "wait"
         if states is not None:
             options["state"] = states
@@ -139,13 +139,13 @@ class Rollout:
         return observation
 
     def step(self, actions: IntArray) -> Step:
-        """Let every walking ant take one action.
+        """Take one action with every walking ant.
 
         Args:
-            actions: index of an action for each ant of `ants`, shape `(m,)`.
+            actions: index of an action for each of `ants`, shape `(m,)`.
 
         Returns:
-            What the step brought. Ants that have finished leave `ants`.
+            The outcome of the step. Ants that have finished are removed from `ants`.
 
         Raises:
             ValueError: a reward is NaN or infinite.
@@ -155,7 +155,7 @@ class Rollout:
             self.env.reset(options={"reset_mask": self._stale})
             self._stale = None
         _spread(ants, actions, self.first_action, self._actions)
-        # A copy: an environment or a wrapper may keep what it is given.
+        # A copy, because an environment or a wrapper may keep its actions.
         observation, reward, terminated, truncated, infos = self.env.step(
             self._actions.copy()
         )
@@ -185,7 +185,7 @@ class Rollout:
                 "environment's reward function."
             )
         if self._mode is AutoresetMode.DISABLED and not self._waits:
-            # Idle slots that finish once more are reset with the others.
+            # Idle slots that finish another episode are reset with the others.
             done = np.logical_or(terminated, truncated)
             self._stale = done if done.any() else None
         if n_left < m:
@@ -200,7 +200,7 @@ class Rollout:
         return Step(ants, observation, cost, reached, stopped)
 
     def episodes(self) -> Episodes:
-        """What every slot has done since `start(record=True)`.
+        """The steps of every slot since `start(record=True)`.
 
         Raises:
             ValueError: nothing was recorded.
@@ -222,7 +222,7 @@ class Rollout:
         """The actions that each walking ant may take, `(m, n_actions)`; None: all.
 
         Raises:
-            ValueError: an ant may take none.
+            ValueError: an ant may take no action at all.
         """
         if self.action_mask is None:
             return None
@@ -244,11 +244,11 @@ class Rollout:
         shape = (self.env.num_envs, self.n_actions)
         if mask.shape != shape or mask.dtype.kind not in "biuf":
             raise ValueError(
-                f"infos['action_mask'] must have shape {shape}, one row a slot, got "
+                f"infos['action_mask'] must have shape {shape}, one row per slot, got "
                 f"{mask.shape} of {mask.dtype}."
             )
         self.action_mask = mask != 0
-        # Slots that say nothing may do anything.
+        # A slot without a mask may take any action.
         given = infos.get("_action_mask")
         if given is not None:
             self.action_mask |= ~np.asarray(given, dtype=np.bool_)[:, None]
@@ -256,19 +256,19 @@ class Rollout:
     def _last_seen(
         self, stopped: IntArray, observation: NDArray[Any], infos: dict[str, Any]
     ) -> NDArray[Any]:
-        """Observations, where slots were reset at once, with their last ones."""
+        """Observations, with the last ones of the episodes that have just ended."""
         observation = observation.copy()
         for slot in stopped:
             observation[slot] = infos["final_obs"][slot]
         if self.action_mask is not None:
-            # The mask is that of the next episode already.
+            # The mask already belongs to the next episode.
             final = infos.get("final_info", {}).get("action_mask")
             self.action_mask[stopped] = True if final is None else final[stopped] != 0
         return observation
 
 
 def require_vector_env(env: Any) -> None:
-    """Refuse what is not a vector environment.
+    """Check that `env` is a vector environment.
 
     Raises:
         TypeError: `env` is not a `gymnasium.vector.VectorEnv`.
@@ -287,7 +287,7 @@ def require_vector_env(env: Any) -> None:
 def _spread(
     ants: IntArray, actions: IntArray, first_action: int, all_actions: IntArray
 ) -> None:
-    """Write the actions of the walking ants into those of all slots."""
+    """Write the actions of the walking ants into the array of all slots."""
     for j in range(ants.size):
         all_actions[np.uint64(ants[j])] = actions[j] + first_action
 
@@ -309,20 +309,20 @@ def _account(
     """Add a step of the walking ants to their totals.
 
     Args:
-        ants: the slots that walk, `(m,)`.
+        ants: the walking slots, `(m,)`.
         reward: of all slots.
         terminated: of all slots.
         truncated: of all slots.
-        total_cost: J so far of all slots, added to.
-        length: steps so far of all slots, added to.
-        success: whether each slot has ended in a terminal state, added to.
+        total_cost: J so far of all slots, updated.
+        length: steps so far of all slots, updated.
+        success: whether each slot has ended in a terminal state, updated.
         cost: receives the stage cost of each walking ant, `(m,)`.
         reached: receives whether it is in a terminal state, `(m,)`.
         stopped: receives whether its episode has ended in any way, `(m,)`.
-        left: receives the ants that walk on, `(m,)`.
+        left: receives the ants that are still walking, `(m,)`.
 
     Returns:
-        How many ants walk on, and a slot whose reward is not finite, or -1.
+        The number of ants still walking, and a slot whose reward is not finite, or -1.
     """
     n_left = 0
     for j in range(ants.size):

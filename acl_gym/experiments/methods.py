@@ -171,7 +171,8 @@ def _learn_dqn(study: Study, seed: int) -> Run:
     # Only here: importing torch takes seconds that the other methods do not need.
     import torch
 
-    from acl_gym.sb3.dqn import PolicyCostCallback, scaled_env
+    from acl_gym.sb3.callback import PolicyCostCallback
+    from acl_gym.sb3.dqn import scaled_env
 
     torch.set_num_threads(1)  # the fastest for such small networks
     task = study.task

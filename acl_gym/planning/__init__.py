@@ -1,1 +1,1 @@
-"""Methods that know or measure the model: exact ones to hold the learners against."""
+"""Dynamic programming with a known model: the optimum to compare the learners with."""

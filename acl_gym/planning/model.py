@@ -1,4 +1,4 @@
-"""The model of a finite decision process, as far as an environment tells it."""
+"""The model of a finite Markov decision process, read from an environment."""
 
 from __future__ import annotations
 
@@ -19,20 +19,21 @@ from acl_gym.utils.typing import BoolArray, FloatArray, IntArray
 class TabularModel:
     """What each action does in each state: the model of a finite MDP.
 
-    Each array is `(n_states, n_actions, outcomes)`: an action has so many outcomes,
-    some of them perhaps with probability 0.
+    Each array is `(n_states, n_actions, n_outcomes)`. Every action has the same number
+    of outcomes; those that cannot happen have probability 0.
 
     Args:
-        probability: P of (3.39), each >= 0, summing to 1 over the outcomes.
-        next_state: the state that an outcome leads to.
+        probability: transition probabilities P of the Bellman equation (3.39), each
+            >= 0, summing to 1 over the outcomes.
+        next_state: the state that an outcome leads to, counted from 0.
         reward: its reward R.
-        terminated: whether the episode ends there: nothing follows.
-        first_state: the observation that stands for state 0, `Discrete.start`.
-        first_action: the action that stands for action 0, `Discrete.start`.
+        terminated: whether the episode ends with this outcome.
+        first_state: the observation of state 0, `Discrete.start`.
+        first_action: the environment's number for action 0, `Discrete.start`.
 
     Raises:
-        ValueError: shapes differ, probabilities are none, a state is out of range, or
-            a reward is not finite.
+        ValueError: shapes differ, probabilities are negative or do not sum to 1, a
+            state is out of range, or a reward is not finite.
     """
 
     probability: FloatArray
@@ -70,7 +71,7 @@ class TabularModel:
                 f"next_state must lie in 0..{len(probability) - 1}, got "
                 f"{next_state.min()} to {next_state.max()}."
             )
-        # Copies of the class's own kind, which nobody else can change.
+        # Read-only copies, so that nobody else can change the model.
         arrays: dict[str, NDArray[Any]] = {
             "probability": probability,
             "next_state": next_state.astype(np.int64),
@@ -92,16 +93,16 @@ class TabularModel:
         return int(self.probability.shape[1])
 
     @classmethod
-    def of(cls, env: gym.Env[Any, Any] | VectorEnv[Any, Any, Any]) -> Self:
-        """Read the model of an environment that tells it.
+    def from_env(cls, env: gym.Env[Any, Any] | VectorEnv[Any, Any, Any]) -> Self:
+        """Read the model of an environment that publishes it.
 
-        Those are the environments of this package whose system has `outcomes()`, and
-        those with a table `P` as Gymnasium's FrozenLake, CliffWalking and Taxi have
-        it, also as the first of a `SyncVectorEnv`. Wrappers are looked through: what
-        they change is not in the model.
+        This works for environments of this package whose system has `outcomes()`, and
+        for those with a table `P`, such as Gymnasium's FrozenLake, CliffWalking and
+        Taxi, alone or in a `SyncVectorEnv`. Wrappers are ignored: what they change is
+        not in the model.
 
         Raises:
-            TypeError: the environment tells no model.
+            TypeError: the environment does not publish its model.
         """
         base: Any = getattr(env, "unwrapped", env)
         if isinstance(base, SyncVectorEnv):
@@ -114,7 +115,7 @@ class TabularModel:
             probability, next_state, reward, terminated = _arrays_of(table)
         else:
             raise TypeError(
-                "env must tell its model, by outcomes() of its system or by a table "
+                "env must publish its model, as outcomes() of its system or as a table "
                 f"P[state][action], got {type(base).__name__}; build a TabularModel "
                 "from arrays, or learn with QLearning, which needs no model."
             )
@@ -135,7 +136,7 @@ class TabularModel:
 def _arrays_of(
     table: dict[int, dict[int, list[tuple[float, int, float, bool]]]],
 ) -> tuple[FloatArray, IntArray, FloatArray, BoolArray]:
-    """The arrays of a model from `P[state][action]`, padded by impossible outcomes."""
+    """The arrays of a model from `P[state][action]`, padded with probability 0."""
     n_states, n_actions = len(table), len(table.get(0, ()))
     if set(table) != set(range(n_states)) or any(
         set(row) != set(range(n_actions)) for row in table.values()

@@ -1,7 +1,7 @@
 """Fuzzy Q-iteration: dynamic programming on the agents' own partition.
 
-With a fine partition it is the optimum to measure the learners against; with theirs
-it tells what the partition itself allows.
+With a fine partition it gives the optimum to compare the learners with; with their own
+partition it shows what that partition allows.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ from acl_gym.policies import TablePolicy
 from acl_gym.utils import validation
 from acl_gym.utils.typing import BoolArray, CellArray, FloatArray
 
-_SLOTS = 65_536  # states tried at once
+_SLOTS = 65_536  # states simulated at once
 
 
 @dataclass(frozen=True)
 class QIterationResult:
-    """What fuzzy Q-iteration found.
+    """The result of fuzzy Q-iteration.
 
     Attributes:
         policy: the greedy policy.
@@ -41,7 +41,7 @@ class QIterationResult:
 
 @dataclass(frozen=True)
 class _Model:
-    """What each action does in each cell: arrays over `(n_cells, n_actions)`."""
+    """What each action does in each cell: arrays of shape `(n_cells, n_actions)`."""
 
     reward: FloatArray
     terminated: BoolArray
@@ -60,20 +60,20 @@ def fuzzy_q_iteration(
 ) -> QIterationResult:
     """Iterate the Bellman optimality equation (3.40) over a partition.
 
-    Q_iu <- r(x_i, u) + gamma max_v sum_j beta_j(f(x_i, u)) Q_jv, where x_i is the
-    state that stands for cell i, in place, cell by cell. A crisp partition makes it
-    value iteration (3.42) on the cells. The deterministic environment is its own
-    model: it is asked through `reset(options={"state": ...})` and one step.
+    Q_iu <- r(x_i, u) + gamma max_v sum_j beta_j(f(x_i, u)) Q_jv, in place, cell by
+    cell; x_i is the state that represents cell i. On a crisp partition this is value
+    iteration, eq. (3.42), on the cells. The environment itself serves as the model:
+    `reset(options={"state": ...})` and one step for each cell and action.
 
     Args:
         env: a deterministic environment of this package.
         partition: the cells.
-        discount: gamma_rl, in [0, 1]; 1 finds the undiscounted policy.
-        tolerance: stop when no value changes by more, > 0.
+        discount: gamma_rl, in [0, 1]; 1 means undiscounted.
+        tolerance: stop when no value changes by more than this, > 0.
         max_iterations: stop after so many sweeps, >= 1. Not reaching the tolerance
             is reported in the result: without a discount, cells from which the goal
             cannot be reached cost more with each sweep.
-        progress_bar: show a bar.
+        progress_bar: show a progress bar.
 
     Raises:
         TypeError: `env` is of another package, or random.
@@ -82,8 +82,8 @@ def fuzzy_q_iteration(
     base = env.unwrapped
     if not isinstance(base, ControlVectorEnv) or base.system.draws_per_step:
         raise TypeError(
-            "env must be a deterministic vector environment of acl_gym, which can be "
-            f"put into any state; got {type(base).__name__}."
+            "env must be a deterministic vector environment of acl_gym, which can "
+            f"start from any state, got {type(base).__name__}."
         )
     discount = validation.number("discount", discount, at_least=0, at_most=1)
     tolerance = validation.number("tolerance", tolerance, above=0)

@@ -1,6 +1,7 @@
-"""Value iteration (3.42) and the exact value of a policy, where the model is known.
+"""Value iteration, eq. (3.42), and the exact value of a policy.
 
-For a finite number of states: what the learners are held against.
+Both need the model of a finite Markov decision process; they give the optimum to
+compare the learners with.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ from acl_gym.utils.typing import BoolArray, FloatArray, IntArray
 
 @dataclass(frozen=True)
 class ValueIterationResult:
-    """What value iteration found.
+    """The result of value iteration.
 
     Attributes:
         values: V of each state, `(n_states,)`.
@@ -36,7 +37,7 @@ class ValueIterationResult:
         actions: a best action of each state, `(n_states,)`; see `value_iteration`.
         iterations: sweeps made.
         change: the largest change of a value in the last sweep.
-        model: what it was found for.
+        model: the model that it was computed for.
     """
 
     values: FloatArray
@@ -50,14 +51,14 @@ class ValueIterationResult:
     def policy(self) -> TablePolicy:
         """The policy that takes `actions`, on observations of a `Discrete` space.
 
-        Its table holds the action values, that of the action taken raised to the best
-        of its state, and its ranks break ties in favour of it.
+        Its table holds the action values; that of the action taken is raised to the
+        highest value in its state, and ties are broken in its favour.
         """
         model, table = self.model, self.action_values.copy()
         states = np.arange(model.n_states)
         table[states, self.actions] = table.max(axis=1)
         ranks = np.tile(np.arange(model.n_actions, dtype=np.int32), (len(table), 1))
-        # The action taken changes places with the first.
+        # The action taken swaps ranks with the first one.
         ranks[states, 0] = self.actions
         ranks[states, self.actions] = 0
         space = spaces.Discrete(model.n_states, start=model.first_state)
@@ -73,33 +74,33 @@ def value_iteration(
     max_iterations: int = 100_000,
     progress_bar: bool = False,
 ) -> ValueIterationResult:
-    """Iterate the Bellman optimality equation (3.42) until values change no more.
+    """Iterate the Bellman optimality equation (3.42) until the values converge.
 
-    V(q) <- max_u sum_q' P (R + gamma V(q')), from V = 0, in place: each state takes
-    the values that those before it have just got, which needs fewer sweeps than
-    (3.42) with two tables and ends with the same values.
+    V(q) <- max_u sum_q' P (R + gamma V(q')), from V = 0, in place: each state uses
+    the values that were just computed for the states before it. This needs fewer
+    sweeps than (3.42) with two tables and converges to the same values.
 
-    Actions whose values lie within `tolerance` of the best, or within that fraction
-    of it if it exceeds 1, are tied (a decision). Of these the policy takes one from
-    which an end may come soonest, and the first of those. Without a discount this
-    matters: where only the goal is rewarded, to stand still for ever is tied with
-    going there. A policy of best actions that always ends is an optimal one.
+    Actions whose values lie within `tolerance` of the best, or within that fraction of
+    the best if it exceeds 1, count as tied (our choice). The policy takes the tied
+    action from which an episode can end soonest, and the first of several. This matters
+    without a discount: if only the goal is rewarded, standing still forever is tied with
+    going to the goal. A policy of best actions is optimal if its episodes always end.
 
     Args:
-        model: the model, or an environment that `TabularModel.of` can read.
+        model: the model, or an environment for `TabularModel.from_env`.
         discount: gamma_rl, in [0, 1].
-        tolerance: stop when no value changes by more, > 0.
+        tolerance: stop when no value changes by more than this, > 0.
         max_iterations: stop after so many sweeps, >= 1. Not reaching the tolerance is
             reported in the result: without a discount, states from which no end can be
             reached cost more with each sweep.
-        progress_bar: show a bar.
+        progress_bar: show a progress bar.
 
     Raises:
-        TypeError: an environment tells no model.
-        ValueError: a parameter is out of range, or values have overflowed.
+        TypeError: the environment does not publish its model.
+        ValueError: a parameter is out of range, or the values overflow.
     """
     if not isinstance(model, TabularModel):
-        model = TabularModel.of(model)
+        model = TabularModel.from_env(model)
     discount = validation.number("discount", discount, at_least=0, at_most=1)
     tolerance = validation.number("tolerance", tolerance, above=0)
     max_iterations = validation.integer("max_iterations", max_iterations, at_least=1)
@@ -117,7 +118,7 @@ def value_iteration(
     action_values = _action_values(*arrays, discount, values)
     if not (np.isfinite(values).all() and np.isfinite(action_values).all()):
         raise ValueError(
-            f"values must stay finite, but have overflowed within {iterations} sweeps; "
+            f"values must stay finite, but overflowed within {iterations} sweeps; "
             "scale the rewards down, or lower discount or max_iterations."
         )
     best = action_values.max(axis=1, keepdims=True)
@@ -135,15 +136,16 @@ def policy_value(
     policy_actions: ArrayLike,
     discount: float = 1.0,
 ) -> FloatArray:
-    """The exact value of a policy in each state: (3.38), solved as a linear system.
+    """The exact value of a policy in each state.
 
-    Without a discount, a policy may come to states that it never ends from, and then
-    goes round among some of them for ever. If no reward is expected there, that is
-    worth 0, as an end is. If costs accrue, it is worth -inf, and so is every state
-    from which it may come to that; if rewards accrue, +inf.
+    Solves the Bellman equation of the policy (3.38) as a linear system. Without a
+    discount, a policy may reach states from which its episodes never end. Where it
+    expects no reward in such a cycle, the value is 0. Where costs accrue, the value is
+    -inf, also in every state from which the cycle may be reached; where rewards
+    accrue, it is +inf.
 
     Args:
-        model: the model, or an environment that `TabularModel.of` can read.
+        model: the model, or an environment for `TabularModel.from_env`.
         policy_actions: the action of each state, counted from 0, `(n_states,)`.
         discount: gamma_rl, in [0, 1].
 
@@ -151,18 +153,18 @@ def policy_value(
         V^h, `(n_states,)`.
 
     Raises:
-        TypeError: an environment tells no model.
+        TypeError: the environment does not publish its model.
         ValueError: `policy_actions` or `discount` are out of range; or, without a
             discount, a value is not defined because both costs and rewards accrue.
     """
     if not isinstance(model, TabularModel):
-        model = TabularModel.of(model)
+        model = TabularModel.from_env(model)
     discount = validation.number("discount", discount, at_least=0, at_most=1)
     actions = np.asarray(policy_actions)
     n = model.n_states
     if actions.shape != (n,) or actions.dtype.kind not in "iu":
         raise ValueError(
-            f"policy_actions must be {n} integers, one a state, got {actions.dtype} "
+            f"policy_actions must be {n} integers, one per state, got {actions.dtype} "
             f"in shape {actions.shape}."
         )
     if actions.min() < 0 or actions.max() >= model.n_actions:
@@ -194,20 +196,20 @@ def policy_value(
 def _for_ever(
     chain: Any, reward: FloatArray, ends: BoolArray
 ) -> tuple[FloatArray, BoolArray]:
-    """Where an undiscounted policy never ends: its value there, 0 or infinite.
+    """Values of the states from which an undiscounted policy never ends: 0 or infinite.
 
     Args:
-        chain: sparse `(n, n)`, probabilities of going on from state to state.
-        reward: expected, `(n,)`.
+        chain: sparse `(n, n)`, probabilities of moving from state to state.
+        reward: expected reward of a step from each state, `(n,)`.
         ends: whether an episode may end right after a state, `(n,)`.
 
     Returns:
-        Values `(n,)`, and where they are still to be computed, `(n,)`.
+        Values `(n,)`, and a mask `(n,)` of the states whose value is still unknown.
 
     Raises:
         ValueError: a value is not defined.
     """
-    # The policy stays for ever in those strong components that nothing leaves.
+    # The policy never leaves a strong component without outgoing edges.
     _, label = csgraph.connected_components(chain, connection="strong")
     edges = chain.tocoo()
     left = np.zeros(label.max() + 1, dtype=np.bool_)
@@ -220,7 +222,7 @@ def _for_ever(
     to_costs, to_gains = _leading_to(chain, costs), _leading_to(chain, gains)
     if (to_costs & to_gains).any():
         raise ValueError(
-            "without a discount a policy must not come to both endless costs and "
+            "without a discount a policy must not lead to both endless costs and "
             f"endless rewards, as from state {int(np.argmax(to_costs & to_gains))}; "
             "use a discount below 1."
         )
@@ -231,7 +233,7 @@ def _for_ever(
 
 
 def _leading_to(chain: Any, target: BoolArray) -> BoolArray:
-    """The states from which `target` may be reached, itself among them, `(n,)`."""
+    """A mask of the states from which `target` may be reached, including itself."""
     found, count = target.copy(), -1
     while found.sum() > count:
         count = int(found.sum())
@@ -250,7 +252,7 @@ def _action_value(
     state: int,
     action: int,
 ) -> float:
-    """The expected reward and what follows, the sum in (3.42)."""
+    """The expected reward plus the discounted value that follows, the sum in (3.42)."""
     total = 0.0
     for i in range(probability.shape[2]):
         worth = reward[state, action, i]

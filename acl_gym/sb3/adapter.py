@@ -32,24 +32,24 @@ class VectorEnvAdapter(VecEnv):
     """Lets the agents of Stable-Baselines3 train in a Gymnasium vector environment.
 
     Both libraries step many slots at once, but a `VecEnv` resets a slot in the step
-    that ends its episode, hands out one info a slot, and tells truncation from
-    termination in that info. With autoreset disabled, the adapter resets the slots
-    that have finished by `reset(options={"reset_mask": ...})`; with SAME_STEP it
-    takes the last observations from `infos["final_obs"]`.
+    that ends its episode, returns one info dict per slot, and reports truncation in
+    that dict. With autoreset disabled, the adapter resets the slots that have finished
+    with `reset(options={"reset_mask": ...})`; with SAME_STEP it takes the last
+    observations from `infos["final_obs"]`.
 
-    Put a `VecMonitor` around it to have the returns of the episodes logged.
+    Wrap it in a `VecMonitor` to log the returns of the episodes.
 
     Args:
-        env: a vector environment whose autoreset mode is DISABLED (the better choice:
-            wrappers of observations work with it) or SAME_STEP.
+        env: a vector environment whose autoreset mode is DISABLED (preferred, because
+            observation wrappers work with it) or SAME_STEP.
 
     Attributes:
-        env: that environment.
+        env: the vector environment.
 
     Raises:
         TypeError: `env` is not a vector environment.
-        ValueError: its autoreset mode or one of its spaces cannot be shown as a
-            `VecEnv`.
+        ValueError: a `VecEnv` does not support its autoreset mode or one of its
+            spaces.
 
     Example:
         >>> import gymnasium as gym, acl_gym
@@ -75,8 +75,8 @@ class VectorEnvAdapter(VecEnv):
         if mode not in _SUPPORTED_MODES:
             raise ValueError(
                 f"env must have autoreset mode DISABLED or SAME_STEP, got {mode.name}, "
-                "which puts a step without meaning between two episodes; make it with "
-                'gym.make_vec(id, autoreset_mode="Disabled"), or where the vector '
+                "which inserts a meaningless step between two episodes; make it with "
+                'gym.make_vec(id, autoreset_mode="Disabled"), or if the vector '
                 "environment is built from single ones, with "
                 'vector_kwargs={"autoreset_mode": AutoresetMode.DISABLED}.'
             )
@@ -95,7 +95,7 @@ class VectorEnvAdapter(VecEnv):
         return self.env.spec
 
     def reset(self) -> VecEnvObs:
-        """Start an episode in every slot, with the seed and options set before.
+        """Start an episode in every slot, with the seed and options set earlier.
 
         Returns:
             The first observations; infos are in `reset_infos`.
@@ -104,7 +104,7 @@ class VectorEnvAdapter(VecEnv):
         observations, infos = self.env.reset(
             seed=None if seed is None else int(seed), options=options or None
         )
-        self.reset_infos = _one_info_a_slot(infos, self.num_envs)
+        self.reset_infos = _infos_per_slot(infos, self.num_envs)
         self._reset_seeds()
         self._reset_options()
         self._actions = None
@@ -113,33 +113,33 @@ class VectorEnvAdapter(VecEnv):
     def set_options(
         self, options: list[dict[str, Any]] | dict[str, Any] | None = None
     ) -> None:
-        """Set the options of the next reset, one dict for all slots together.
+        """Set the options of the next reset, one dict for all slots.
 
         Raises:
-            TypeError: `options` is a list, one a slot.
+            TypeError: `options` is a list with one dict per slot.
         """
         if isinstance(options, list):
             raise TypeError(
                 "options must be one dict for all slots, got a list; a vector "
-                "environment takes what differs between slots as an array with one "
-                'row a slot, such as {"state": states}.'
+                "environment takes values that differ between slots as an array with "
+                'one row per slot, such as {"state": states}.'
             )
         super().set_options(options)
 
     def step_async(self, actions: NDArray[Any]) -> None:
-        """Keep the actions for `step_wait`."""
+        """Store the actions for `step_wait`."""
         self._actions = np.array(actions)
 
     def step_wait(self) -> VecEnvStepReturn:
-        """Take the step, and start a new episode where one has ended.
+        """Take the step, and start a new episode in each slot whose episode has ended.
 
         Returns:
             `(observations, rewards, dones, infos)`, the rewards as float32. Every
-            info has `TimeLimit.truncated`; that of a slot that has finished has
-            `terminal_observation` as well.
+            info has `TimeLimit.truncated`; that of a slot that has finished also has
+            `terminal_observation`.
 
         Raises:
-            RuntimeError: `step_async` was not called before.
+            RuntimeError: `step_async` has not been called.
         """
         if self._actions is None:
             raise RuntimeError(
@@ -151,10 +151,10 @@ class VectorEnvAdapter(VecEnv):
         dones = np.logical_or(terminated, truncated)
         slots = np.flatnonzero(dones).tolist()
         plain = {key: infos[key] for key in infos if key not in _FINAL_KEYS}
-        rows = _one_info_a_slot(plain, self.num_envs)
+        rows = _infos_per_slot(plain, self.num_envs)
         if slots and self._resets_itself:
-            # What is not in final_info was written by the reset, or by a wrapper.
-            last = _one_info_a_slot(infos.get("final_info", {}), self.num_envs)
+            # Entries missing from final_info were written by the reset or a wrapper.
+            last = _infos_per_slot(infos.get("final_info", {}), self.num_envs)
             for slot in slots:
                 self.reset_infos[slot] = rows[slot]
                 rows[slot] = {**rows[slot], **last[slot]}
@@ -162,9 +162,9 @@ class VectorEnvAdapter(VecEnv):
         elif slots:
             for slot in slots:
                 rows[slot]["terminal_observation"] = _row(observations, slot)
-            # Some environments take the mask out of the dict: each gets a new one.
+            # Some environments remove the mask from the dict, so make a new dict.
             observations, infos = self.env.reset(options={"reset_mask": dones.copy()})
-            first = _one_info_a_slot(infos, self.num_envs)
+            first = _infos_per_slot(infos, self.num_envs)
             for slot in slots:
                 self.reset_infos[slot] = first[slot]
         for slot, cut in enumerate(np.greater(truncated, terminated).tolist()):
@@ -176,15 +176,15 @@ class VectorEnvAdapter(VecEnv):
         self.env.close()
 
     def get_images(self) -> Sequence[NDArray[Any] | None]:
-        """The frame of each slot, None where there is no picture."""
+        """The frame of each slot, or None for slots without one."""
         frames: Any = self.env.render()
         return [None] * self.num_envs if frames is None else list(frames)
 
     def get_attr(self, attr_name: str, indices: VecEnvIndices = None) -> list[Any]:
-        """The attribute for each slot, see `set_attr` for whose.
+        """The attribute for each slot; `set_attr` explains where it is looked up.
 
         Raises:
-            AttributeError: nobody has it.
+            AttributeError: no environment or wrapper has it.
         """
         slots = self._get_indices(indices)
         if attr_name in ("observation_space", "action_space"):
@@ -197,16 +197,15 @@ class VectorEnvAdapter(VecEnv):
     def set_attr(
         self, attr_name: str, value: Any, indices: VecEnvIndices = None
     ) -> None:
-        """Set an attribute that exists.
+        """Set an existing attribute.
 
-        In a `SyncVectorEnv` it is that of the slots' single environments. In any
-        other vector environment, or where those do not have it, it is that of the
-        vector environment or of its outermost wrapper that has it, and counts for
-        all slots.
+        In a `SyncVectorEnv` it is the attribute of the slots' single environments. In
+        any other vector environment, or if those do not have it, it is that of the
+        outermost wrapper or vector environment that has it, shared by all slots.
 
         Raises:
-            AttributeError: nobody has it.
-            ValueError: it counts for all slots, but `indices` names some.
+            AttributeError: no environment or wrapper has it.
+            ValueError: it is shared by all slots, but `indices` selects only some.
         """
         slots = list(self._get_indices(indices))
         if envs := self._single_envs_with(attr_name):
@@ -224,15 +223,15 @@ class VectorEnvAdapter(VecEnv):
         indices: VecEnvIndices = None,
         **method_kwargs: Any,
     ) -> list[Any]:
-        """Call a method, see `set_attr` for whose.
+        """Call a method; `set_attr` explains where it is looked up.
 
         Returns:
-            What it returned for each slot; a method of the vector environment is
-            called once, and its result stands for all.
+            Its result for each slot. A method of the vector environment is called
+            once, and its result is returned for every slot.
 
         Raises:
-            AttributeError: nobody has it.
-            ValueError: it acts on all slots, but `indices` names some.
+            AttributeError: no environment or wrapper has it.
+            ValueError: it acts on all slots, but `indices` selects only some.
         """
         slots = list(self._get_indices(indices))
         if envs := self._single_envs_with(method_name):
@@ -250,7 +249,7 @@ class VectorEnvAdapter(VecEnv):
         wrapper_class: type[gym.Wrapper[Any, Any, Any, Any]],
         indices: VecEnvIndices = None,
     ) -> list[bool]:
-        """Whether each slot, or the vector environment, has such a wrapper."""
+        """Whether each slot, or the vector environment, is wrapped in this class."""
         slots = list(self._get_indices(indices))
         if any(isinstance(layer, wrapper_class) for layer in self._layers()):
             return [True for _ in slots]
@@ -260,7 +259,7 @@ class VectorEnvAdapter(VecEnv):
         return [False for _ in slots]
 
     def _layers(self) -> Iterator[VectorEnv[Any, Any, Any]]:
-        """The wrappers from the outermost inwards, and the environment itself."""
+        """The wrappers from the outside in, then the environment itself."""
         layer = self.env
         while isinstance(layer, VectorWrapper):
             yield layer
@@ -274,7 +273,7 @@ class VectorEnvAdapter(VecEnv):
         raise AttributeError(f"neither {self.env} nor what it wraps has {name!r}.")
 
     def _single_envs_with(self, name: str) -> Sequence[gym.Env[Any, Any]]:
-        """The single environments of the slots if they are here and have `name`."""
+        """The slots' single environments if they are accessible and have `name`."""
         base = self.env.unwrapped
         if isinstance(base, SyncVectorEnv) and all(
             env.has_wrapper_attr(name) for env in base.envs
@@ -285,8 +284,8 @@ class VectorEnvAdapter(VecEnv):
     def _check_all(self, name: str, slots: Iterable[int]) -> None:
         if set(slots) != set(range(self.num_envs)):
             raise ValueError(
-                f"{name!r} belongs to all {self.num_envs} slots together, got the "
-                f"indices {list(slots)}; leave indices out."
+                f"{name!r} is shared by all {self.num_envs} slots, got indices "
+                f"{list(slots)}; leave indices out."
             )
 
 
@@ -302,16 +301,16 @@ def _check_observation_space(space: spaces.Space[Any]) -> None:
 
 
 def _check_start(what: str, space: spaces.Space[Any]) -> None:
-    """Stable-Baselines3 takes it that the first of n discrete values is 0."""
+    """Stable-Baselines3 assumes that discrete values start from 0."""
     if np.any(getattr(space, "start", 0)):
         raise ValueError(
-            f"{what} must count from 0, got {space}; shift them with gymnasium's "
+            f"{what} must start from 0, got {space}; shift them with gymnasium's "
             f"{'TransformAction' if what == 'actions' else 'TransformObservation'}."
         )
 
 
-def _one_info_a_slot(infos: dict[str, Any], count: int) -> list[dict[str, Any]]:
-    """Take batched infos apart: under each key, what its mask says a slot has."""
+def _infos_per_slot(infos: dict[str, Any], count: int) -> list[dict[str, Any]]:
+    """Split batched infos into one dict per slot, following the mask of each key."""
     rows: list[dict[str, Any]] = [{} for _ in range(count)]
     for key, values in infos.items():
         if key.startswith("_") and key[1:] in infos:
@@ -319,7 +318,7 @@ def _one_info_a_slot(infos: dict[str, Any], count: int) -> list[dict[str, Any]]:
         mask = infos.get(f"_{key}")
         slots = range(count) if mask is None else np.flatnonzero(mask).tolist()
         if isinstance(values, dict):
-            parts: Sequence[Any] = _one_info_a_slot(values, count)
+            parts: Sequence[Any] = _infos_per_slot(values, count)
         elif isinstance(values, np.ndarray) and values.shape[:1] == (count,):
             parts = list(values.copy())
         else:  # one value for all

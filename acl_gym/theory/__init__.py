@@ -1,21 +1,22 @@
 """The thesis's theory as functions: bounds and limits of §2.6 and §3.4.
 
-All take numbers or arrays and broadcast them; costs come as deposits, 1 / J, as in the
-text. What the special cases of §3.4.7 and §3.4.8 say follows from the general formulas
-(3.29) and (3.31), which the tests show; where the text goes further than its formulas,
-the docstring says so, and docs/theory.md gives the algebra. §2.6 is in `aco`,
-§3.4.3 to §3.4.6 in `levels`, the rest in `convergence`; take all of it from here.
+All functions take numbers or arrays and broadcast them. Costs enter as deposits, 1 / J,
+as in the thesis. The special cases of §3.4.7 and §3.4.8 follow from the general gaps of
+the levels (3.29) and of the policy (3.31), as the tests show. Where the thesis claims
+more than its formulas give, the docstring says so, and docs/theory.md has the algebra.
+§2.6 is in `aco`, §3.4.3 to §3.4.6 in `levels`, the rest in `convergence`; import
+everything from this package.
 
 Common arguments:
     n_ants: M, >= 1.
     tau0: the initial level tau_0, > 0.
     local_decay: gamma, in [0, 1).
     global_decay: rho, in (0, 1].
-    expected_deposit: J_exp^-1 of `expected_deposit`, > 0.
-    expected_deposit_second: the same while the second-best action is taken for the
-        best, J_exp^-1 with a bar in the text, > 0.
+    expected_deposit: J_exp^-1, see the function `expected_deposit`, > 0.
+    expected_deposit_second: the expected deposit while the ants prefer the second-best
+        action, J_exp^-1 with a bar in the thesis, > 0.
 
-An argument outside of its range, or NaN, is a ValueError.
+An argument that is out of range or NaN raises a ValueError.
 """
 
 from acl_gym.theory.aco import (

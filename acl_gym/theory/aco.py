@@ -1,4 +1,4 @@
-"""What §2.6 proves of Ant Colony Optimization with one global-best solution.
+"""Convergence of Ant Colony Optimization with the global-best update, §2.6.
 
 Part of `acl_gym.theory`.
 """
@@ -15,12 +15,12 @@ from acl_gym.utils.typing import FloatArray
 def aco_level_limit(optimal_fitness: ArrayLike, global_decay: ArrayLike) -> FloatArray:
     """tau_max = F(s*) / rho: bound (Proposition 2.2) and limit (2.3) of a level.
 
-    For the global-best update of the Ant System. The Ant Colony System weighs its
-    deposit with rho, and its levels go to F(s*) instead. The proof needs
-    tau_0 <= F(s), which the text uses and does not state.
+    This is for the Ant System with the global-best update. The Ant Colony System
+    weights its deposit by rho, so that its levels converge to F(s*) instead. The proof
+    needs tau_0 <= F(s), which the thesis uses without stating it.
 
     Args:
-        optimal_fitness: F(s*), > 0.
+        optimal_fitness: fitness of the optimal solution, F(s*), > 0.
         global_decay: rho, in (0, 1].
     """
     fitness = ranges.positive("optimal_fitness", optimal_fitness)
@@ -30,12 +30,12 @@ def aco_level_limit(optimal_fitness: ArrayLike, global_decay: ArrayLike) -> Floa
 def least_probability(
     tau_min: ArrayLike, tau_max: ArrayLike, n_choices: ArrayLike, alpha: ArrayLike
 ) -> FloatArray:
-    """p_min: no choice is less probable than this (Theorem 2.4).
+    """p_min: every choice has at least this probability (Theorem 2.4).
 
     Args:
         tau_min: lowest level, > 0.
         tau_max: highest level, >= tau_min.
-        n_choices: N_C, from how many vertices an ant chooses at most, >= 1.
+        n_choices: N_C, the most vertices that an ant chooses from, >= 1.
         alpha: exponent of the selection rule, >= 0.
     """
     low, high = ranges.positive("tau_min", tau_min), ranges.positive("tau_max", tau_max)
@@ -49,11 +49,11 @@ def least_probability(
 def trials_to_find(
     probability: ArrayLike, length: ArrayLike, failure: ArrayLike
 ) -> FloatArray:
-    """K of Theorem 2.4: after K trials an optimum was found but for a chance `failure`.
+    """K of Theorem 2.4: trials until an optimum is found, except with chance `failure`.
 
     Args:
         probability: p_min, in (0, 1].
-        length: n, the choices of the longest solution, >= 1.
+        length: n, the number of choices in the longest solution, >= 1.
         failure: epsilon of the theorem, in (0, 1].
 
     Returns:
@@ -64,7 +64,7 @@ def trials_to_find(
     failure = ranges.checked("failure", failure, above=0, at_most=1)
     with np.errstate(divide="ignore", invalid="ignore"):
         trials = np.log(failure) / np.log1p(-chance)
-    # Certain to find it: one trial. Nothing asked: none. Otherwise rounded up.
+    # One trial if the optimum is certain, none if failure is allowed, else rounded up.
     trials = np.where(chance == 1.0, 1.0, np.ceil(trials))
     return np.where(failure == 1.0, 0.0, trials)
 
@@ -72,15 +72,15 @@ def trials_to_find(
 def trials_to_dominate(global_decay: ArrayLike) -> FloatArray:
     """k_0 = ceil((1 - rho) / rho) of Theorem 2.5.
 
-    So many trials after the first optimal solution its levels exceed all others. That
-    takes evaporation on all edges, tau <- (1 - rho) tau, for then after k trials the
-    optimum has at least k (1 - rho)^(k - 1) F(s*), others at most
-    (1 - rho)^k F(s*) / rho. The text's proof says that the others "remain the same";
-    if they did, an edge at tau_max would never be exceeded.
+    This many trials after the first optimal solution, its levels exceed all others.
+    This requires evaporation on all edges, tau <- (1 - rho) tau: after k trials the
+    optimum then has at least k (1 - rho)^(k - 1) F(s*), and all others have at most
+    (1 - rho)^k F(s*) / rho. The proof in the thesis says that the others "remain the
+    same"; in that case an edge at tau_max would never be exceeded.
     """
     rho = ranges.global_decay_checked(global_decay)
     quotient = (1.0 - rho) / rho
-    # 0.9 / 0.1 is 9, whatever rounding makes of it.
+    # Undo rounding errors: 0.9 / 0.1 must give 9.
     nearest = np.round(quotient)
     close = np.isclose(quotient, nearest, rtol=1e-12, atol=0.0)
     return np.where(close, nearest, np.ceil(quotient))

@@ -1,6 +1,6 @@
-"""What §3.4.7 and §3.4.8 say of the convergence of the levels and of the policy.
+"""Convergence of the levels, §3.4.7, and of the policy, §3.4.8.
 
-Part of `acl_gym.theory`, which explains the arguments that all have in common.
+Part of `acl_gym.theory`, which explains the common arguments.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ def level_gap(
     global_decay: ArrayLike,
     expected_deposit: ArrayLike,
 ) -> FloatArray:
-    """Delta(E[tau]) of (3.29): how uncertain an expected level stays, >= 0.
+    """Gap between the bounds on an expected level, Delta(E[tau]) of eq. (3.29), >= 0.
 
-    With annealed exploration it is this with 1 / J_min for `expected_deposit`.
+    With annealed exploration, pass 1 / J_min as `expected_deposit`.
     """
     common = n_ants, tau0, local_decay, global_decay, expected_deposit
     return expected_upper_limit(*common) - expected_lower_limit(*common)
@@ -36,7 +36,7 @@ def one_ant_limit(
     global_decay: ArrayLike,
     expected_deposit: ArrayLike,
 ) -> FloatArray:
-    """To where the expected level goes if M = 1: both bounds meet, (3.29) is 0."""
+    """Limit of the expected level for M = 1, where the gap (3.29) is 0."""
     rho, gamma = (
         ranges.global_decay_checked(global_decay),
         ranges.local_decay_checked(local_decay),
@@ -49,7 +49,7 @@ def one_ant_limit(
 def level_gap_without_local_update(
     n_ants: ArrayLike, expected_deposit: ArrayLike
 ) -> FloatArray:
-    """(3.29) for gamma = 0, any rho, and for rho = 1, any gamma: (M - 1) J_exp^-1."""
+    """The gap (3.29) for gamma = 0, or for rho = 1: (M - 1) J_exp^-1."""
     deposit = ranges.positive("expected_deposit", expected_deposit)
     return (ranges.n_ants_checked(n_ants) - 1.0) * deposit
 
@@ -57,7 +57,7 @@ def level_gap_without_local_update(
 def level_gap_with_full_local_update(
     n_ants: ArrayLike, global_decay: ArrayLike, expected_deposit: ArrayLike
 ) -> FloatArray:
-    """(3.29) for gamma -> 1: rho (M - 1) J_exp^-1."""
+    """The gap (3.29) for gamma -> 1: rho (M - 1) J_exp^-1."""
     gap = level_gap_without_local_update(n_ants, expected_deposit)
     return ranges.global_decay_checked(global_decay) * gap
 
@@ -65,12 +65,12 @@ def level_gap_with_full_local_update(
 def level_gap_without_global_update(
     n_ants: ArrayLike, tau0: ArrayLike, local_decay: ArrayLike
 ) -> FloatArray:
-    """(3.29) for rho -> 0.
+    """The gap (3.29) for rho -> 0.
 
     Args:
         n_ants: M, >= 1; infinity gives tau0 (1 - gamma^2) / gamma.
         tau0: see `acl_gym.theory`.
-        local_decay: gamma, in (0, 1); for gamma = 0 as well the limit depends on
+        local_decay: gamma, in (0, 1). With gamma -> 0 too, the limit depends on
             which of the two goes to 0 first.
     """
     gamma = ranges.checked("local_decay", local_decay, above=0, below=1)
@@ -92,12 +92,13 @@ def policy_gap(
     expected_deposit: ArrayLike,
     expected_deposit_second: ArrayLike,
 ) -> FloatArray:
-    """Delta of (3.31), of which §3.4.8 says: if positive, the policy in q' settles.
+    """Gap between the levels of the two best actions, Delta of eq. (3.31).
 
-    That does not follow from it (docs/theory.md); claim C23 tries it out.
+    According to §3.4.8 the policy in q' settles if the gap is positive. That does not
+    follow from the formula (docs/theory.md); claim C23 tests it by experiment.
 
-    With annealed exploration it is this with 1 / J_min and 1 / J_second for the two
-    expected deposits.
+    With annealed exploration, pass 1 / J_min and 1 / J_second as the two expected
+    deposits.
     """
     common = n_ants, tau0, local_decay, global_decay
     lower = expected_lower_limit(*common, expected_deposit)
@@ -110,7 +111,7 @@ def policy_gap_of_one_ant(
     expected_deposit: ArrayLike,
     expected_deposit_second: ArrayLike,
 ) -> FloatArray:
-    """(3.31) for M = 1: never negative, as the first deposit is the larger one."""
+    """The gap (3.31) for M = 1: never negative, as the first deposit is the larger."""
     rho, gamma = (
         ranges.global_decay_checked(global_decay),
         ranges.local_decay_checked(local_decay),
@@ -123,7 +124,7 @@ def policy_gap_of_one_ant(
 def policy_gap_without_local_update(
     n_ants: ArrayLike, expected_deposit: ArrayLike, expected_deposit_second: ArrayLike
 ) -> FloatArray:
-    """(3.31) for gamma = 0, any rho, and for rho = 1, any gamma."""
+    """The gap (3.31) for gamma = 0, or for rho = 1."""
     second = ranges.positive("expected_deposit_second", expected_deposit_second)
     first = ranges.positive("expected_deposit", expected_deposit)
     return np.asarray(first - ranges.n_ants_checked(n_ants) * second)
@@ -135,7 +136,7 @@ def policy_gap_with_full_local_update(
     expected_deposit: ArrayLike,
     expected_deposit_second: ArrayLike,
 ) -> FloatArray:
-    """(3.31) for gamma -> 1: rho times that of gamma = 0."""
+    """The gap (3.31) for gamma -> 1: rho times the gap for gamma = 0."""
     gap = policy_gap_without_local_update(
         n_ants, expected_deposit, expected_deposit_second
     )
@@ -145,18 +146,18 @@ def policy_gap_with_full_local_update(
 def policy_gap_without_global_update(
     n_ants: ArrayLike, tau0: ArrayLike, local_decay: ArrayLike
 ) -> FloatArray:
-    """(3.31) for rho -> 0: minus (3.29), the deposits play no part."""
+    """The gap (3.31) for rho -> 0: minus the gap (3.29), whatever the deposits."""
     return -level_gap_without_global_update(n_ants, tau0, local_decay)
 
 
 def most_ants(
     expected_deposit: ArrayLike, expected_deposit_second: ArrayLike
 ) -> FloatArray:
-    """(3.32): with more ants than this the policy gap is negative.
+    """Number of ants above which the policy gap is negative, eq. (3.32).
 
-    For gamma = 0, gamma -> 1 and rho = 1; the ratio of the two deposits. In between the
-    gap is negative with fewer ants already (docs/theory.md), but not always, as the end
-    of §3.4.8 may be read.
+    It is the ratio of the two deposits and holds for gamma = 0, gamma -> 1 and rho = 1.
+    In between the gap becomes negative with fewer ants (docs/theory.md), though not for
+    every number, as the end of §3.4.8 might suggest.
     """
     first = ranges.positive("expected_deposit", expected_deposit)
     return first / ranges.positive("expected_deposit_second", expected_deposit_second)

@@ -1,6 +1,6 @@
-"""What §3.4.3 to §3.4.6 say of the levels: their update, and bounds on them.
+"""The update of the pheromone levels and bounds on them, §3.4.3 to §3.4.6.
 
-Part of `acl_gym.theory`, which explains the arguments that all have in common.
+Part of `acl_gym.theory`, which explains the common arguments.
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ from acl_gym.utils.typing import FloatArray
 
 
 class Coefficients(NamedTuple):
-    """alpha and beta of (3.25), or a bound on them (Table 3.3).
+    """Coefficients alpha, beta of the recursion (3.25), or bounds on them (Table 3.3).
 
     Attributes:
-        alpha: what is left of the level, in [0, 1).
-        beta: what the local update adds, >= 0.
+        alpha: the fraction of the level that remains, in [0, 1).
+        beta: the amount that the local update adds, >= 0.
     """
 
     alpha: FloatArray
@@ -33,10 +33,10 @@ class Coefficients(NamedTuple):
 def update_coefficients(
     visits: ArrayLike, tau0: ArrayLike, local_decay: ArrayLike, global_decay: ArrayLike
 ) -> Coefficients:
-    """alpha(kappa) and beta(kappa) of (3.25): tau <- alpha tau + beta + deposits.
+    """Coefficients of the level recursion (3.25): tau <- alpha tau + beta + deposits.
 
     Args:
-        visits: M_qu, how many ants visit the pair, >= 1.
+        visits: M_qu, the number of ants that visit the pair, >= 1.
         tau0: see `acl_gym.theory`.
         local_decay: see `acl_gym.theory`.
         global_decay: see `acl_gym.theory`.
@@ -56,11 +56,12 @@ def total_update(
     local_decay: ArrayLike,
     global_decay: ArrayLike,
 ) -> FloatArray:
-    """A level after a trial, (3.16)-(3.18).
+    """A level after a trial: total update, eqs. (3.16) to (3.18).
 
     Args:
         level: tau(k), > 0.
-        visits: M_qu(k), how many ants visited the pair, >= 0; with 0 the level stays.
+        visits: M_qu(k), the number of ants that visited the pair, >= 0; with 0 the
+            level does not change.
         deposit: the sum of 1 / J of those ants, >= 0.
         tau0: see `acl_gym.theory`.
         local_decay: see `acl_gym.theory`.
@@ -82,7 +83,7 @@ def total_update(
 
 
 def action_probability_bound(epsilon: ArrayLike, n_actions: ArrayLike) -> FloatArray:
-    """epsilon / N: epsilon-greedy ants choose no action less often (Proposition 3.1).
+    """epsilon / N: least probability that an ant takes an action (Proposition 3.1).
 
     Args:
         epsilon: exploration probability, in [0, 1].
@@ -94,10 +95,10 @@ def action_probability_bound(epsilon: ArrayLike, n_actions: ArrayLike) -> FloatA
 
 
 def state_probability_bound(n_states: ArrayLike) -> FloatArray:
-    """1 / |Q|: a state is visited no less often in a trial (Proposition 3.2).
+    """1 / |Q|: least probability that a trial visits a state (Proposition 3.2).
 
     Args:
-        n_states: |Q|, the states in which ants may begin, >= 1.
+        n_states: |Q|, the number of possible initial states, >= 1.
     """
     return 1.0 / ranges.checked("n_states", n_states, at_least=1)
 
@@ -105,7 +106,7 @@ def state_probability_bound(n_states: ArrayLike) -> FloatArray:
 def pair_probability_bound(
     epsilon: ArrayLike, n_actions: ArrayLike, n_states: ArrayLike
 ) -> FloatArray:
-    """epsilon / (N |Q|), for a pair of state and action (Corollary 3.3).
+    """epsilon / (N |Q|): the same for a pair of state and action (Corollary 3.3).
 
     Args:
         epsilon: see `action_probability_bound`.
@@ -120,10 +121,10 @@ def pair_probability_bound(
 
 
 def tau0_bound(max_cost: ArrayLike, global_decay: ArrayLike) -> FloatArray:
-    """rho / J_max: with a tau0 up to this no level falls below tau0 (Proposition 3.4).
+    """rho / J_max: largest tau0 below which no level falls (Proposition 3.4).
 
     The proof needs less: the level after an update is at least
-    (1 - rho) tau0 + rho / J_max, so tau0 <= 1 / J_max is enough.
+    (1 - rho) tau0 + rho / J_max, so that tau0 <= 1 / J_max suffices.
 
     Args:
         max_cost: J_max, > 0.
@@ -135,7 +136,7 @@ def tau0_bound(max_cost: ArrayLike, global_decay: ArrayLike) -> FloatArray:
 
 
 def recursion_limit(a: ArrayLike, b: ArrayLike) -> FloatArray:
-    """b / (1 - a), to where y <- a y + b goes from anywhere (Lemma 3.5).
+    """b / (1 - a): limit of y <- a y + b from any start (Lemma 3.5).
 
     Args:
         a: in (-1, 1).
@@ -146,7 +147,7 @@ def recursion_limit(a: ArrayLike, b: ArrayLike) -> FloatArray:
 
 
 def recursion_rises(a: ArrayLike, b: ArrayLike, start: ArrayLike) -> NDArray[np.bool_]:
-    """Whether y <- a y + b never falls from y(0) = `start` (Lemma 3.6).
+    """Whether y <- a y + b never decreases from y(0) = `start` (Lemma 3.6).
 
     Args:
         a: in [0, 1).
@@ -160,7 +161,7 @@ def recursion_rises(a: ArrayLike, b: ArrayLike, start: ArrayLike) -> NDArray[np.
 def upper_coefficients(
     n_ants: ArrayLike, tau0: ArrayLike, local_decay: ArrayLike, global_decay: ArrayLike
 ) -> Coefficients:
-    """alpha_upper and beta_upper of Table 3.3."""
+    """Upper bounds on alpha and beta, Table 3.3."""
     one = update_coefficients(1, tau0, local_decay, global_decay)
     all_ants = update_coefficients(
         ranges.n_ants_checked(n_ants), tau0, local_decay, global_decay
@@ -171,7 +172,7 @@ def upper_coefficients(
 def lower_coefficients(
     n_ants: ArrayLike, tau0: ArrayLike, local_decay: ArrayLike, global_decay: ArrayLike
 ) -> Coefficients:
-    """alpha_lower and beta_lower of Table 3.3."""
+    """Lower bounds on alpha and beta, Table 3.3."""
     one = update_coefficients(1, tau0, local_decay, global_decay)
     all_ants = update_coefficients(
         ranges.n_ants_checked(n_ants), tau0, local_decay, global_decay
@@ -186,10 +187,10 @@ def level_bound(
     global_decay: ArrayLike,
     largest_deposit: ArrayLike,
 ) -> FloatArray:
-    """No level rises above this (3.23), Proposition 3.7.
+    """Upper bound on every level, eq. (3.23), Proposition 3.7.
 
-    It is the limit of (3.26) and holds where tau0 is not above it, as with the tau0 of
-    Proposition 3.4: 1 / J_min >= 1 / J_max >= tau0 / rho.
+    It is the limit of the recursion (3.26) and holds if tau0 does not exceed it, as
+    with the tau0 of Proposition 3.4: 1 / J_min >= 1 / J_max >= tau0 / rho.
 
     Args:
         n_ants: see `acl_gym.theory`.
@@ -208,14 +209,14 @@ def level_bound(
 def expected_deposit(epsilon: ArrayLike, deposits: ArrayLike) -> FloatArray:
     """J_exp^-1 = (1 - epsilon) J_min^-1 + epsilon J_avg^-1 of Proposition 3.8.
 
-    What an epsilon-greedy ant lays in the mean if it takes the first action for the
-    best. J_avg^-1 is the mean of the deposits (not the inverse of the mean cost, as the
-    text puts it: the derivation averages deposits).
+    The mean deposit of an epsilon-greedy ant that prefers the first action. J_avg^-1 is
+    the mean of the deposits. (The thesis calls it the inverse of the mean cost, but its
+    derivation averages deposits.)
 
     Args:
         epsilon: exploration probability, in [0, 1].
-        deposits: 1 / J of each action along the last axis, > 0, first that of the
-            action that ants prefer.
+        deposits: 1 / J of each action along the last axis, > 0, the preferred action
+            first.
     """
     deposits = ranges.positive("deposits", deposits)
     if deposits.ndim == 0:
@@ -232,7 +233,7 @@ def expected_upper_limit(
     global_decay: ArrayLike,
     expected_deposit: ArrayLike,
 ) -> FloatArray:
-    """No expected level rises above this (3.27), Proposition 3.8."""
+    """Upper bound on the expected level, eq. (3.27), Proposition 3.8."""
     alpha, beta = upper_coefficients(n_ants, tau0, local_decay, global_decay)
     deposit = ranges.positive("expected_deposit", expected_deposit)
     total = (
@@ -250,7 +251,7 @@ def expected_lower_limit(
     global_decay: ArrayLike,
     expected_deposit: ArrayLike,
 ) -> FloatArray:
-    """In the limit no expected level lies below this (3.28), Proposition 3.9."""
+    """Lower bound on the expected level in the limit, eq. (3.28), Proposition 3.9."""
     alpha, beta = lower_coefficients(n_ants, tau0, local_decay, global_decay)
     deposit = ranges.positive("expected_deposit", expected_deposit)
     return recursion_limit(
@@ -266,10 +267,10 @@ def expected_band(
     global_decay: ArrayLike,
     expected_deposit: ArrayLike,
 ) -> tuple[FloatArray, FloatArray]:
-    """E_lower and E_upper of Propositions 3.8 and 3.9 as they rise from tau0.
+    """Bounds on the expected level after each update (Propositions 3.8 and 3.9).
 
     Args:
-        n_updates: how many updates to follow, >= 0.
+        n_updates: number of updates, >= 0.
         n_ants: see `acl_gym.theory`.
         tau0: see `acl_gym.theory`.
         local_decay: see `acl_gym.theory`.
@@ -283,7 +284,7 @@ def expected_band(
     count = validation.integer("n_updates", n_updates, at_least=0)
     rho, deposit = (
         ranges.global_decay_checked(global_decay),
-        ranges.positive("deposit", expected_deposit),
+        ranges.positive("expected_deposit", expected_deposit),
     )
     common = n_ants, tau0, local_decay, global_decay
     bounds = []

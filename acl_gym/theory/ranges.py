@@ -1,4 +1,4 @@
-"""Arguments of the theory as arrays, each within its range."""
+"""Range checks of the theory's arguments."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def checked(
     at_most: float = math.inf,
     finite: bool = True,
 ) -> FloatArray:
-    """Numbers as an array, or a ValueError that names the range."""
+    """Return numbers as an array; a number out of range raises a ValueError."""
     array = validation.real_array(name, values, finite=finite)
     inside = (array > above) | (above == -math.inf)
     inside &= (array >= at_least) & (array <= at_most)
@@ -34,25 +34,25 @@ def checked(
 
 
 def positive(name: str, values: ArrayLike) -> FloatArray:
-    """Numbers > 0."""
+    """Check numbers that must be > 0."""
     return checked(name, values, above=0)
 
 
 def n_ants_checked(values: ArrayLike) -> FloatArray:
-    """M, >= 1."""
+    """Check the number of ants M, >= 1."""
     return checked("n_ants", values, at_least=1)
 
 
 def epsilon_checked(values: ArrayLike) -> FloatArray:
-    """The exploration probability, in [0, 1]."""
+    """Check the exploration probability epsilon, in [0, 1]."""
     return checked("epsilon", values, at_least=0, at_most=1)
 
 
 def local_decay_checked(values: ArrayLike) -> FloatArray:
-    """gamma, in [0, 1)."""
+    """Check the local decay gamma, in [0, 1)."""
     return checked("local_decay", values, at_least=0, below=1)
 
 
 def global_decay_checked(values: ArrayLike) -> FloatArray:
-    """rho, in (0, 1]."""
+    """Check the global decay rho, in (0, 1]."""
     return checked("global_decay", values, above=0, at_most=1)

@@ -1,1 +1,1 @@
-"""What every other module may use, and which knows none of them."""
+"""Helpers that any other module may use and that import none of them."""

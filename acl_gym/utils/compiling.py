@@ -1,4 +1,4 @@
-"""A word to the user while kernels are compiled, which takes a while on first use."""
+"""A log message while kernels are compiled on first use, which takes a while."""
 
 from __future__ import annotations
 
@@ -12,41 +12,41 @@ from numba.core.event import Event, Listener, register
 logger = logging.getLogger("acl_gym")
 
 PATIENCE = 1.0
-"""Seconds of compilation after which the user is told what the wait is for."""
+"""Seconds of compilation after which the message is logged."""
 
 
 class Announcer(Listener):
-    """Tells once, when this package's kernels have compiled for `PATIENCE` seconds.
+    """Logs one message when the package has compiled kernels for `PATIENCE` seconds.
 
-    Kernels that are loaded from Numba's cache do not count, nor do other packages'.
+    Kernels loaded from Numba's cache and kernels of other packages do not count.
 
     Attributes:
-        seconds: how long kernels have been compiled in this process.
+        seconds: time spent compiling kernels in this process.
     """
 
     def __init__(self) -> None:
         self.seconds = 0.0
-        self._depth = 0  # a kernel that calls another compiles it in between
+        self._depth = 0  # compiling a kernel compiles those that it calls
         self._began = 0.0
-        self._told = False
+        self._announced = False
         self._timer: threading.Timer | None = None
 
     def on_start(self, event: Event) -> None:
-        """A kernel begins to be compiled."""
+        """Compilation of a kernel begins."""
         if not _is_ours(event):
             return
         if self._depth == 0:
             self._began = time.perf_counter()
-            if not self._told:
+            if not self._announced:
                 # A single kernel may take longer than the patience.
                 wait = max(0.0, PATIENCE - self.seconds)
-                self._timer = threading.Timer(wait, self._tell)
+                self._timer = threading.Timer(wait, self._announce)
                 self._timer.daemon = True
                 self._timer.start()
         self._depth += 1
 
     def on_end(self, event: Event) -> None:
-        """A kernel has been compiled."""
+        """Compilation of a kernel has ended."""
         if not _is_ours(event):
             return
         self._depth -= 1
@@ -57,12 +57,12 @@ class Announcer(Listener):
             self._timer.cancel()
             self._timer = None
 
-    def _tell(self) -> None:
-        if not self._told:
-            self._told = True
+    def _announce(self) -> None:
+        if not self._announced:
+            self._announced = True
             logger.warning(
-                "acl-gym compiles its kernels when they are first used, which may take "
-                "half a minute in all; they are kept on disk for the next time."
+                "acl-gym is compiling its kernels for their first use, which may take "
+                "half a minute in total; they are cached on disk for later runs."
             )
 
 

@@ -1,7 +1,7 @@
 """Agents as files: NumPy arrays and JSON in one `.npz`, read without pickle.
 
-A file from a stranger runs no code: arrays are read with pickle refused, everything
-else is JSON.
+An untrusted file cannot run code: arrays are read without pickle, and everything else
+is JSON.
 """
 
 from __future__ import annotations
@@ -28,13 +28,13 @@ def with_suffix(path: str | Path) -> Path:
 def save(
     path: str | Path, header: dict[str, Any], arrays: dict[str, NDArray[Any]]
 ) -> Path:
-    """Write header and arrays; the file appears whole or not at all.
+    """Write header and arrays in one atomic step.
 
     Returns:
         The path written.
 
     Raises:
-        FileNotFoundError: there is no such folder.
+        FileNotFoundError: the folder of the file does not exist.
     """
     target = with_suffix(path)
     text = json.dumps(
@@ -49,10 +49,10 @@ def save(
 
 
 def checked_target(path: Path) -> Path:
-    """Return the path of a file to be written if its folder is there.
+    """Return the path of a file to be written if its folder exists.
 
     Raises:
-        FileNotFoundError: there is no such folder.
+        FileNotFoundError: the folder of the file does not exist.
     """
     if not path.parent.is_dir():
         raise FileNotFoundError(
@@ -62,7 +62,7 @@ def checked_target(path: Path) -> Path:
 
 
 def write_atomically(path: Path, content: bytes) -> None:
-    """Write a file that appears whole or not at all."""
+    """Write a file so that it appears complete or not at all."""
     temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
     try:
         with temporary.open("wb") as file:
@@ -79,7 +79,8 @@ def load(path: str | Path) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
 
     Raises:
         FileNotFoundError: there is no such file.
-        ValueError: it is not ours, is cut short or damaged, or is of a later version.
+        ValueError: it is not a file of this package, is damaged, or is of a later
+            version.
     """
     source = with_suffix(path)
     if not source.is_file():
@@ -92,10 +93,10 @@ def load(path: str | Path) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
         header = json.loads(arrays.pop("header").tobytes())
         kind, number = header.get("format"), header.get("version")
     except Exception as error:
-        # Whatever NumPy, zipfile, zlib and json may raise, and that is a dozen kinds,
-        # means one thing here.
+        # NumPy, zipfile, zlib and json raise a dozen kinds of errors, which all mean
+        # the same here.
         raise ValueError(
-            f"{source} is not an agent saved by acl-gym, or is cut short "
+            f"{source} is not an agent saved by acl-gym, or is damaged "
             f"({type(error).__name__}); save the agent again or use another copy."
         ) from error
     if kind != FORMAT or number != VERSION:
@@ -107,7 +108,7 @@ def load(path: str | Path) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
 
 
 def _plain_number(value: Any) -> Any:
-    """NumPy's numbers, which a callback may have left in a row, as Python's."""
+    """Turn a NumPy number, which a callback may have added, into a Python number."""
     if isinstance(value, np.generic):
         return value.item()
     raise TypeError(

@@ -1,9 +1,9 @@
-"""Several threads within one colony, with the same bits whatever their number.
+"""Several threads within one colony, with results that are the same for any number.
 
-What a step does for each ant by itself (moving it, locating its state, drawing its
-action) is cut into blocks of ants, and threads take the blocks. What the ants share
-(decay, and the sum of the deposits) is done by one thread, in the order of the ants.
-So a result does not depend on the number of threads, nor on who is first.
+The parts of a step that concern one ant at a time (moving it, locating its state,
+drawing its action) are split into blocks of ants, which threads share. The parts that
+concern all ants (decay and the sum of the deposits) are done by one thread, in the
+order of the ants. So a result does not depend on the number of threads or their timing.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from __future__ import annotations
 from acl_gym.utils import validation
 
 LEAST_ANTS = 2_000
-"""Below so many ants waking the threads costs more than it saves."""
+"""With fewer ants, waking the threads costs more than it saves."""
 
 
 class _Setting:
@@ -19,10 +19,10 @@ class _Setting:
 
 
 def set_num_threads(count: int) -> None:
-    """Let colonies and their environments use `count` threads; at first it is 1.
+    """Let colonies and their environments use `count` threads; the default is 1.
 
-    Threads serve colonies of several thousand ants. Independent runs gain more from
-    processes of their own. Do not fork the process once threads have worked.
+    Threads pay off in colonies of several thousand ants; independent runs gain more
+    from processes of their own. Do not fork the process after threads have been used.
 
     Args:
         count: >= 1, at most the number of cores, or `NUMBA_NUM_THREADS` where that
@@ -40,8 +40,8 @@ def set_num_threads(count: int) -> None:
         most = int(getattr(config, "NUMBA_NUM_THREADS", 1))
         if count > most:
             raise ValueError(
-                f"count must be at most {most}, got {count}: one thread a core, or what "
-                "the environment variable NUMBA_NUM_THREADS says; set it before Python "
+                f"count must be at most {most}, got {count}: one thread per core, or "
+                "NUMBA_NUM_THREADS where that variable is set; set it before Python "
                 "starts to allow more."
             )
         numba.set_num_threads(count)
@@ -49,10 +49,10 @@ def set_num_threads(count: int) -> None:
 
 
 def get_num_threads() -> int:
-    """How many threads colonies and their environments use at most."""
+    """The most threads that colonies and their environments use."""
     return _Setting.count
 
 
 def worth_it(ants: int) -> bool:
-    """Whether so many ants are to be shared among threads."""
+    """Whether a number of ants is large enough to share among threads."""
     return _Setting.count > 1 and ants >= LEAST_ANTS

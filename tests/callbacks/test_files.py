@@ -131,7 +131,7 @@ def test_bad_arguments_of_an_evaluation(keywords: Any, message: str) -> None:
 
 @BOTH
 def test_going_on_from_a_checkpoint_is_going_on(kind: type, tmp_path: Path) -> None:
-    whole = make(kind).learn(
+    unbroken = make(kind).learn(
         trials=20, callback=[evaluation(every=5), Checkpoint(tmp_path)]
     )
     names = sorted(path.name for path in tmp_path.iterdir())
@@ -139,10 +139,10 @@ def test_going_on_from_a_checkpoint_is_going_on(kind: type, tmp_path: Path) -> N
     half = kind.load(tmp_path / "trial_000010.npz", pendulums())
     assert half.trials == 10
     half.learn(trials=10, callback=evaluation(every=5))
-    assert half.table.tobytes() == whole.table.tobytes()
-    assert half.num_timesteps == whole.num_timesteps
-    assert without_time(half.history) == without_time(whole.history)
-    assert half.rng.bit_generator.state == whole.rng.bit_generator.state
+    assert half.table.tobytes() == unbroken.table.tobytes()
+    assert half.num_timesteps == unbroken.num_timesteps
+    assert without_time(half.history) == without_time(unbroken.history)
+    assert half.rng.bit_generator.state == unbroken.rng.bit_generator.state
 
 
 def test_the_last_trial_is_saved_with_its_whole_row(tmp_path: Path) -> None:

@@ -31,7 +31,7 @@ def figures(*arguments: str) -> Any:
 
 
 def run(*arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]:
-    """In a new interpreter, in another folder; without the word about compilation."""
+    """In a new interpreter, in another folder; without the message about compilation."""
     done = subprocess.run(
         [sys.executable, "-m", "acl_gym", *arguments],
         cwd=cwd,
@@ -42,7 +42,7 @@ def run(*arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]:
         timeout=120,
     )
     lines = done.stderr.splitlines(keepends=True)
-    done.stderr = "".join(line for line in lines if "compiles its kernels" not in line)
+    done.stderr = "".join(line for line in lines if "compiling its kernels" not in line)
     return done
 
 

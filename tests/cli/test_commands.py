@@ -168,7 +168,7 @@ def test_the_table_has_the_evaluated_rows_and_the_last() -> None:
     assert lines[0].split()[:3] == ["trial", "steps", "seconds"]
     assert [line.split()[0] for line in lines[1:4]] == ["2", "4", "5"]
     assert f"{rows[-1]['policy_cost']:.4f}" in lines[3]
-    assert lines[4].startswith("Saved Pendulum-v0.npz; acl-gym evaluate Pendulum-v0")
+    assert lines[4].startswith("Saved Pendulum-v0.npz. To evaluate it again: acl-gym")
 
 
 def test_quiet_prints_nothing() -> None:
@@ -182,8 +182,8 @@ def test_partitions_and_cells() -> None:
         found = figures(*SMALL, "--partition", kind, "--trials", "1")
         assert found["partition"].startswith(start)
         assert "circular=[0]" in found["partition"]
-    whole = figures("train", PENDULUM, "--ants", "2", "--trials", "1")
-    assert whole["partition"] == "Fuzzy(40 x 41 cells, circular=[0])"
+    default = figures("train", PENDULUM, "--ants", "2", "--trials", "1")
+    assert default["partition"] == "Fuzzy(40 x 41 cells, circular=[0])"
     one = figures(*SMALL, "--cells", "5", "--trials", "1")
     assert one["partition"] == "Fuzzy(5 x 5 cells, circular=[0])"
 
@@ -213,7 +213,7 @@ def test_any_environment_gets_a_partition(env_id: str, partition: str) -> None:
 
 
 def test_an_environment_of_a_module_in_this_folder(tmp_path: Path) -> None:
-    """Random, and so evaluated with the same luck; its own T."""
+    """It is random, so evaluations share their random numbers; it has its own T."""
     (tmp_path / "my_corridor.py").write_text(MODULE)
     arguments = ["train", "my_corridor:Corridor-v0", "--ants", "10", "--cells", "11"]
     arguments += ["--trials", "4", "--param", "tau0=0.001", "--env-arg", "slip=0.2"]
@@ -229,17 +229,17 @@ def test_an_environment_of_a_module_in_this_folder(tmp_path: Path) -> None:
     assert (evaluated["episodes"], evaluated["max_steps"]) == (100, 80)
 
 
-def test_evaluation_as_told(tmp_path: Path) -> None:
+def test_evaluation_options_are_followed(tmp_path: Path) -> None:
     out = str(tmp_path / "x.npz")
     figures(*SMALL, "--out", out)
-    told = figures("evaluate", out, "--episodes", "7", "--seed", "3")
-    assert (told["episodes"], told["seed"]) == (7, 3)
+    found = figures("evaluate", out, "--episodes", "7", "--seed", "3")
+    assert (found["episodes"], found["seed"]) == (7, 3)
     states = Pendulum().sample_states(np.random.default_rng(3), 7).T
     env = gym.make_vec(PENDULUM, num_envs=7)
     expected = evaluate_policy_cost(ACL.load(out), env, states)
-    assert told["policy_cost"] == expected.cost
-    assert told["mean_length"] == expected.lengths.mean()
-    assert figures("evaluate", out, "--episodes", "7", "--seed", "4") != told
+    assert found["policy_cost"] == expected.cost
+    assert found["mean_length"] == expected.lengths.mean()
+    assert figures("evaluate", out, "--episodes", "7", "--seed", "4") != found
     short = figures("evaluate", out, "--max-steps", "3")
     assert short["mean_length"] <= 3
 
@@ -265,7 +265,7 @@ def test_every_environment_is_listed_and_described() -> None:
         assert row["id"] in text
         assert row["description"].endswith(".")
         for head in ("observation", "actions", "thesis"):
-            assert row[head], f"the docstring of {row['id']} says nothing of {head}"
+            assert row[head], f"the docstring of {row['id']} lacks {head}"
 
 
 @pytest.mark.parametrize("env_id", list(ENVIRONMENTS))
@@ -273,7 +273,7 @@ def test_every_parameter_is_explained(env_id: str) -> None:
     found = figures("envs", env_id)
     assert found["parameters"]
     for each in found["parameters"]:
-        assert each["meaning"], f"{env_id}: nothing is said of {each['name']}"
+        assert each["meaning"], f"{env_id}: no meaning given for {each['name']}"
     shown = invoke("envs", env_id).stdout
     assert all(each["name"] in shown for each in found["parameters"])
     space = gym.make_vec(env_id, num_envs=1).single_observation_space

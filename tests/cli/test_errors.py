@@ -54,19 +54,19 @@ def test_an_interrupted_command_says_what_is_kept(
         ([*SMALL, "--cells", "6,7,8"], "cells must be an int or 2 ints"),
         ([*SMALL, "--cells", "six"], "--cells must be whole numbers"),
         ([*SMALL, "--param", "epsilon"], "--param must be name=value, got 'epsilon'"),
-        ([*SMALL, "--param", "speed=1"], "no 'speed'; there are alpha, "),
+        ([*SMALL, "--param", "speed=1"], "no 'speed'; choose from alpha, "),
         ([*SMALL, "--param", "seed=1"], "no 'seed'"),
         ([*SMALL, "--param", "epsilon=1.5"], "epsilon must lie in [0, 1]"),
         ([*SMALL, "--param", "epsilon=high"], "epsilon must be a real number"),
         ([*SMALL, "--param", "alpha=1", "--param", "alpha=2"], "twice"),
-        ([*SMALL, "--env-arg", "gravitas=1"], "there are inertia, motor_gain"),
+        ([*SMALL, "--env-arg", "gravitas=1"], "choose from inertia, motor_gain"),
         ([*SMALL, "--env-arg", "mass=-1"], "mass must lie in"),
         ([*SMALL, "--out", "/no/such/folder/x"], "no folder /no/such/folder"),
         ([*SMALL, "--log", "/no/such/folder/x"], "no folder /no/such/folder"),
         ([*SMALL, "--log", str(ROOT / "README.md")], "is not a log"),
         (["evaluate", "/no/such/agent"], "no agent file at /no/such/agent.npz"),
         (["evaluate", str(ROOT / "README.md")], "is not an agent saved by acl-gym"),
-        (["envs", "CartPole-v1"], "no environment 'CartPole-v1'; there are"),
+        (["envs", "CartPole-v1"], "no environment 'CartPole-v1'; choose from"),
         (["compare", "--preset", "huge"], "invalid choice 'huge'"),
         (["compare", "--env", "CartPole-v1"], "invalid choice 'CartPole-v1'"),
         (["compare", "--agents", "sarsa"], "must be among acl-fuzzy"),
@@ -137,4 +137,4 @@ def test_ctrl_c_is_one_line_and_130(tmp_path: Path) -> None:
         out, err = process.communicate(timeout=60)
     assert process.returncode == 130
     assert out == ""
-    assert err == "acl-gym: interrupted; what is in files already is kept.\n"
+    assert err == "acl-gym: interrupted; files written so far are kept.\n"

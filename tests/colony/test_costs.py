@@ -1,6 +1,8 @@
-"""Costs of whole solutions, against loops over one solution at a time."""
+"""Episode costs, against loops over one solution at a time."""
 
 from __future__ import annotations
+
+import json
 
 import numpy as np
 import pytest
@@ -10,8 +12,8 @@ from hypothesis import strategies as st
 from acl_gym.colony.costs import (
     Constant,
     Cost,
+    FunctionCost,
     Overshoot,
-    OwnCost,
     Quadratic,
     RiseTime,
     SettlingTime,
@@ -202,7 +204,17 @@ def test_what_an_episode_hands_out_is_a_copy() -> None:
 @pytest.mark.parametrize("result", ["a", None, np.nan, [1.0]])
 def test_a_function_that_gives_no_number_is_refused(result: object) -> None:
     with pytest.raises((TypeError, ValueError), match="the cost of ant 0 must"):
-        OwnCost(lambda _: result)(episodes([0.0, 1.0]))  # type: ignore[arg-type,return-value]
+        FunctionCost(lambda _: result)(episodes([0.0, 1.0]))  # type: ignore[arg-type,return-value]
+
+
+def test_an_older_file_names_a_function_otherwise() -> None:
+    saved = to_settings(2.0 * as_cost(lambda _: 1.0))  # type: ignore[operator]
+    text = json.dumps(saved)
+    assert "FunctionCost" in text
+    older = json.loads(text.replace("FunctionCost", "OwnCost"))
+    assert to_settings(cost_from_settings(older)) == to_settings(
+        cost_from_settings(saved)
+    )
 
 
 def test_a_cost_that_gives_no_costs_is_refused() -> None:

@@ -42,7 +42,7 @@ class TableEnv(gym.Env):
     Args:
         table: `P[state][action]`, a list of (probability, next, reward, terminated).
         start: the first state; None draws it from those that do not end at once.
-        masks: which actions each state offers, told in `info["action_mask"]`.
+        masks: which actions each state offers, given in `info["action_mask"]`.
         limit: truncate after so many steps.
     """
 
@@ -58,7 +58,7 @@ class TableEnv(gym.Env):
         self.action_space = spaces.Discrete(len(table[0]))
         self.start, self.masks, self.limit = start, masks, limit
 
-    def _told(self) -> tuple[np.ndarray, dict[str, Any]]:
+    def _observation(self) -> tuple[np.ndarray, dict[str, Any]]:
         info = {} if self.masks is None else {"action_mask": self.masks[self.cell]}
         return np.array([float(self.cell)]), info
 
@@ -69,23 +69,23 @@ class TableEnv(gym.Env):
         drawn = int(self.np_random.integers(len(self.P) - 1))
         self.cell = drawn if self.start is None else self.start
         self.steps = 0
-        return self._told()
+        return self._observation()
 
     def step(self, action: int) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
         outcomes = self.P[self.cell][int(action)]
         which = self.np_random.choice(len(outcomes), p=[o[0] for o in outcomes])
         _, self.cell, reward, terminated = outcomes[which]
         self.steps += 1
-        observation, info = self._told()
+        observation, info = self._observation()
         return observation, reward, terminated, self.steps >= self.limit, info
 
 
 def vector(table: Table, slots: int, mode: str = "NextStep", **keywords: Any) -> Any:
-    """Many of them, one a slot."""
+    """Several such environments, one per slot."""
     return SyncVectorEnv(
         [lambda: TableEnv(table, **keywords)] * slots, autoreset_mode=mode
     )
 
 
 def model(table: Table) -> TabularModel:
-    return TabularModel.of(TableEnv(table))
+    return TabularModel.from_env(TableEnv(table))

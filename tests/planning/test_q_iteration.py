@@ -118,14 +118,14 @@ def test_four_dimensions_and_nine_actions(kind: Any) -> None:
 def test_batches_of_cells_do_not_matter(monkeypatch: pytest.MonkeyPatch) -> None:
     env = pendulum()
     partition = grid(Fuzzy, env, 9, 7)
-    whole = fuzzy_q_iteration(env, partition, max_iterations=20)
+    at_once = fuzzy_q_iteration(env, partition, max_iterations=20)
     monkeypatch.setattr(q_iteration, "_SLOTS", 10)
     parts = fuzzy_q_iteration(env, partition, max_iterations=20)
-    np.testing.assert_array_equal(whole.policy.table, parts.policy.table)
+    np.testing.assert_array_equal(at_once.policy.table, parts.policy.table)
 
 
 def test_discounted_values_of_a_system_that_cannot_move() -> None:
-    """No gravity, no torque: a resting pendulum pays the same cost for ever."""
+    """No gravity, no torque: a resting pendulum pays the same cost forever."""
     env = pendulum(gravity=0.0, torques=(0.0,), torque_weight=0.0)
     partition = Fuzzy([[0.0, 1.0, 2.0, 3.0], [0.0]], [2 * np.pi, None])
     found = fuzzy_q_iteration(env, partition, discount=0.8, tolerance=1e-12)

@@ -189,7 +189,7 @@ END = [(1.0, 0, -1.0, True)]
 @pytest.mark.parametrize(
     ("states", "expected"),
     [
-        # 1 stands still for ever at a cost; 2 may come to it, 3 cannot.
+        # 1 stands still forever at a cost; 2 may come to it, 3 cannot.
         (
             [
                 END,
@@ -281,7 +281,7 @@ def test_the_policy_walks_as_well_as_its_values_say() -> None:
 
 def test_the_policy_takes_the_actions_found() -> None:
     """Also where others tie with them, and where spaces do not begin at 0."""
-    lake = TabularModel.of(gym.make("FrozenLake-v1", is_slippery=False))
+    lake = TabularModel.from_env(gym.make("FrozenLake-v1", is_slippery=False))
     arrays = (lake.probability, lake.next_state, lake.reward, lake.terminated)
     found = value_iteration(TabularModel(*arrays, first_state=5, first_action=2))
     assert (found.action_values[0] == 1.0).sum() > 1
@@ -295,8 +295,8 @@ def test_the_policy_takes_the_actions_found() -> None:
 
 def test_models_of_this_package_are_those_of_the_system() -> None:
     """Any environment whose system has `outcomes()`, single or vector."""
-    told = model(corridor(4, success=0.5))
-    arrays = (told.probability, told.next_state, told.reward, told.terminated)
+    built = model(corridor(4, success=0.5))
+    arrays = (built.probability, built.next_state, built.reward, built.terminated)
     for kind in (gym.Env, gym.vector.VectorEnv):
         env: Any = kind()
         env.system = SimpleNamespace(outcomes=lambda: arrays)
@@ -304,10 +304,10 @@ def test_models_of_this_package_are_those_of_the_system() -> None:
         env.single_action_space = gym.spaces.Discrete(1, start=7)
         env.observation_space = env.single_observation_space
         env.action_space = env.single_action_space
-        read = TabularModel.of(env)
+        read = TabularModel.from_env(env)
         assert (read.first_state, read.first_action) == (3, 7)
         for name in ("probability", "next_state", "reward", "terminated"):
-            np.testing.assert_array_equal(getattr(read, name), getattr(told, name))
+            np.testing.assert_array_equal(getattr(read, name), getattr(built, name))
 
 
 def test_tables_are_padded_by_outcomes_that_never_happen() -> None:
@@ -318,7 +318,7 @@ def test_tables_are_padded_by_outcomes_that_never_happen() -> None:
         [[1.0, 0.0]],
     ]
     assert (read.n_states, read.n_actions) == (3, 1)
-    same = TabularModel.of(vector(corridor(3, success=0.8), 2))
+    same = TabularModel.from_env(vector(corridor(3, success=0.8), 2))
     np.testing.assert_array_equal(same.probability, read.probability)
 
 
@@ -326,11 +326,15 @@ def test_tables_are_padded_by_outcomes_that_never_happen() -> None:
 def test_environments_that_tell_no_model(env_id: str) -> None:
     single = gym.make(env_id)
     for env in (single, SyncVectorEnv([lambda: gym.make(env_id)])):
-        for ask in (TabularModel.of, value_iteration, lambda e: policy_value(e, [0])):
-            with pytest.raises(TypeError, match=r"tell its model, .* learn with"):
+        for ask in (
+            TabularModel.from_env,
+            value_iteration,
+            lambda e: policy_value(e, [0]),
+        ):
+            with pytest.raises(TypeError, match=r"publish its model, .* learn with"):
                 ask(env)
-    with pytest.raises(TypeError, match=r"tell its model, .*got str"):
-        TabularModel.of("FrozenLake-v1")  # type: ignore[arg-type]
+    with pytest.raises(TypeError, match=r"publish its model, .*got str"):
+        TabularModel.from_env("FrozenLake-v1")  # type: ignore[arg-type]
 
 
 GOOD: dict[str, Any] = {
@@ -376,7 +380,7 @@ def test_bad_tables(keys: Any) -> None:
     env = TableEnv(corridor(3))
     env.P = keys
     with pytest.raises(ValueError, match="P must have the keys"):
-        TabularModel.of(env)
+        TabularModel.from_env(env)
 
 
 @pytest.mark.parametrize(

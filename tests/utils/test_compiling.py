@@ -1,4 +1,4 @@
-"""Who waits for the compiler is told so, once, and only then."""
+"""The wait for the compiler is announced once, and only when there is one."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def test_many_short_compilations_are_announced_once(
                 wait_until(lambda: bool(caplog.messages))
             announcer.on_end(event("acl_gym.partitions.kernels"))
     assert len(caplog.messages) == 1
-    assert "first used" in caplog.messages[0]
+    assert "first use" in caplog.messages[0]
     assert announcer.seconds == pytest.approx(3 * 0.3 + 3 * 0.4)
 
 
@@ -100,5 +100,5 @@ def test_the_first_run_says_what_the_wait_is_for_and_the_second_nothing(
             env={**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)},
         )
         said.append(done.stderr)
-    assert "compiles its kernels when they are first used" in said[0]
+    assert "compiling its kernels for their first use" in said[0]
     assert said[1] == ""

@@ -1,4 +1,4 @@
-"""Files: whole or not there, and harmless whatever is in them."""
+"""Files are complete or absent, and harmless whatever is in them."""
 
 from __future__ import annotations
 
@@ -212,7 +212,7 @@ def test_random_bytes_are_refused(tmp_path: Path, content: bytes, magic: bytes) 
 
 
 class Malice:
-    """What a pickle from a stranger may do."""
+    """What an untrusted pickle may do."""
 
     def __init__(self, target: Path) -> None:
         self.target = str(target)
@@ -233,7 +233,7 @@ def test_pickles_are_never_run(name: str | None, saved: bytes, tmp_path: Path) -
 
 
 def foreign_files() -> dict[str, bytes]:
-    """Files that are whole, but not of ours."""
+    """Valid files that are not agents."""
     files = {"empty": b"", "text": b"no agent", "null": b"\0" * 100}
     buffer = io.BytesIO()
     np.save(buffer, np.ones(3))

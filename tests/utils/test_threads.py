@@ -1,4 +1,4 @@
-"""Threads change no bit, and say what they cannot do."""
+"""Threads change no bit of a result, and refuse impossible numbers."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ def test_a_colony_of_vehicles_learns_the_same_bits() -> None:
 
 
 def test_any_number_of_threads_gives_the_same_bits() -> None:
-    """More threads than cores, which Numba allows where it is told beforehand."""
+    """More threads than cores, which Numba allows if it is configured beforehand."""
     done = subprocess.run(
         [sys.executable, "-c", BITS_FOR_EACH_COUNT],
         capture_output=True,
@@ -113,7 +113,11 @@ def test_threads_wake_for_many_ants_only(monkeypatch: pytest.MonkeyPatch) -> Non
     [
         (0, ValueError, "count"),
         (1.5, TypeError, "count"),
-        (10_000, ValueError, r"at most \d+, got 10000: one thread a core, .*NUMBA_NUM"),
+        (
+            10_000,
+            ValueError,
+            r"at most \d+, got 10000: one thread per core, .*NUMBA_NUM",
+        ),
     ],
 )
 def test_a_number_of_threads_that_cannot_be(

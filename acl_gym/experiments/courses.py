@@ -10,9 +10,11 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
+import gymnasium as gym
 import numpy as np
 
-from acl_gym.partitions import Crisp, Discrete, Fuzzy, Partition, named
+from acl_gym.partitions import Crisp, Discrete, Fuzzy, Partition
+from acl_gym.partitions.automatic import thesis_partition
 from acl_gym.partitions.grid import Grid
 from acl_gym.utils import validation
 
@@ -153,8 +155,12 @@ PENDULUM = Course(
     slots=250,
     max_steps=300,
     partitions={
-        "fuzzy": lambda: named.pendulum(40, 41, kind=Fuzzy),
-        "crisp": lambda: named.pendulum(40, 41, kind=Crisp),
+        "fuzzy": lambda: thesis_partition(
+            gym.make("acl_gym/Pendulum-v0"), (40, 41), kind=Fuzzy
+        ),
+        "crisp": lambda: thesis_partition(
+            gym.make("acl_gym/Pendulum-v0"), (40, 41), kind=Crisp
+        ),
     },
     # Table 5.2 and the base case of §5.3.
     acl={
@@ -179,20 +185,26 @@ PENDULUM = Course(
             trials=2,
             dqn_steps=1_200,
             dqn_every=400,
-            reference=lambda: named.pendulum(100, 101),
+            reference=lambda: thesis_partition(
+                gym.make("acl_gym/Pendulum-v0"), (100, 101)
+            ),
         ),
         "quick": Budget(
             trials=100,
             dqn_steps=20_000,
             dqn_every=1_000,
-            reference=lambda: named.pendulum(400, 401),
+            reference=lambda: thesis_partition(
+                gym.make("acl_gym/Pendulum-v0"), (400, 401)
+            ),
         ),
         "full": Budget(
             trials=100,
             dqn_steps=200_000,
             dqn_every=2_000,
             long_run=True,
-            reference=lambda: named.pendulum(1600, 1601),
+            reference=lambda: thesis_partition(
+                gym.make("acl_gym/Pendulum-v0"), (1600, 1601)
+            ),
         ),
     },
     pictures="pendulum",
@@ -205,8 +217,12 @@ NAVIGATION = Course(
     slots=200,
     max_steps=150,
     partitions={
-        "fuzzy": lambda: named.navigation("regular", kind=Fuzzy),
-        "crisp": lambda: named.navigation("regular", kind=Crisp),
+        "fuzzy": lambda: thesis_partition(
+            gym.make("acl_gym/Navigation-v0"), "regular", kind=Fuzzy
+        ),
+        "crisp": lambda: thesis_partition(
+            gym.make("acl_gym/Navigation-v0"), "regular", kind=Crisp
+        ),
     },
     acl={
         "tau0": 1e-3,

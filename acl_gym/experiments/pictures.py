@@ -19,7 +19,7 @@ from acl_gym.envs.navigation import Navigation
 from acl_gym.envs.navigation.painter import goal_outline
 from acl_gym.envs.pendulum import Pendulum
 from acl_gym.evaluation import Predictor, actions_in, control_env, record_trajectory
-from acl_gym.partitions import named
+from acl_gym.partitions.automatic import thesis_partition
 from acl_gym.planning.value_iteration import policy_value, value_iteration
 from acl_gym.utils.typing import FloatArray
 
@@ -55,7 +55,7 @@ def _pendulum_scene(env: ControlVectorEnv) -> Picture:
 
 def _pendulum_axes(env: ControlVectorEnv) -> tuple[FloatArray, FloatArray]:
     """Angles and velocities of the policy maps, four times finer than the cells."""
-    n_theta, n_omega = (len(centres) for centres in named.pendulum().centres)
+    n_theta, n_omega = (len(centres) for centres in thesis_partition(env).centres)  # type: ignore[attr-defined]
     low, high = env.single_observation_space.low, env.single_observation_space.high  # type: ignore[attr-defined]
     return (
         np.linspace(low[0], high[0], 4 * n_theta, endpoint=False),

@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import gymnasium as gym
 import numpy as np
 from gymnasium import spaces
-from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector import AutoresetMode, VectorEnv, VectorWrapper
 
 from acl_gym.envs.control.environments import ControlEnv, ControlVectorEnv
 from acl_gym.envs.control.system import ControlSystem
-from acl_gym.partitions import named
+from acl_gym.envs.wrappers.perturbations import HiddenVariables
 from acl_gym.partitions.base import Partition
 from acl_gym.partitions.discrete import FINITE_SPACES, Discrete
-from acl_gym.partitions.grid import Fuzzy, Grid
+from acl_gym.partitions.grid import Fuzzy, Grid, checked_kind
 from acl_gym.utils import validation
 from acl_gym.utils.typing import FloatArray
 
@@ -31,15 +31,70 @@ INFINITE = 1e30
 MARGIN = 0.25
 """`estimate_bounds` widens what it saw by this share of the range on either side."""
 
-_NAMED: dict[str, Callable[[Any, type[Grid]], Grid]] = {
-    "acl_gym.envs.pendulum.system.Pendulum": lambda system, kind: named.pendulum(
-        kind=kind, omega_max=system.omega_max
-    ),
-    "acl_gym.envs.navigation.system.Navigation": lambda system, kind: named.navigation(
-        "regular", kind=kind
-    ),
-}
-"""Class of a system -> the partition that the thesis gives it."""
+
+def thesis_partition(
+    env: Env, cells: Any = None, *, kind: type[Grid] = Fuzzy
+) -> Partition:
+    """Build the partition that the thesis uses for an environment of this package.
+
+    Args:
+        env: a single or a vector environment of this package. Wrappers may perturb or
+            hide variables (`HiddenVariables`), but not transform them.
+        cells: which centres: what the system's `thesis_centres` takes, such as
+            (40, 41) for the pendulum and "regular" or "damping" for the navigation, or
+            the centres themselves, one increasing sequence for each variable that is
+            observed. None takes the default of the system.
+        kind: `Fuzzy` or `Crisp`; for observations that are not cells already.
+
+    Returns:
+        `Discrete` where a state is a cell, otherwise a partition of that kind; the
+        circular variables are those of the system.
+
+    Raises:
+        TypeError: `env` is not an environment of this package, or `kind` or a number
+            in `cells` has the wrong type.
+        ValueError: there are no such centres, or a wrapper transforms the variables.
+    """
+    space = _observation_space(env)
+    checked_kind(kind)
+    system = _system(env)
+    if system is None:
+        raise TypeError(
+            f"env must be a control environment of this package, got {env}; use "
+            "automatic_partition(env) for others."
+        )
+    if isinstance(space, FINITE_SPACES):
+        if cells is not None:
+            raise ValueError(
+                "cells must be None where observations are cells already, got "
+                f"{cells!r} for {space}."
+            )
+        return Discrete.from_space(space)
+    shown = _shown_variables(env, system)
+    if _are_centres(cells):
+        centres = list(cells)
+        if len(centres) != len(shown):
+            raise ValueError(
+                f"cells must hold the centres of {len(shown)} variables, got "
+                f"{len(centres)} sequences."
+            )
+    else:
+        named = system.thesis_centres(cells)
+        if named is None:
+            raise ValueError(
+                f"the thesis has no centres for {type(system).__name__}; give them in "
+                "cells, one sequence for each variable, or use "
+                "automatic_partition(env)."
+            )
+        centres = [named[variable] for variable in shown]
+    full = _box(system.observation_space)
+    periods = [
+        float(full.high[variable] - full.low[variable])
+        if variable in system.circular
+        else None
+        for variable in shown
+    ]
+    return kind(centres, periods)
 
 
 def automatic_partition(
@@ -54,8 +109,8 @@ def automatic_partition(
     """Choose a partition for the observations of an environment.
 
     - `Discrete`, `MultiDiscrete` and `MultiBinary` observations are cells already.
-    - The systems of the thesis have its own centres: `named.pendulum` and
-      `named.navigation("regular")`, if the ranges of their variables are its own.
+    - The systems of the thesis get its centres, see `thesis_partition`, if these reach
+      to the bounds of the variables.
     - Other Boxes of one axis get evenly spread centres, both ends included. The
       more variables, the fewer for each (a decision): 101 for one variable, 41 for
       two, as in (5.3), 15 for three, 7 for four, 5 for five, 3 for six. This keeps the
@@ -89,7 +144,7 @@ def automatic_partition(
             more than one axis, or an argument does not fit the observations.
     """
     space = _observation_space(env)
-    named.checked_kind(kind)
+    checked_kind(kind)
     if isinstance(space, FINITE_SPACES):
         if cells is not None or bounds is not None:
             raise ValueError(
@@ -98,12 +153,13 @@ def automatic_partition(
             )
         return Discrete.from_space(space)
     box = _box(space)
-    system = _system(env, box)
+    system = _system(env)
+    if system is not None and system.observation_space != space:
+        system = None  # a wrapper has changed what is observed
     if cells is None and bounds is None and system is not None:
-        for base in type(system).__mro__:
-            make = _NAMED.get(f"{base.__module__}.{base.__qualname__}")
-            if make is not None and _spans(grid := make(system, kind), box):
-                return grid
+        centres = system.thesis_centres()
+        if centres is not None and _span(centres, system.circular, box):
+            return thesis_partition(env, kind=kind)
     circular = () if system is None else system.circular
     number = _centres(box.low.size) if cells is None else 0
     low, high = _bounded(env, box, bounds, circular, random_steps, seed)
@@ -236,23 +292,53 @@ def _centres(dimensions: int) -> int:
     return CENTRES[dimensions]
 
 
-def _system(env: Any, space: spaces.Space[Any]) -> ControlSystem | None:
-    """The system behind one of this package's environments, if `env` shows it as is."""
+def _system(env: Any) -> ControlSystem | None:
+    """The system of an environment of this package, None for any other."""
     base = env.unwrapped
     if isinstance(base, gym.vector.SyncVectorEnv):
         base = base.envs[0].unwrapped
     if not isinstance(base, (ControlEnv, ControlVectorEnv)):
         return None
-    # A wrapper may have changed what is observed.
-    return base.system if base.system.observation_space == space else None
+    return base.system
 
 
-def _spans(grid: Grid, box: spaces.Box) -> bool:
-    """Whether the outermost centres of `grid` are the bounds of `box`."""
-    ends = zip(grid.centres, grid.periods, box.low, box.high, strict=True)
+def _shown_variables(env: Any, system: ControlSystem) -> list[int]:
+    """The variables of a system that are observed through its wrappers, in order."""
+    full = _box(system.observation_space)
+    shown = list(range(full.low.size))
+    wrappers = []
+    while isinstance(env, (gym.Wrapper, VectorWrapper)):
+        wrappers.append(env)
+        env = env.env
+    for wrapper in reversed(wrappers):
+        if isinstance(wrapper, HiddenVariables):
+            shown = [shown[i] for i in wrapper.shown]
+    space = _observation_space(wrappers[0] if wrappers else env)
+    if space != spaces.Box(full.low[shown], full.high[shown], dtype=full.dtype.type):
+        raise ValueError(
+            "env must show variables of its system as they are, got observations "
+            f"from {space} of the system's {full}; use automatic_partition(env), or "
+            "leave out the wrapper that transforms them."
+        )
+    return shown
+
+
+def _are_centres(cells: Any) -> bool:
+    """Whether `cells` are sequences of centres, not numbers of them or a name."""
+
+    def is_list(value: Any) -> bool:
+        return isinstance(value, Sequence | np.ndarray) and not isinstance(value, str)
+
+    return is_list(cells) and len(cells) > 0 and all(map(is_list, cells))
+
+
+def _span(
+    centres: Sequence[FloatArray], circular: Sequence[int], box: spaces.Box
+) -> bool:
+    """Whether the outermost centres are the bounds of `box`."""
     return all(
-        period is not None or (axis[0] == low and axis[-1] == high)
-        for axis, period, low, high in ends
+        axis in circular or (line[0] == box.low[axis] and line[-1] == box.high[axis])
+        for axis, line in enumerate(centres)
     )
 
 

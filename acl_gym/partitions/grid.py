@@ -257,6 +257,17 @@ class Fuzzy(Grid):
     fuzzy = True
 
 
+def checked_kind(kind: Any) -> type[Grid]:
+    """Return `kind` if it is a kind of grid.
+
+    Raises:
+        TypeError: it is not `Crisp`, `Fuzzy` or a subclass of one of them.
+    """
+    if not (isinstance(kind, type) and issubclass(kind, (Crisp, Fuzzy))):
+        raise TypeError(f"kind must be the class Crisp or Fuzzy, got {kind!r}.")
+    return kind
+
+
 def _as_float64(states: NDArray[Any]) -> FloatArray:
     if states.dtype.kind not in "fiu":
         raise ValueError(f"states must be real numbers, got dtype {states.dtype}.")

@@ -17,7 +17,8 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
-from acl_gym.partitions import Crisp, Fuzzy, Partition, named
+from acl_gym.partitions import Crisp, Fuzzy, Partition
+from acl_gym.partitions.automatic import thesis_partition
 
 PENDULUM = "acl_gym/Pendulum-v0"
 NAVIGATION = "acl_gym/Navigation-v0"
@@ -172,14 +173,8 @@ class Setting(Named):
 
     def make_partition(self, fine: int = 1) -> Partition | None:
         """The partition; None where the states are the cells."""
-        if self.env_id == PENDULUM:
-            n_theta, n_omega = self.cells
-            limit = self.env.get("omega_max", 9.0)
-            return named.pendulum(
-                n_theta, n_omega, kind=KINDS[self.kind], omega_max=limit
-            )
-        if self.env_id == NAVIGATION:
-            return named.navigation(self.cells, kind=KINDS[self.kind])
+        if self.env_id in (PENDULUM, NAVIGATION):
+            return thesis_partition(self.make_env(1), self.cells, kind=KINDS[self.kind])
         return None
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 
+import gymnasium as gym
 import numpy as np
 import pytest
 
@@ -18,14 +19,15 @@ from acl_gym.experiments.courses import (
     Budget,
 )
 from acl_gym.experiments.pictures import PICTURES
-from acl_gym.partitions import Crisp, Discrete, Fuzzy, named
+from acl_gym.partitions import Crisp, Discrete, Fuzzy
+from acl_gym.partitions.automatic import thesis_partition
 from acl_gym.sb3.dqn import LONG_RUN, DQNSettings
 
 TINY = Budget(
     trials=2,
     dqn_steps=160,
     dqn_every=80,
-    reference=lambda: named.pendulum(20, 21),
+    reference=lambda: thesis_partition(gym.make("acl_gym/Pendulum-v0"), (20, 21)),
 )
 EVERY_ONE = [(c, method) for c in COURSES.values() for method in c.methods]
 

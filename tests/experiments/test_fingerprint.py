@@ -23,7 +23,7 @@ MATTERS = [
     *("envs/pendulum/system", "envs/pendulum/env", "envs/pendulum/kernels"),
     *("envs/navigation/system", "envs/navigation/kernels", "envs/two_state/system"),
     *("envs/grid_search/maps", "envs/grid_search/system"),
-    *("partitions/grid", "partitions/named", "partitions/kernels"),
+    *("partitions/grid", "partitions/automatic", "partitions/kernels"),
     *("colony/costs", "colony/deposits", "colony/schedules"),
 ]
 OF_ONE = {

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -13,12 +12,10 @@ import pytest
 
 from acl_gym.agents.q_learning import QLearning
 from acl_gym.colony.episodes import Episodes
-from acl_gym.envs.wrappers.perturbations import Backwards, BackwardsLuck, perturbed
 from acl_gym.reproduction import reproduce as reproduction
 from acl_gym.reproduction.catalogue import BY_NAME
 from acl_gym.reproduction.reproduce import tasks_for
 from acl_gym.reproduction.store import ParquetStore
-from acl_gym.reproduction.versus.arena import Arena
 from acl_gym.reproduction.versus.arenas import ARENAS, LABELS, SYSTEMS
 from acl_gym.reproduction.versus.contest import COLUMNS, Contest, learn, make_agent
 from acl_gym.reproduction.versus.reference import Reference
@@ -94,70 +91,6 @@ def test_a_run_that_breaks_down_costs_the_most(
     assert rows["policy_cost"][-1] == ARENAS["pendulum"].ceiling
     assert rows["success_rate"][-1] == 0.0
     assert np.all(np.diff(rows["env_steps"]) > 0)
-
-
-def test_a_veil_of_another_name_is_refused() -> None:
-    with pytest.raises(ValueError, match=r"must be made of slips, .* got 'fog'"):
-        perturbed(ARENAS["pendulum"].base(2), {"fog": 1})
-
-
-def test_noise_is_that_of_the_seed_and_stays_in_the_space() -> None:
-    env = Arena("acl_gym/Pendulum-v0", 1, 1, veil={"noise": [0.5, 3.0]}).make_env(500)
-    first, _ = env.reset(seed=3)
-    again, _ = env.reset(seed=3)
-    other, _ = env.reset(seed=4)
-    assert np.array_equal(first, again)
-    assert not np.array_equal(first, other)
-    true = env.unwrapped.states  # type: ignore[attr-defined]
-    env.reset(seed=4)
-    assert all(env.single_observation_space.contains(each) for each in first)
-    turn = 2 * math.pi
-    apart = (other[:, 0] - true[:, 0] + turn / 2) % turn - turn / 2
-    assert 0.4 < apart.std() < 0.6
-
-
-def test_slips_replace_as_many_actions_as_they_say() -> None:
-    env = perturbed(ARENAS["pendulum"].base(4_000), {"slips": 0.3})
-    plain = ARENAS["pendulum"].base(4_000)
-    env.reset(seed=1)
-    plain.reset(seed=1)
-    chosen = np.zeros(4_000, dtype=np.int64)
-    differ = env.step(chosen)[0][:, 1] != plain.step(chosen)[0][:, 1]
-    assert 0.17 < differ.mean() < 0.23  # two of three draws are another action
-
-
-def test_rounded_and_hidden_observations() -> None:
-    arena = ARENAS["pendulum-sign"]
-    env = arena.make_env(50)
-    seen, _ = env.reset(seed=0)
-    true = env.unwrapped.states  # type: ignore[attr-defined]
-    assert np.array_equal(seen[:, 0], true[:, 0])
-    assert np.array_equal(seen[:, 1], np.where(true[:, 1] > 0, 9.0, -9.0))
-
-    arena = ARENAS["navigation-hidden"]
-    env = arena.make_env(7)
-    seen, _ = env.reset(seed=0)
-    true = env.unwrapped.states  # type: ignore[attr-defined]
-    assert np.array_equal(seen, true[:, :3])
-    assert env.step(np.zeros(7, dtype=np.int64))[0].shape == (7, 3)
-    assert arena.partition("fuzzy").n_cells == 9 * 3 * 9
-
-
-def test_backwards_gives_each_slot_what_it_had() -> None:
-    plain = ARENAS["pendulum"].base(6)
-    env = Backwards(ARENAS["pendulum"].base(6))
-    first, second = plain.reset(seed=2)[0], env.reset(seed=2)[0]
-    assert np.array_equal(first[::-1], second)
-    actions = np.array([0, 1, 2, 2, 1, 0]) % 3
-    actions[0] = 2
-    forth, back = plain.step(actions), env.step(actions[::-1])
-    for one, other in zip(forth[:4], back[:4], strict=True):
-        assert np.array_equal(one[::-1], other)
-    states = plain.states[:]
-    env.reset(options={"state": states[::-1]})
-    assert np.array_equal(env.unwrapped.states, states)  # type: ignore[attr-defined]
-    luck = BackwardsLuck(np.random.default_rng(5)).random((2, 4))
-    assert np.array_equal(luck[:, ::-1], np.random.default_rng(5).random((2, 4)))
 
 
 def test_the_order_of_ants_does_not_matter_and_that_of_q_learning_does() -> None:

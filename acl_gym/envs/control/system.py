@@ -112,6 +112,28 @@ class ControlSystem(ABC):
             action: what was done to reach it; None at the start of an episode.
         """
 
+    def thesis_centres(self, cells: Any = None) -> tuple[FloatArray, ...] | None:
+        """The centres that the thesis gives each state variable, for a partition.
+
+        Args:
+            cells: which of them, where the thesis has several or a formula; see the
+                system. None takes its default.
+
+        Returns:
+            For each variable its centres, increasing, in the unit of the variable;
+            None if the thesis has none, as where a state is a cell already.
+
+        Raises:
+            ValueError: there are no such centres.
+            TypeError: `cells` is of another type than the system takes.
+        """
+        if cells is not None:
+            raise ValueError(
+                f"cells must be None for {type(self).__name__}, for which the thesis "
+                f"has no centres, got {cells!r}."
+            )
+        return None
+
     def observe(self, states: FloatArray) -> NDArray[Any]:
         """Return what is seen of `states` `(state_size, n)`: a new array `(n, ...)`."""
         seen = np.empty(states.shape[::-1])

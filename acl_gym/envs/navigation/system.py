@@ -18,6 +18,19 @@ from acl_gym.envs.navigation.kernels import Peak, Row
 from acl_gym.utils import threads, validation
 from acl_gym.utils.typing import BoolArray, FloatArray, IntArray
 
+_VELOCITY = (-2.0, 0.0, 2.0)
+_REGULAR = (-5.0, -2.0, -0.3, -0.1, 0.0, 0.1, 0.3, 2.0, 5.0)
+_DAMPING_1 = (-5.0, -3.75, -2.0, -0.3, 0.0, 0.3, 2.0, 2.45, 3.5, 3.75, 4.7, 5.0)
+_DAMPING_2 = (
+    *(-5.0, -4.55, -3.5, -2.3, -2.0, -1.1, -0.6, -0.3),
+    *(0.0, 0.3, 1.0, 2.6, 4.0, 5.0),
+)
+THESIS_CENTRES = {
+    "regular": (_REGULAR, _VELOCITY, _REGULAR, _VELOCITY),
+    "damping": (_DAMPING_1, _VELOCITY, _DAMPING_2, _VELOCITY),
+}
+"""Name -> centres of (c1, v1, c2, v2), in m and m/s (§4.5.2 and §4.5.3)."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Navigation(ControlSystem):
@@ -260,6 +273,27 @@ class Navigation(ControlSystem):
         distributed over the state space" and does not list them.
         """
         return (2.0 * halton_points(100) - 1.0) * self._limits[:, 0]
+
+    def thesis_centres(self, cells: Any = None) -> tuple[FloatArray, ...]:
+        """The centres of c1, v1, c2 and v2 by name.
+
+        With the 9 actions, "regular" (§4.5.2) has 729 cells and 6,561 pairs of cell and
+        action; "damping" (§4.5.3), finer around the two regions of stronger damping,
+        has 1,512 cells and 13,608 pairs.
+
+        Args:
+            cells: "regular" or "damping"; None takes "regular".
+
+        Returns:
+            Centres of the four variables, m and m/s. They span the default
+            `position_max` and `velocity_max`, whatever those of this system are.
+
+        Raises:
+            ValueError: there are no centres of that name.
+        """
+        name = "regular" if cells is None else cells
+        validation.one_of("cells", name, tuple(THESIS_CENTRES))
+        return tuple(np.array(centres) for centres in THESIS_CENTRES[name])
 
     def draw(
         self, pygame: Any, canvas: Any, state: FloatArray, action: int | None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
 from typing import Any, ClassVar
@@ -195,6 +196,38 @@ class Pendulum(ControlSystem):
         omega = -self.omega_max + 2.0 * self.omega_max * np.arange(10) / 9
         return np.stack(np.meshgrid(theta, omega, indexing="ij"), axis=-1).reshape(
             -1, 2
+        )
+
+    def thesis_centres(self, cells: Any = None) -> tuple[FloatArray, FloatArray]:
+        """The evenly spaced centres of theta, (5.2), and of omega, (5.3).
+
+        For a crisp partition choose an even number for theta and an odd one for omega.
+        Both equilibria are then centres. Otherwise they lie on the border between two
+        bins, and the cell of a resting pendulum would chatter (§5.2.2).
+
+        Args:
+            cells: `(n_theta, n_omega)`, the numbers of centres, each >= 3; None takes
+                (40, 41). Those of theta start at 0 and exclude 2 pi, which is the same
+                angle; those of omega include both ends, -omega_max and omega_max.
+
+        Returns:
+            Centres of theta, rad, and of omega, rad/s.
+
+        Raises:
+            ValueError: `cells` are not two numbers, or one is too small.
+            TypeError: a number is not an integer.
+        """
+        pair = (40, 41) if cells is None else cells
+        if not isinstance(pair, Sequence | np.ndarray) or len(pair) != 2:
+            raise ValueError(
+                "cells of the pendulum must be two integers (n_theta, n_omega), such "
+                f"as (40, 41), got {cells!r}."
+            )
+        n_theta = validation.integer("n_theta", pair[0], at_least=3)
+        n_omega = validation.integer("n_omega", pair[1], at_least=3)
+        return (
+            np.linspace(0.0, TWO_PI, n_theta, endpoint=False),
+            np.linspace(-self.omega_max, self.omega_max, n_omega),
         )
 
     def draw(

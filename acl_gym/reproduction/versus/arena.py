@@ -17,8 +17,9 @@ from acl_gym.envs.control.environments import ControlVectorEnv
 from acl_gym.envs.wrappers.perturbations import perturbed
 from acl_gym.evaluation import control_env
 from acl_gym.experiments.courses import COURSES, Course
-from acl_gym.partitions import Crisp, Discrete, Fuzzy, Partition, named
-from acl_gym.reproduction.settings import GRID_1D, GRID_2D, PENDULUM
+from acl_gym.partitions import Crisp, Discrete, Fuzzy, Partition
+from acl_gym.partitions.automatic import thesis_partition
+from acl_gym.reproduction.settings import GRID_1D, GRID_2D
 from acl_gym.reproduction.versus.wholes import WHOLES
 
 KINDS = {"crisp": Crisp, "fuzzy": Fuzzy}
@@ -81,13 +82,7 @@ class Arena:
         """
         if self.finite:
             return Discrete(self.base(1).system.n_states)  # type: ignore[attr-defined]
-        if self.env_id == PENDULUM:
-            return named.pendulum(*self.cells, kind=KINDS[kind])
-        grid = named.navigation("regular", kind=KINDS[kind])
-        hidden = self.veil.get("hidden", ())
-        return KINDS[kind](
-            [line for i, line in enumerate(grid.centres) if i not in hidden]
-        )
+        return thesis_partition(self.make_env(1), self.cells, kind=KINDS[kind])
 
     def states(self) -> NDArray[np.float64]:
         """The initial states of an evaluation, `(n, d)`."""

@@ -16,7 +16,7 @@ from acl_gym.agents.acl import ACL, PheromoneBoundWarning
 from acl_gym.agents.base import TabularAgent
 from acl_gym.agents.q_learning import QLearning
 from acl_gym.callbacks import Agent, Callback
-from acl_gym.envs.wrappers.perturbations import Backwards, BackwardsLuck
+from acl_gym.envs.wrappers.perturbations import ReversedLuck, ReversedSlots
 from acl_gym.evaluation import evaluate_policy_cost
 from acl_gym.reproduction.settings import Learner, Named, Result
 from acl_gym.reproduction.versus.arena import Arena
@@ -167,7 +167,7 @@ def make_agent(contest: Contest, seed: int) -> TabularAgent:
     slots, kind = settings.pop("slots"), settings.pop("kind")
     env: VectorEnv[Any, Any, Any] = arena.make_env(slots)
     if contest.backwards:
-        env = Backwards(env)
+        env = ReversedSlots(env)
     if settings.pop("reward", "stage") == "steps":
         env = TransformReward(env, lambda reward: np.full_like(reward, -1.0))
     grid = arena.partition(kind)
@@ -181,7 +181,7 @@ def make_agent(contest: Contest, seed: int) -> TabularAgent:
     else:
         agent = QLearning(env, grid, seed=seed, **settings)
     if contest.backwards:
-        agent.rng = BackwardsLuck(agent.rng)  # type: ignore[assignment]
+        agent.rng = ReversedLuck(agent.rng)  # type: ignore[assignment]
     return agent
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import gymnasium as gym
 import numpy as np
 from gymnasium.error import ResetNeeded
 from gymnasium.vector import AutoresetMode
@@ -11,6 +12,7 @@ from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from acl_gym.envs.control.system import ControlSystem
+from acl_gym.utils import validation
 from acl_gym.utils.typing import BoolArray, FloatArray, IntArray
 
 
@@ -169,3 +171,45 @@ def checked_render_mode(mode: str | None, metadata: dict[str, Any]) -> str | Non
             f"got {mode!r}."
         )
     return mode
+
+
+def warn_of_no_render_mode(metadata: dict[str, Any]) -> None:
+    """Warn that `render` was called on an environment that draws nothing."""
+    modes = " or ".join(f'"{mode}"' for mode in metadata["render_modes"])
+    gym.logger.warn(
+        "render() draws nothing without a render_mode; make the environment with "
+        f"render_mode={modes}."
+    )
+
+
+def states_of_slots(
+    given: Any, slots: IntArray, num_envs: int, current: FloatArray | None
+) -> FloatArray:
+    """Return `options["state"]` of a reset as rows for all slots.
+
+    Args:
+        given: one row for each slot; `(num_envs,)` for states of one variable.
+        slots: those that are reset.
+        num_envs: number of slots.
+        current: the states that the slots are in, `(num_envs, state_size)`; None
+            before the first reset. They take the place of given rows of slots that are
+            not reset, which may hold anything.
+
+    Raises:
+        ValueError: `given` does not have a row for each slot.
+    """
+    rows = validation.real_array("options['state']", given, finite=False)
+    if rows.shape[:1] != (num_envs,):
+        raise ValueError(
+            "options['state'] must hold one row for each slot, shape "
+            f"({num_envs}, ...), got shape {rows.shape}."
+        )
+    if current is None:
+        return rows
+    if rows.ndim == 1 and current.shape[1] == 1:
+        rows = rows[:, None]
+    if rows.shape != current.shape:
+        return rows
+    merged = current.copy()
+    merged[slots] = rows[slots]
+    return merged

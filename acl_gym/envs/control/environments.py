@@ -27,6 +27,8 @@ from acl_gym.envs.control.bookkeeping import (
     draw_uniforms,
     final_infos,
     finish,
+    states_of_slots,
+    warn_of_no_render_mode,
 )
 from acl_gym.envs.control.rendering import Frame, Renderer
 from acl_gym.envs.control.stepping import PartialStep
@@ -54,6 +56,8 @@ class ControlEnv(gym.Env[Observation, np.int64]):
         "render_fps": 10,
     }
     system_type: ClassVar[type[ControlSystem]]
+    painter: ClassVar[str | None] = None
+    """"module:class" of what draws the system, see `Renderer`; None draws nothing."""
 
     def __init__(self, render_mode: str | None = None, **parameters: Any) -> None:
         self.render_mode = checked_render_mode(render_mode, self.metadata)
@@ -61,8 +65,8 @@ class ControlEnv(gym.Env[Observation, np.int64]):
         self.observation_space = self.system.observation_space
         self.action_space = self.system.action_space
         self._n_actions = int(self.system.action_space.n)
-        self._renderer: Renderer | None = None
-        self._table: FloatArray | None = None
+        fps = self.metadata["render_fps"]
+        self._renderer = Renderer(self.system, self.painter, fps)
         self._state: FloatArray | None = None
         self._finished = False
 
@@ -141,20 +145,15 @@ class ControlEnv(gym.Env[Observation, np.int64]):
             DependencyNotInstalled: pygame is missing.
         """
         if self.render_mode is None:
-            gym.logger.warn(
-                "render() draws nothing without a render_mode; make the environment "
-                'with render_mode="rgb_array" or "human".'
-            )
+            warn_of_no_render_mode(self.metadata)
             return None
         if self._state is None:
             raise ResetNeeded("render() needs a state; call reset() first.")
-        if self._renderer is None:
-            self._renderer = Renderer(self.system, self.metadata["render_fps"])
         state = self._state[:, 0]
         if self.render_mode == "human":
-            self._renderer.show(state, self._action, self._table)
+            self._renderer.show(state, self._action)
             return None
-        return self._renderer.frame(state, self._action, self._table)
+        return self._renderer.frame(state, self._action)
 
     def show_table(self, table: FloatArray | None) -> None:
         """Draw a table of (state, action) values over the frames from now on.
@@ -168,14 +167,11 @@ class ControlEnv(gym.Env[Observation, np.int64]):
             ValueError: the system draws no tables, or the table does not fit it.
             TypeError: it is not a NumPy array.
         """
-        if table is not None:
-            self.system.check_table(table)
-        self._table = table
+        self._renderer.show_table(table)
 
     def close(self) -> None:
         """Close the window if there is one."""
-        if self._renderer is not None:
-            self._renderer.close()
+        self._renderer.close()
 
     def _info(self, state: FloatArray) -> dict[str, Any]:
         mask = self.system.action_mask(state)
@@ -209,6 +205,8 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
         "autoreset_mode": AutoresetMode.NEXT_STEP,
     }
     system_type: ClassVar[type[ControlSystem]]
+    painter: ClassVar[str | None] = None
+    """"module:class" of what draws the system, see `Renderer`; None draws nothing."""
 
     def __init__(
         self,
@@ -237,8 +235,8 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
         )
         self.action_space = batch_space(self.single_action_space, self.num_envs)
         self._n_actions = int(self.system.action_space.n)
-        self._renderer: Renderer | None = None
-        self._table: FloatArray | None = None
+        fps = self.metadata["render_fps"]
+        self._renderer = Renderer(self.system, self.painter, fps)
         self._actions: IntArray | None = None  # the last ones, to be drawn
 
         self._state: FloatArray | None = None  # (state_size, num_envs)
@@ -286,7 +284,7 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
         )
         slots = np.arange(self.num_envs) if mask is None else np.flatnonzero(mask)
         given = options.get("state")
-        states = None if given is None else self._given_states(given, slots)
+        states = None if given is None else self._checked_states(given, slots)
         if "finished" in options:
             validation.one_of("options['finished']", options["finished"], ("wait",))
 
@@ -366,13 +364,8 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
             DependencyNotInstalled: pygame is missing.
         """
         if self.render_mode is None:
-            gym.logger.warn(
-                "render() draws nothing without a render_mode; make the environment "
-                'with render_mode="rgb_array".'
-            )
+            warn_of_no_render_mode(self.metadata)
             return None
-        if self._renderer is None:
-            self._renderer = Renderer(self.system, self.metadata["render_fps"])
         started = self._steps == 0
         idle = self._finished & self._wait_when_finished
         return tuple(
@@ -381,16 +374,13 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
                 None
                 if self._actions is None or started[slot] or idle[slot]
                 else int(self._actions[slot]),
-                self._table,
             )
             for slot in range(self.num_envs)
         )
 
     def show_table(self, table: FloatArray | None) -> None:
         """Draw a table over the frames from now on; see `ControlEnv.show_table`."""
-        if table is not None:
-            self.system.check_table(table)
-        self._table = table
+        self._renderer.show_table(table)
 
     def with_slots(self, num_envs: int) -> Self:
         """Make a new environment of the same system and limits with other slots."""
@@ -452,17 +442,7 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
     def _observe(self) -> Observation:
         return self.system.observe(self._states)
 
-    def _given_states(self, given: Any, slots: IntArray) -> FloatArray:
-        rows = validation.real_array("options['state']", given, finite=False)
-        if rows.shape[:1] != (self.num_envs,):
-            raise ValueError(
-                "options['state'] must hold one row for each slot, shape "
-                f"({self.num_envs}, ...), got shape {rows.shape}."
-            )
-        if rows.ndim == 1 and self._state is not None and len(self._state) == 1:
-            rows = rows[:, None]
-        if self._state is not None and rows.shape == (current := self.states).shape:
-            # Rows outside the mask may hold anything, so they are not looked at.
-            current[slots] = rows[slots]
-            rows = current
+    def _checked_states(self, given: Any, slots: IntArray) -> FloatArray:
+        current = None if self._state is None else self._state.T
+        rows = states_of_slots(given, slots, self.num_envs, current)
         return self.system.checked_states(rows)[slots].T.copy()

@@ -99,19 +99,6 @@ class ControlSystem(ABC):
     def evaluation_states(self) -> FloatArray:
         """The fixed initial states of the policy cost (3.47), `(n, state_size)`."""
 
-    @abstractmethod
-    def draw(
-        self, pygame: Any, canvas: Any, state: FloatArray, action: int | None
-    ) -> None:
-        """Draw a state.
-
-        Args:
-            pygame: the module.
-            canvas: a square pygame surface to fill.
-            state: `(state_size,)`.
-            action: what was done to reach it; None at the start of an episode.
-        """
-
     def thesis_centres(self, cells: Any = None) -> tuple[FloatArray, ...] | None:
         """The centres that the thesis gives each state variable, for a partition.
 
@@ -150,31 +137,6 @@ class ControlSystem(ABC):
             A new array `(n, n_actions)`; None if all actions are always offered.
         """
         return None
-
-    def check_table(self, table: Any) -> None:
-        """Refuse a (state, action) table that `draw_table` cannot draw.
-
-        Raises:
-            ValueError: always, unless the system can draw tables of its states.
-        """
-        raise ValueError(
-            "only the grids (GridSearch1D, GridSearch2D) draw tables, one value for "
-            f"each state and action, not {type(self).__name__}, whose states are "
-            "continuous; use frames without a table."
-        )
-
-    def draw_table(self, pygame: Any, canvas: Any, table: FloatArray) -> None:
-        """Draw a (state, action) table over what `draw` has drawn.
-
-        Args:
-            pygame: the module.
-            canvas: the surface that `draw` has filled.
-            table: `(n_states, n_actions)`, for instance levels of pheromone.
-
-        Raises:
-            ValueError: the system or the table does not allow it, see `check_table`.
-        """
-        self.check_table(table)
 
 
 @njit(cache=True)

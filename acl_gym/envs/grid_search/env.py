@@ -52,12 +52,14 @@ class GridSearch1DEnv(ControlEnv):
     """
 
     system_type = GridSearch1D
+    painter = "acl_gym.envs.grid_search.painter:GridSearchPainter"
 
 
 class GridSearch1DVectorEnv(ControlVectorEnv):
     """Many ants in one row, one a slot; see `GridSearch1DEnv`."""
 
     system_type = GridSearch1D
+    painter = "acl_gym.envs.grid_search.painter:GridSearchPainter"
 
 
 class GridSearch2DEnv(ControlEnv):
@@ -114,9 +116,11 @@ class GridSearch2DEnv(ControlEnv):
     """
 
     system_type = GridSearch2D
+    painter = "acl_gym.envs.grid_search.painter:GridSearchPainter"
 
 
 class GridSearch2DVectorEnv(ControlVectorEnv):
     """Many ants in one world, one a slot; see `GridSearch2DEnv`."""
 
     system_type = GridSearch2D
+    painter = "acl_gym.envs.grid_search.painter:GridSearchPainter"

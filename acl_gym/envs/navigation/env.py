@@ -60,9 +60,11 @@ class NavigationEnv(ControlEnv):
     """
 
     system_type = Navigation
+    painter = "acl_gym.envs.navigation.painter:NavigationPainter"
 
 
 class NavigationVectorEnv(ControlVectorEnv):
     """Many vehicles, one a slot, advanced by one kernel; see `NavigationEnv`."""
 
     system_type = Navigation
+    painter = "acl_gym.envs.navigation.painter:NavigationPainter"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, ClassVar
 
@@ -12,6 +12,7 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import ArrayLike
 
+from acl_gym.envs.control import parameters, sampling
 from acl_gym.envs.control.system import ControlSystem
 from acl_gym.envs.navigation import kernels
 from acl_gym.envs.navigation.kernels import Peak, Row
@@ -101,7 +102,6 @@ class Navigation(ControlSystem):
         validation.integer("substeps", self.substeps, at_least=1)
         validation.one_of("cost", self.cost, ("quadratic", "time"))
         validation.one_of("goal_rule", self.goal_rule, ("bounds", "membership"))
-        # Plain tuples and floats: the parameters stay immutable, hashable and JSON.
         canonical: dict[str, Any] = {
             "peaks": _checked_peaks(self.peaks),
             "forces": _checked_forces(self.forces),
@@ -112,11 +112,7 @@ class Navigation(ControlSystem):
             "goal_spacing": _checked_pair("goal_spacing", self.goal_spacing),
             "state_weight": _checked_weight(self.state_weight),
         }
-        for field in fields(self):
-            value = canonical.get(field.name)
-            if value is None:
-                value = float(getattr(self, field.name))
-            object.__setattr__(self, field.name, value)
+        parameters.set_canonical(self, canonical)
         with np.errstate(over="ignore", invalid="ignore"):  # the checks look for it
             self._check_step()
             self._check_cost()
@@ -217,11 +213,9 @@ class Navigation(ControlSystem):
     def sample_states(self, rng: np.random.Generator, count: int) -> FloatArray:
         """Draw states uniformly over X without the goal, shape `(4, count)`."""
         limits = self._limits
-        states = limits * (2.0 * rng.random((4, count)) - 1.0)
-        # Each column is drawn again until it lies outside the goal region.
-        while (inside := np.flatnonzero(self._in_goal(states))).size:
-            states[:, inside] = limits * (2.0 * rng.random((4, inside.size)) - 1.0)
-        return states
+        return sampling.sample_outside(
+            lambda n: limits * (2.0 * rng.random((4, n)) - 1.0), self._in_goal, count
+        )
 
     def checked_states(self, states: Any) -> FloatArray:
         """Return states `(n, 4)`, rows [c1, v1, c2, v2].
@@ -229,24 +223,15 @@ class Navigation(ControlSystem):
         Raises:
             ValueError: wrong shape, not finite, or outside X.
         """
-        array = validation.real_array("states", states, finite=False)
-        if array.ndim != 2 or array.shape[1] != 4:
-            raise ValueError(
-                "states must be rows [c1, v1, c2, v2], shape (n, 4), got "
-                f"{array.shape}."
-            )
-        if not np.isfinite(array).all():
-            row = int(np.flatnonzero(~np.isfinite(array).all(axis=1))[0])
-            raise ValueError(
-                f"states must be finite, got {array[row].tolist()} in row {row}."
-            )
+        variables = ("c1", "v1", "c2", "v2")
+        array = parameters.real_states(states, variables)
         beyond = np.argwhere(np.abs(array) > self._limits[:, 0])
         if beyond.size:
             row, column = beyond[0]
             limit = self._limits[column, 0]
             setting = ("position_max", "velocity_max")[column % 2]
             raise ValueError(
-                f"states must have {('c1', 'v1', 'c2', 'v2')[column]} in "
+                f"states must have {variables[column]} in "
                 f"[-{limit:g}, {limit:g}], got {array[row, column]:g} in row {row}; "
                 f"set {setting} to allow more."
             )
@@ -272,7 +257,7 @@ class Navigation(ControlSystem):
         A decision: the thesis says "100 predefined initial states, uniformly
         distributed over the state space" and does not list them.
         """
-        return (2.0 * halton_points(100) - 1.0) * self._limits[:, 0]
+        return (2.0 * sampling.halton_points(100) - 1.0) * self._limits[:, 0]
 
     def thesis_centres(self, cells: Any = None) -> tuple[FloatArray, ...]:
         """The centres of c1, v1, c2 and v2 by name.
@@ -294,15 +279,6 @@ class Navigation(ControlSystem):
         name = "regular" if cells is None else cells
         validation.one_of("cells", name, tuple(THESIS_CENTRES))
         return tuple(np.array(centres) for centres in THESIS_CENTRES[name])
-
-    def draw(
-        self, pygame: Any, canvas: Any, state: FloatArray, action: int | None
-    ) -> None:
-        """The vehicle with its velocity and force, over the damping and the goal."""
-        # Only here: environments that draw nothing need not load it.
-        from acl_gym.envs.navigation.painter import draw_vehicle
-
-        draw_vehicle(self, pygame, canvas, state, action)
 
     def _check_step(self) -> None:
         """Refuse parameters for which Runge-Kutta would diverge (limit: 2.78)."""
@@ -340,7 +316,7 @@ class Navigation(ControlSystem):
 
     def _check_goal(self) -> None:
         name = "goal_bounds" if self.goal_rule == "bounds" else "goal_spacing"
-        points = (2.0 * halton_points(1000).T - 1.0) * self._limits
+        points = (2.0 * sampling.halton_points(1000).T - 1.0) * self._limits
         share = float(self._in_goal(points).mean())
         if share > 0.99:
             raise ValueError(
@@ -354,22 +330,6 @@ class Navigation(ControlSystem):
             return np.asarray((np.abs(states) <= size).all(axis=0), dtype=np.bool_)
         degree = np.maximum(1.0 - np.abs(states) / size, 0.0).prod(axis=0)
         return np.asarray(degree > 0.5, dtype=np.bool_)
-
-
-def halton_points(count: int) -> FloatArray:
-    """The points 1 to `count` of Halton's sequence in four dimensions, `(count, 4)`.
-
-    Coordinate j of point i is the digits of i in the j-th prime base, mirrored at the
-    point. They fill [0, 1)^4 evenly, without randomness.
-    """
-    points = np.zeros((count, 4))
-    for column, base in enumerate((2, 3, 5, 7)):
-        rest, share = np.arange(1, count + 1), 1.0
-        while rest.any():
-            share /= base
-            points[:, column] += share * (rest % base)
-            rest = rest // base
-    return points
 
 
 def _checked_peaks(values: Any) -> tuple[Peak, ...]:
@@ -410,14 +370,7 @@ def _checked_weight(values: Any) -> tuple[Any, ...]:
     weight = validation.real_array("state_weight", values)
     if weight.shape == (4,):
         weight = np.diag(weight)
-    # Rounding may leave the smallest eigenvalue of v v' a hair below zero.
-    slack = 1e-12 * float(np.abs(weight).max())
-    valid = (
-        weight.shape == (4, 4)
-        and np.array_equal(weight, weight.T)
-        and np.linalg.eigvalsh(weight)[0] >= -slack
-    )
-    if not valid:
+    if not parameters.is_weight(weight, 4):
         raise ValueError(
             "state_weight must be a symmetric positive semi-definite (4, 4) matrix or "
             f"the 4 numbers >= 0 of its diagonal, got {values!r}."

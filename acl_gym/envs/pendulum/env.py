@@ -56,9 +56,11 @@ class PendulumEnv(ControlEnv):
     """
 
     system_type = Pendulum
+    painter = "acl_gym.envs.pendulum.painter:PendulumPainter"
 
 
 class PendulumVectorEnv(ControlVectorEnv):
     """Many pendulums, one a slot, advanced by one kernel; see `PendulumEnv`."""
 
     system_type = Pendulum
+    painter = "acl_gym.envs.pendulum.painter:PendulumPainter"

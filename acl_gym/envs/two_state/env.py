@@ -47,9 +47,11 @@ class TwoStateEnv(ControlEnv):
     """
 
     system_type = TwoState
+    painter = "acl_gym.envs.two_state.painter:TwoStatePainter"
 
 
 class TwoStateVectorEnv(ControlVectorEnv):
     """Many ants, one a slot; see `TwoStateEnv`."""
 
     system_type = TwoState
+    painter = "acl_gym.envs.two_state.painter:TwoStatePainter"

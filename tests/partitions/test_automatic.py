@@ -13,7 +13,8 @@ from gymnasium.wrappers import FlattenObservation, TransformObservation
 from gymnasium.wrappers.vector import FlattenObservation as FlattenVectorObservation
 
 from acl_gym import Crisp, Discrete, Fuzzy, ScaledObservation, automatic_partition
-from acl_gym.partitions.automatic import CENTRES, estimate_bounds, thesis_partition
+from acl_gym.partitions.automatic import CENTRES, thesis_partition
+from acl_gym.partitions.bounds import estimate_bounds
 
 PENDULUM = "acl_gym/Pendulum-v0"
 INF = float("inf")

@@ -1,4 +1,4 @@
-"""Small parts of `environments`: checks of what callers pass, and short kernels."""
+"""Checks of arguments and short kernels of the control environments."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from acl_gym.utils.typing import BoolArray, FloatArray, IntArray
 def checked_options(
     options: dict[str, Any] | None, allowed: tuple[str, ...]
 ) -> dict[str, Any]:
-    """Refuse reset options that would otherwise be ignored in silence."""
+    """Refuse reset options that would otherwise be ignored silently."""
     unknown = sorted(set(options or ()) - set(allowed), key=str)
     if unknown:
         raise ValueError(
@@ -46,7 +46,7 @@ def count_step(
 def finish(
     terminated: BoolArray, truncated: BoolArray, finished: BoolArray, walking: IntArray
 ) -> int:
-    """Note who has finished now; write who walks on into `walking`, return how many."""
+    """Record the finished slots; write the others into `walking`, return how many."""
     n_walking = 0
     for slot in range(finished.size):
         finished[slot] |= terminated[slot] | truncated[slot]
@@ -68,7 +68,7 @@ def copy_if_below(actions: IntArray, n_actions: int, copied: IntArray) -> bool:
 def draw_uniforms(
     system: ControlSystem, rng: np.random.Generator, count: int
 ) -> FloatArray | None:
-    """The random numbers of one step of `count` slots, None if the system has none."""
+    """Draw the random numbers of one step of `count` slots; None if it needs none."""
     if system.draws_per_step == 0:
         return None
     return rng.random((system.draws_per_step, count))
@@ -131,13 +131,13 @@ def checked_reset_mask(mask: Any, num_envs: int, *, begun: bool) -> BoolArray | 
 def final_infos(
     observations: NDArray[Any], finished: BoolArray, infos: dict[str, Any]
 ) -> dict[str, Any]:
-    """What the infos of a step say of slots that it ends and resets at once.
+    """Return the final observations and infos of slots that a step ends and resets.
 
     Args:
-        observations: the last ones, `(num_envs, ...)`.
-        finished: `(num_envs,)`.
-        infos: those of the last states, keys with arrays `(num_envs, ...)`; changed
-            where slots have not finished.
+        observations: of the last states, `(num_envs, ...)`.
+        finished: whether each slot has finished, `(num_envs,)`.
+        infos: of the last states, arrays `(num_envs, ...)`; set to 0 in place where
+            slots have not finished.
     """
     final_obs = np.full(finished.size, None, dtype=object)
     for slot in np.flatnonzero(finished):

@@ -94,12 +94,12 @@ class GridSearch(ControlSystem):
 
     @cached_property
     def _offered(self) -> BoolArray:
-        """Whether each action leads away, `(n_states, n_actions)`."""
+        """Whether each action leads to another state, `(n_states, n_actions)`."""
         return np.asarray(self._next_state != np.arange(self.n_states)[:, None])
 
     @property
     def n_states(self) -> int:
-        """How many cells are no obstacles, goals included."""
+        """The number of cells that are not obstacles, goals included."""
         return int(self._goal.size)
 
     @property
@@ -122,8 +122,8 @@ class GridSearch(ControlSystem):
     def evaluation_steps(self) -> int:  # type: ignore[override]
         """T = 5 n_states / p, rounded up.
 
-        A decision: the thesis states no T. That long a walk of random moves from a
-        random state finds the goal with a probability of 0.50 on 11x11, 0.29 on 21x21,
+        A decision: the thesis gives no T. A random walk of this length from a random
+        state finds the goal with a probability of 0.50 on 11x11, 0.29 on 21x21,
         0.45 on 31x31 and 0.57 on the row of 10 states, where T is 50; the expected
         steps of any walk grow by 1 / p.
         """
@@ -145,7 +145,7 @@ class GridSearch(ControlSystem):
         return 1.0
 
     def sample_states(self, rng: np.random.Generator, count: int) -> FloatArray:
-        """Draw states uniformly over those that are no goals, shape `(1, count)`."""
+        """Draw states uniformly over those that are not goals, shape `(1, count)`."""
         starts = np.flatnonzero(~self._goal)
         drawn = starts[rng.integers(starts.size, size=(1, count))]
         return drawn.astype(np.float64)
@@ -154,7 +154,7 @@ class GridSearch(ControlSystem):
         """Return states given as `(n,)` or `(n, 1)` in the shape `(n, 1)`.
 
         Raises:
-            ValueError: wrong shape, or a state is no integer of 0..n_states - 1.
+            ValueError: wrong shape, or a state is not an integer of 0..n_states - 1.
         """
         hint = "`cells` lists the cell of each state"
         return parameters.numbered_states(states, self.n_states, hint)
@@ -173,7 +173,7 @@ class GridSearch(ControlSystem):
     ) -> None:
         """One move of each ant; see `ControlSystem.advance`.
 
-        A state that is a goal already is left like any other.
+        A goal is left like any other state.
         """
         if uniforms is None:
             kernels.move(
@@ -217,7 +217,7 @@ class GridSearch(ControlSystem):
         return np.asarray(self._offered[states[0].astype(np.int64)], dtype=np.bool_)
 
     def evaluation_states(self) -> FloatArray:
-        """Every state that is no goal, `(n, 1)`."""
+        """Return every state that is not a goal, `(n, 1)`."""
         return np.flatnonzero(~self._goal).astype(np.float64)[:, None]
 
 
@@ -255,9 +255,9 @@ class GridSearch2D(GridSearch):
 
     Attributes:
         map_name: "11x11", "21x21" or "31x31", with 86, 278 and 640 free cells and the
-            goal in the centre. A decision: the maps of the thesis are lost; `maps`
-            made these. The mean shortest way is 9.99, 19.85 and 19.97 steps.
-        desc: a map of one's own, as text or as a sequence of rows, instead of
+            goal in the centre. A decision: the maps of the thesis are not available;
+            `maps` made these. The mean shortest path has 9.99, 19.85 and 19.97 steps.
+        desc: a map of your own, as text or as a sequence of rows, instead of
             `map_name`: `#` obstacle, `.` free, `G` goal, one or more.
         transition_probability: p, in (0, 1]: a move fails with probability 1 - p.
         mask_blocked: whether infos carry `"action_mask"`, U_q of (3.4), which leaves

@@ -52,8 +52,8 @@ class Navigation(ControlSystem):
         substeps: Runge-Kutta steps in one sampling time, >= 1. Measured
             against DOP853 over the whole state space, one step of the default 0.2 s
             is off by at most 3e-2 m and 0.2 m/s with 1 substep, 8e-4 and 6e-3 with 2,
-            4e-5 and 3e-4 with 4; the most where the damping is strongest. 2 is as
-            exact as the pendulum with 1 (a decision).
+            4e-5 and 3e-4 with 4; most where the damping is strongest. 2 is as exact
+            as the pendulum with 1 (a decision).
         position_max: m, > 0. Both positions are clipped to it after each step.
         velocity_max: m / s, > 0. Both velocities are clipped to it after each step.
             A wall stops the position only: the velocity towards it is kept until a
@@ -125,7 +125,7 @@ class Navigation(ControlSystem):
 
     @cached_property
     def _kernel_peaks(self) -> tuple[float, ...]:
-        """The peaks for the kernel in a row: one of height 0 stands for none."""
+        """The peaks as one flat tuple; a peak of height 0 stands for none."""
         peaks = self.peaks or ((0.0, 0.0, 0.0, 1.0, 1.0),)
         scaled = (
             (height / self.mass, mean_1, mean_2, 1.0 / sigma_1, 1.0 / sigma_2)
@@ -135,7 +135,7 @@ class Navigation(ControlSystem):
 
     @cached_property
     def _dynamics(self) -> tuple[Any, ...]:
-        """The parameters of `integrate`."""
+        """Arguments of `kernels.integrate`."""
         return (
             self._acceleration,
             self.base_damping / self.mass,
@@ -146,7 +146,7 @@ class Navigation(ControlSystem):
 
     @cached_property
     def _goal_and_cost(self) -> tuple[Any, ...]:
-        """The parameters of `settle`."""
+        """Arguments of `kernels.settle`."""
         return (
             float(self.position_max),
             float(self.velocity_max),
@@ -158,14 +158,14 @@ class Navigation(ControlSystem):
 
     @cached_property
     def _stage_weight(self) -> tuple[Any, ...]:
-        """Q of the stage cost: that of time spent does not depend on the state."""
+        """Q of the stage cost: zero for cost="time", which does not depend on the state."""
         if self.cost == "time":
             return ((0.0,) * 4,) * 4
         return self.state_weight
 
     @cached_property
     def _action_cost(self) -> FloatArray:
-        """What each action adds to the stage cost: u' R u, or 1 for time spent."""
+        """What each action adds to the stage cost: u' R u, or 1 for cost="time"."""
         if self.cost == "time":
             return np.ones(len(self.forces))
         squares = np.square(np.array(self.forces)).sum(axis=1)
@@ -178,7 +178,7 @@ class Navigation(ControlSystem):
 
     @property
     def _goal(self) -> tuple[float, float]:
-        """The sizes of the goal that its rule goes by."""
+        """The sizes of the goal region that `goal_rule` uses."""
         return self.goal_bounds if self.goal_rule == "bounds" else self.goal_spacing
 
     @property
@@ -194,12 +194,12 @@ class Navigation(ControlSystem):
 
     @property
     def max_stage_cost(self) -> float:
-        """The stage cost at the dearest corner of X and the dearest force."""
+        """The largest stage cost over the corners of X and the forces."""
         corners = np.array(list(itertools.product((-1.0, 1.0), repeat=4)))
         corners *= self._limits[:, 0]
         weight = np.array(self._stage_weight)
-        dearest = np.einsum("ni,ij,nj->n", corners, weight, corners).max()
-        return float(dearest + self._action_cost.max())
+        largest = np.einsum("ni,ij,nj->n", corners, weight, corners).max()
+        return float(largest + self._action_cost.max())
 
     def damping(self, c1: ArrayLike, c2: ArrayLike) -> FloatArray:
         """The damping b(c1, c2), kg / s, of §4.5.1, for positions that broadcast."""
@@ -252,7 +252,7 @@ class Navigation(ControlSystem):
         move(states, actions, self._dynamics, self._goal_and_cost, rewards, reached)
 
     def evaluation_states(self) -> FloatArray:
-        """The Halton points 1 to 100 in bases 2, 3, 5 and 7, stretched to X.
+        """Return the Halton points 1 to 100 in bases 2, 3, 5 and 7, scaled to X.
 
         A decision: the thesis says "100 predefined initial states, uniformly
         distributed over the state space" and does not list them.
@@ -284,7 +284,7 @@ class Navigation(ControlSystem):
         """Refuse parameters for which Runge-Kutta would diverge (limit: 2.78)."""
         step = self.sampling_time / self.substeps
         push = np.abs(self._acceleration).max()
-        # How far a vehicle can come within one step, before it is clipped.
+        # How far a vehicle can get within one step, before it is clipped.
         reach = self.position_max + step * (self.velocity_max + step * push)
         if not (np.isfinite(push) and reach < 1e100):
             raise ValueError(

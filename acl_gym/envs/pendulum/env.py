@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from acl_gym.envs.control.environments import ControlEnv, ControlVectorEnv
+from acl_gym.envs.control.environments import ControlVectorEnv
+from acl_gym.envs.control.single import ControlEnv
 from acl_gym.envs.pendulum.system import Pendulum
 
 

@@ -23,7 +23,7 @@ from acl_gym.utils.typing import BoolArray, FloatArray, IntArray
 class Pendulum(ControlSystem):
     """Parameters (Table 5.1) and dynamics (5.1) of the pendulum.
 
-    The state is x = [theta omega]: theta = 0 hangs, theta = pi stands.
+    The state is x = [theta omega]: theta = 0 hangs down, theta = pi stands upright.
 
     Attributes:
         inertia: J, kg m^2, > 0.
@@ -86,7 +86,7 @@ class Pendulum(ControlSystem):
 
     @cached_property
     def _dynamics(self) -> tuple[Any, ...]:
-        """For `integrate`: accelerations K_m u / J in rad / s^2 of each torque, ..."""
+        """Arguments of `kernels.integrate`; first K_m u / J of each torque, rad / s^2."""
         return (
             self.motor_gain / self.inertia * np.array(self.torques),
             self.mass * self.gravity * self.length / self.inertia,
@@ -97,7 +97,7 @@ class Pendulum(ControlSystem):
 
     @cached_property
     def _goal_and_cost(self) -> tuple[Any, ...]:
-        """For `settle`: bounds, Q, R u^2 of each action, the goal."""
+        """Arguments of `kernels.settle`: bounds, Q, R u^2 of each action, the goal."""
         (cost_theta, cost_cross), (_, cost_omega) = self.state_weight
         return (
             float(self.omega_max),
@@ -124,13 +124,13 @@ class Pendulum(ControlSystem):
 
     @property
     def max_stage_cost(self) -> float:
-        """The stage cost (5.4) at its dearest corner of X and dearest torque."""
+        """The largest stage cost (5.4) over the corners of X and the torques."""
         weight = np.array(self.state_weight)
         corners = [
             np.array([math.pi, speed]) for speed in (-self.omega_max, self.omega_max)
         ]
-        dearest = max(float(e @ weight @ e) for e in corners)
-        return dearest + self.torque_weight * max(u * u for u in self.torques)
+        largest = max(float(e @ weight @ e) for e in corners)
+        return largest + self.torque_weight * max(u * u for u in self.torques)
 
     def sample_states(self, rng: np.random.Generator, count: int) -> FloatArray:
         """Draw states uniformly over X without the goal, shape `(2, count)`."""
@@ -172,7 +172,7 @@ class Pendulum(ControlSystem):
         move(states, actions, self._dynamics, self._goal_and_cost, rewards, reached)
 
     def evaluation_states(self) -> FloatArray:
-        """100 states: theta_i = 2 pi i / 10 + 0.01, omega_j over 10 values to the ends.
+        """Return 100 states: theta_i = 2 pi i / 10 + 0.01, 10 even values of omega.
 
         A decision: the thesis names no initial states for (3.47). The 0.01 keeps
         the set off the unstable symmetry axis.

@@ -22,9 +22,9 @@ class TwoState(ControlSystem):
     """From q one action leads to q', from there N actions to the goal.
 
     Attributes:
-        costs: of the N actions in q', two or more, > 0 and rising, so that action 0 is
-            u* and action 1 the second-best. A decision: the text ranks the costs and
-            names none.
+        costs: of the N actions in q', two or more, > 0 and increasing, so that action 0
+            is u* and action 1 the second-best. A decision: the thesis ranks the costs
+            without giving values.
     """
 
     evaluation_steps: ClassVar[int] = 2
@@ -35,7 +35,7 @@ class TwoState(ControlSystem):
         costs = validation.real_array("costs", self.costs, ndim=1)
         if costs.size < 2 or not (costs > 0).all() or not (np.diff(costs) > 0).all():
             raise ValueError(
-                "costs must be two or more, positive and rising from the best action "
+                "costs must be two or more, positive and increasing from the best action "
                 f"to the worst, got {self.costs!r}."
             )
         object.__setattr__(self, "costs", tuple(costs.tolist()))
@@ -60,7 +60,7 @@ class TwoState(ControlSystem):
         return self.costs[-1]
 
     def sample_states(self, rng: np.random.Generator, count: int) -> FloatArray:
-        """All ants begin in q, shape `(1, count)`; nothing is drawn."""
+        """Return q for all ants, shape `(1, count)`; nothing is drawn at random."""
         return np.full((1, count), float(FIRST))
 
     def checked_states(self, states: Any) -> FloatArray:

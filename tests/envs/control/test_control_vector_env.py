@@ -285,7 +285,7 @@ def test_slots_step_alike_however_many_are_idle(
     options = {"finished": "wait"}
     seen = []
     for most in (0.0, 1.0):  # idle slots are put back, and left out
-        monkeypatch.setattr(stepping, "MOST", most)
+        monkeypatch.setattr(stepping, "RESTORE_ABOVE", most)
         env = case.vector(9, autoreset_mode=mode, max_episode_steps=30, **case.easy)
         first = env.reset(seed=3, options=options)
         seen.append([first, *walk(env, 60, 4)])

@@ -176,7 +176,7 @@ def test_a_variable_that_cannot_change_has_one_centre() -> None:
 
 
 @WAYS
-def test_variables_without_bounds_are_named_with_both_remedies(way: str) -> None:
+def test_variables_without_bounds_are_reported_with_both_remedies(way: str) -> None:
     env = made("CartPole-v1", way)
     with pytest.raises(ValueError, match=r"variables 1, 3;") as error:
         automatic_partition(env)
@@ -289,7 +289,7 @@ def test_bounded_environments_are_not_stepped() -> None:
         env.step(0)
 
 
-def test_observations_that_are_not_finite_are_named(monkeypatch: Any) -> None:
+def test_observations_that_are_not_finite_are_reported(monkeypatch: Any) -> None:
     bad = lambda self: np.array([0.0, np.nan, 0.0, 0.0])  # noqa: E731
     monkeypatch.setattr(Clock, "_observe", bad)
     with pytest.raises(ValueError, match=r"must be finite, got \[0.0, nan"):

@@ -353,7 +353,7 @@ def test_counting_kernels_run_the_same_without_the_compiler() -> None:
         (np.array([0, 200, 0], np.uint8), 1, "200"),
     ],
 )
-def test_the_first_action_out_of_range_is_named(
+def test_the_first_action_out_of_range_is_reported(
     actions: Any, slot: int, shown: str
 ) -> None:
     with pytest.raises(ValueError, match=rf"0\.\.2, got {shown} in slot {slot}\."):

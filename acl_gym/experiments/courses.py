@@ -15,7 +15,6 @@ import numpy as np
 
 from acl_gym.partitions import Crisp, Discrete, Fuzzy, Partition
 from acl_gym.partitions.automatic import thesis_partition
-from acl_gym.partitions.grid import Grid
 from acl_gym.utils import validation
 
 Settings = Mapping[str, Any]
@@ -58,7 +57,7 @@ class Budget:
     dqn_steps: int
     dqn_every: int
     long_run: bool = False
-    reference: Callable[[], Grid] | None = None
+    reference: Callable[[], Any] | None = None
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -18,7 +18,7 @@ from tqdm.auto import tqdm
 
 from acl_gym import ACL, QLearning, evaluate_policy_cost
 from acl_gym.colony.costs import Cost, Overshoot, RiseTime, SettlingTime, Steps
-from acl_gym.partitions import named
+from acl_gym.partitions.automatic import thesis_partition
 
 TURN = 2 * math.pi
 ANGLE = {"variable": 0, "target": math.pi, "period": TURN}
@@ -41,7 +41,7 @@ LEARNERS = {
 
 def train(name: str, seed: int, trials: int) -> object:
     env = gym.make_vec("acl_gym/Pendulum-v0", num_envs=250)
-    grid = named.pendulum(40, 41)
+    grid = thesis_partition(env, (40, 41))
     if name.startswith("ACL"):
         return ACL(env, grid, seed=seed, **LEARNERS[name]).learn(trials=trials)
     if name == "Q(lambda), number of steps":

@@ -12,7 +12,8 @@ import numpy as np
 from numpy_colony import NumpyColony
 
 from acl_gym.agents.acl import ACL
-from acl_gym.partitions import Crisp, Discrete, Fuzzy, Partition, named
+from acl_gym.partitions import Crisp, Fuzzy, Partition
+from acl_gym.partitions.automatic import thesis_partition
 
 Work = Callable[[], int]
 """Makes some steps and returns their number, all slots counted."""
@@ -57,11 +58,7 @@ def make_env(system: str, n_ants: int) -> gym.vector.VectorEnv[Any, Any, Any]:
 def partition_of(system: str, kind: str, env: Any) -> Partition:
     """The thesis's cells: 40 x 41 of §5.3, 729 of §4.5.2, a cell a state."""
     cell_kind = Crisp if kind == "crisp" else Fuzzy
-    if system == "pendulum":
-        return named.pendulum(kind=cell_kind)
-    if system == "navigation":
-        return named.navigation("regular", kind=cell_kind)
-    return Discrete.from_space(env.single_observation_space)
+    return thesis_partition(env, kind=cell_kind)
 
 
 def kinds_of(system: str) -> tuple[str, ...]:

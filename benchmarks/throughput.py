@@ -181,9 +181,9 @@ def startup_seconds(repetitions: int) -> dict[str, float]:
     """Seconds of `import acl_gym`, and of a first trial without and with a cache."""
     trial = (
         "import gymnasium as gym, time; from acl_gym import ACL; "
-        "from acl_gym.partitions import named; start = time.perf_counter(); "
+        "from acl_gym.partitions.automatic import thesis_partition; start = time.perf_counter(); "
         "env = gym.make_vec('acl_gym/Pendulum-v0', num_envs=2); "
-        "ACL(env, named.pendulum(), seed=0, max_steps=2).learn(trials=1); "
+        "ACL(env, thesis_partition(env), seed=0, max_steps=2).learn(trials=1); "
         "print(time.perf_counter() - start)"
     )
     imported = (

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from acl_gym import ACL
-from acl_gym.partitions import named
+from acl_gym.partitions.automatic import thesis_partition
 
 FOLDER = Path(__file__).resolve().parents[1] / "benchmarks"
 
@@ -94,7 +94,7 @@ def test_the_numpy_colony_is_the_colony(monkeypatch: pytest.MonkeyPatch) -> None
     from numpy_colony import NumpyColony
 
     env = gym.make_vec("acl_gym/Pendulum-v0", num_envs=30)
-    colony = ACL(env, named.pendulum(), seed=4, max_steps=60).learn(trials=4)
+    colony = ACL(env, thesis_partition(env), seed=4, max_steps=60).learn(trials=4)
     plain = NumpyColony(30, max_steps=60, seed=4)
     for _ in range(4):
         plain.trial()

@@ -79,17 +79,8 @@ class Task:
             kind: "crisp" or "fuzzy"; not used where a state is a cell.
             cells: see `partitions.automatic.thesis_partition`.
         """
-        env = self.make_system_env(1)
-        partition = thesis_partition(env, cells, kind=KINDS.get(kind, Fuzzy))
-        hidden = self.perturbations.get("hidden", ())
-        if not hidden:
-            return partition
-        shown = [
-            line
-            for axis, line in enumerate(partition.centres)  # type: ignore[attr-defined]
-            if axis not in hidden
-        ]
-        return KINDS[kind](shown)
+        kinds = KINDS.get(kind, Fuzzy)
+        return thesis_partition(self.make_env(1), cells, kind=kinds)
 
     def evaluation_states(self) -> FloatArray:
         """The initial states of an evaluation, `(n, state_size)`."""

@@ -1,11 +1,11 @@
 """Partitions: a batch of states becomes `(index, degree)`, all that an agent sees.
 
-Every state belongs to k cells, to each by a degree >= 0, and the degrees of a state
+Every state belongs to k cells, to each with a degree >= 0, and the degrees of a state
 sum to 1. Plain discrete states (§3.2) and a crisp partition (§4.2) have k = 1, a fuzzy
 one (§4.3) k = 2^d. Equations written over `(index, degree)` therefore hold for all.
 
-`base` says what a partition is, `discrete` and `grid` hold the kinds of them, `named`
-those of the thesis, and `automatic` chooses one for an environment.
+`base` defines what a partition is, `discrete` and `grid` hold the kinds of them, and
+`automatic` builds one for an environment: that of the thesis, or one of its own choice.
 """
 
 from acl_gym.partitions.base import Partition, check_cells

@@ -25,8 +25,8 @@ class Partition(ABC):
     """Axes of the array that is one state; 0 where a state is a plain number."""
 
     checked: ClassVar[bool] = False
-    """Whether `locate` itself sees to it that cells are in range, so that an agent
-    need not look at them again in every step."""
+    """Whether `locate` itself ensures that cells are in range, so that agents need not
+    check them in every step."""
 
     @abstractmethod
     def locate(
@@ -59,8 +59,8 @@ class Partition(ABC):
     def check_space(self, space: spaces.Space[Any]) -> None:
         """Refuse an observation space whose states this partition cannot take.
 
-        Agents ask before they learn. A partition of your own accepts every space
-        unless it overrides this.
+        Agents call this before they learn. A partition of your own accepts every space
+        unless it overrides this method.
 
         Raises:
             ValueError: the observations of `space` are not states of the partition.
@@ -87,7 +87,7 @@ class Partition(ABC):
 
 
 def check_cells(index: CellArray, partition: Partition) -> None:
-    """Hold a partition to its own number of cells; tables are indexed by them.
+    """Check that cells are below the number of cells; tables are indexed by them.
 
     Raises:
         ValueError: a cell is out of range.

@@ -13,14 +13,14 @@ from acl_gym.partitions.kernels import locate_discrete
 from acl_gym.utils.typing import CellArray, FloatArray, IntArray
 
 _MOST_START = 2**52
-"""Up to here, sizes added, integers are exact as floats, as which they may arrive."""
+"""Starts up to this, plus sizes, are exact as floats, in which states may be given."""
 
 
 class Discrete(Partition):
     """One cell for each value, or combination of values, of integer states (§3.2).
 
     A state is an array of integers, variable i among `starts[i]`, ..., `starts[i] +
-    sizes[i] - 1`; it belongs wholly to its own cell. The last variable is the
+    sizes[i] - 1`; it belongs entirely to its own cell. The last variable varies
     fastest, as in (4.8). See `from_space`.
 
     Args:
@@ -63,7 +63,7 @@ class Discrete(Partition):
 
     @classmethod
     def from_space(cls, space: spaces.Space[Any]) -> Self:
-        """Take each element of a finite space as a cell.
+        """Make each element of a finite space a cell.
 
         Args:
             space: `Discrete`, `MultiDiscrete` or `MultiBinary`, for instance

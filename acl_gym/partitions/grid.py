@@ -92,7 +92,7 @@ class Grid(Partition):
             space: a bounded one-dimensional Box, for instance
                 `env.single_observation_space`.
             cells: number of centres, for all variables or for each.
-            circular: the variables whose high end is their low end, such as angles.
+            circular: the variables that wrap around, such as angles.
                 Their centres are low, low + range / n, ... as in (5.2); all others
                 have centres on both ends as in (5.3).
 
@@ -153,12 +153,12 @@ class Grid(Partition):
     def refine(self, axis: int, centres: ArrayLike) -> Self:
         """Return the partition with more centres along one axis.
 
-        Around a goal that is narrow beside the cells this costs a few cells and can
-        save a policy from hovering (docs/hovering.md).
+        Around a goal that is narrow compared with the cells, this costs few cells and
+        can keep a policy from hovering near the goal (docs/hovering.md).
 
         Args:
             axis: the state variable.
-            centres: what to add, in any order; those that are there are skipped.
+            centres: what to add, in any order; existing ones are skipped.
 
         Raises:
             ValueError: there is no such axis, or a centre is not finite.
@@ -229,9 +229,9 @@ class Grid(Partition):
 
 
 class Crisp(Grid):
-    """Crisp bins: a state belongs wholly to the nearest centre, (4.2).
+    """Crisp bins: a state belongs entirely to the nearest centre, (4.2).
 
-    A state half-way between two centres belongs to the upper one. See `from_box` for
+    A state halfway between two centres belongs to the upper one. See `from_box` for
     evenly spread centres.
 
     Args:
@@ -246,7 +246,7 @@ class Fuzzy(Grid):
     """Triangular membership functions around the centres, (4.7)-(4.9).
 
     The degree of a cell is the product of the memberships of the variables; a state
-    beyond the outermost centres belongs wholly to the outermost. See `from_box` for
+    beyond the outermost centres belongs entirely to the outermost. See `from_box` for
     evenly spread centres.
 
     Args:
@@ -255,6 +255,17 @@ class Fuzzy(Grid):
     """
 
     fuzzy = True
+
+
+def checked_kind(kind: Any) -> type[Grid]:
+    """Return `kind` if it is a kind of grid.
+
+    Raises:
+        TypeError: it is not `Crisp`, `Fuzzy` or a subclass of one of them.
+    """
+    if not (isinstance(kind, type) and issubclass(kind, (Crisp, Fuzzy))):
+        raise TypeError(f"kind must be the class Crisp or Fuzzy, got {kind!r}.")
+    return kind
 
 
 def _as_float64(states: NDArray[Any]) -> FloatArray:

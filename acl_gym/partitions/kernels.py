@@ -12,7 +12,7 @@ from acl_gym.utils import compiling as _compiling  # noqa: F401 - it says what t
 from acl_gym.utils.typing import CellArray, FloatArray, IntArray
 
 BLOCK = 256
-"""States that `locate` takes at a time: their scratch stays in the nearest cache."""
+"""States that `locate` handles at a time, so that scratch stays in the nearest cache."""
 
 Axes = tuple[
     tuple[int, ...],
@@ -21,24 +21,24 @@ Axes = tuple[
     tuple[float, ...],
     tuple[float, ...],
 ]
-"""What `locate` knows of each axis: where its centres begin in `edges` and how many
+"""What `locate` knows about each axis: where its centres begin in `edges` and how many
 there are (a circular axis repeats its first centre at the end, one period on), its
 number of cells, its period (0: none), and 1 / spacing (0: irregular)."""
 
 MOST_WRITTEN_OUT = 16
-"""The longest loop that `written_out` writes out."""
+"""The longest loop that `written_out` unrolls."""
 
 MOST_COUNTED = 32
-"""Irregular centres up to which counting those that are passed, a vectorised loop for
-each, is faster than a search for each state."""
+"""Number of irregular centres up to which a vectorised loop over the centres is faster
+than a search for each state."""
 
 
 def written_out(size: int) -> tuple[int, ...]:
-    """A tuple of `size` zeros, for kernels with a short loop of that many rounds.
+    """Return a tuple of `size` zeros, for kernels with a short loop of that length.
 
-    The length of a tuple belongs to its type: a kernel that is given one is compiled
-    for that number of actions, or of cells a state, with the loop written out, which
-    halves its time. Longer loops than `MOST_WRITTEN_OUT` get an empty tuple and stay
+    The length of a tuple belongs to its type: a kernel that takes one is compiled for
+    that number of actions, or of cells per state, with the loop unrolled, which halves
+    its time. Longer loops than `MOST_WRITTEN_OUT` get an empty tuple and stay
     loops.
     """
     return (0,) * size if size <= MOST_WRITTEN_OUT else ()
@@ -107,7 +107,7 @@ def locate_on_axis(
         fraction[i] = (x[i] - left[i]) / (right[i] - left[i])
     if wrong == 0:
         return
-    # Hardly ever: only states within rounding of a centre are guessed wrong.
+    # Rarely: only states within rounding of a centre are guessed wrong.
     for i in range(x.size):
         interval = low[i]
         while x[i] < edges[interval]:
@@ -129,7 +129,7 @@ def _first_not_finite(states: FloatArray, slots: IntArray) -> int:
 
 @njit(cache=True)
 def scratch_for(dimensions: int) -> tuple[CellArray, FloatArray]:
-    """What `locate_block` works in, for states of so many variables."""
+    """Return the scratch of `locate_block`, for states with this many variables."""
     ends = np.empty((2 * dimensions, BLOCK), np.int32)
     return ends, np.empty((3 + dimensions, BLOCK))
 
@@ -155,7 +155,7 @@ def locate_block(
     size = min(BLOCK, slots.size - start)
     first, count, cells, period, rate = axes
     dimensions = len(cells)
-    # Of each state and axis: what the cells below and above add to the index (4.8).
+    # What the cells below and above each state add to the index (4.8), per axis.
     low, high, fraction = ends[:dimensions], ends[dimensions:], reals[3:]
     x, left, right = reals[0, :size], reals[1], reals[2]
     stride = 1
@@ -206,7 +206,7 @@ def _corners(
     for i in range(size):
         j, state = np.uint64(start + i), np.uint64(i)
         if dimensions <= 2:
-            # So few that the compiler writes all of them out and keeps them at hand.
+            # So few that the compiler unrolls the loops and keeps values in registers.
             for c in range(1 << dimensions):
                 cell, weight = np.int32(0), 1.0
                 for a in range(dimensions):
@@ -247,7 +247,7 @@ def locate(
     """Fill rows of `index` and `degree`; return a slot that is not finite, or -1.
 
     `axes` holds tuples, so that the number of axes is known when the kernel is compiled
-    and the loops over them are written out.
+    and the loops over them are unrolled.
     """
     ends, reals = scratch_for(len(axes[0]))
     for block in range((slots.size + BLOCK - 1) // BLOCK):

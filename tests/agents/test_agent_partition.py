@@ -12,7 +12,7 @@ from gymnasium import spaces
 from gymnasium.vector import SyncVectorEnv
 
 from acl_gym import ACL, Crisp, Discrete, Fuzzy, Partition, QLearning
-from acl_gym.partitions import named
+from acl_gym.partitions.automatic import thesis_partition
 from tests.agents.reference_colony import Chain
 
 PENDULUM = "acl_gym/Pendulum-v0"
@@ -116,7 +116,7 @@ def test_without_a_partition_the_agent_chooses(kind: Any) -> None:
     parameters: Any = {"tau0": 1e-6} if kind is ACL else {}
     parameters |= {"max_steps": 5, "seed": 0}
     chosen = kind(env, **parameters).learn(trials=2)
-    given = kind(env, named.pendulum(), **parameters).learn(trials=2)
+    given = kind(env, thesis_partition(env), **parameters).learn(trials=2)
     assert chosen.partition.settings() == given.partition.settings()
     assert chosen.table.shape == (40 * 41, 3)
     np.testing.assert_array_equal(chosen.table, given.table)

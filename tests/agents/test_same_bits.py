@@ -10,7 +10,8 @@ import pytest
 
 from acl_gym import ACL
 from acl_gym.agents.acl import PheromoneBoundWarning
-from acl_gym.partitions import Crisp, Partition, named
+from acl_gym.partitions import Crisp, Partition
+from acl_gym.partitions.automatic import thesis_partition
 
 # Ant-steps, and pheromone added up with weights that tell pairs apart, of six trials.
 KNOWN = {
@@ -34,12 +35,18 @@ def learned(system: str, partition: Partition | None, ants: int) -> tuple[int, f
 
 
 CASES = {
-    "pendulum, fuzzy": ("Pendulum", named.pendulum()),
-    "pendulum, crisp": ("Pendulum", named.pendulum(kind=Crisp)),
-    "navigation, fuzzy": ("Navigation", named.navigation("regular")),
+    "pendulum, fuzzy": ("Pendulum", thesis_partition(gym.make("acl_gym/Pendulum-v0"))),
+    "pendulum, crisp": (
+        "Pendulum",
+        thesis_partition(gym.make("acl_gym/Pendulum-v0"), kind=Crisp),
+    ),
+    "navigation, fuzzy": (
+        "Navigation",
+        thesis_partition(gym.make("acl_gym/Navigation-v0"), "regular"),
+    ),
     "navigation, irregular, crisp": (
         "Navigation",
-        named.navigation("damping", kind=Crisp),
+        thesis_partition(gym.make("acl_gym/Navigation-v0"), "damping", kind=Crisp),
     ),
     "1-D grid": ("GridSearch1D", None),
     "2-D grid": ("GridSearch2D", None),

@@ -5,7 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from acl_gym.envs.control.environments import ControlEnv, ControlVectorEnv
+from acl_gym.envs.control.environments import ControlVectorEnv
+from acl_gym.envs.control.single import ControlEnv
 from acl_gym.envs.grid_search import (
     GridSearch1DEnv,
     GridSearch1DVectorEnv,

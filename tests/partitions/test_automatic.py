@@ -13,8 +13,8 @@ from gymnasium.wrappers import FlattenObservation, TransformObservation
 from gymnasium.wrappers.vector import FlattenObservation as FlattenVectorObservation
 
 from acl_gym import Crisp, Discrete, Fuzzy, ScaledObservation, automatic_partition
-from acl_gym.partitions import named
-from acl_gym.partitions.automatic import CENTRES, estimate_bounds
+from acl_gym.partitions.automatic import CENTRES, thesis_partition
+from acl_gym.partitions.bounds import estimate_bounds
 
 PENDULUM = "acl_gym/Pendulum-v0"
 INF = float("inf")
@@ -95,7 +95,7 @@ def test_other_finite_observations_are_cells(space: Any) -> None:
 def test_the_pendulum_gets_the_centres_of_the_thesis(kind: Any, way: str) -> None:
     env = made(PENDULUM, way, omega_max=7.0)
     partition = automatic_partition(env, kind=kind)
-    expected = named.pendulum(kind=kind, omega_max=7.0)
+    expected = thesis_partition(env, kind=kind)
     assert partition.settings() == expected.settings()
     # A number of centres of one's own, round the same circle.
     own = automatic_partition(env, kind=kind, cells=(6, 7))
@@ -118,25 +118,14 @@ def test_a_wrapped_pendulum_is_taken_as_it_is_seen() -> None:
 
 
 def test_navigation_gets_the_centres_of_the_thesis() -> None:
-    class Navigation:
-        circular = ()
-        high = np.array([5.0, 2.0, 5.0, 2.0])
-        observation_space = spaces.Box(-high, high, dtype=np.float64)
-
-    env = gym.make(PENDULUM)
-    env.unwrapped.system = Navigation()
-    env.unwrapped.observation_space = Navigation.observation_space
-    # A class of the same name from elsewhere is just any system.
-    assert automatic_partition(env).n_cells == 7**4
-    Navigation.__module__ = "acl_gym.envs.navigation.system"
-    Navigation.__qualname__ = "Navigation"
+    env = gym.make("acl_gym/Navigation-v0")
     for kind in (Crisp, Fuzzy):
-        expected = named.navigation("regular", kind=kind).settings()
+        expected = thesis_partition(env, "regular", kind=kind).settings()
         assert automatic_partition(env, kind=kind).settings() == expected
     # Where the vehicle may go further, the centres of the thesis do not reach.
-    wide = spaces.Box(-Navigation.high, 2 * Navigation.high, dtype=np.float64)
-    env.unwrapped.observation_space = Navigation.observation_space = wide
-    assert automatic_partition(env).settings() == Fuzzy.from_box(wide, 7).settings()
+    wide = gym.make("acl_gym/Navigation-v0", position_max=10.0)
+    expected = Fuzzy.from_box(wide.observation_space, 7).settings()
+    assert automatic_partition(wide).settings() == expected
 
 
 @pytest.mark.parametrize("d", range(1, 7))
@@ -187,7 +176,7 @@ def test_a_variable_that_cannot_change_has_one_centre() -> None:
 
 
 @WAYS
-def test_variables_without_bounds_are_named_with_both_remedies(way: str) -> None:
+def test_variables_without_bounds_are_reported_with_both_remedies(way: str) -> None:
     env = made("CartPole-v1", way)
     with pytest.raises(ValueError, match=r"variables 1, 3;") as error:
         automatic_partition(env)
@@ -300,7 +289,7 @@ def test_bounded_environments_are_not_stepped() -> None:
         env.step(0)
 
 
-def test_observations_that_are_not_finite_are_named(monkeypatch: Any) -> None:
+def test_observations_that_are_not_finite_are_reported(monkeypatch: Any) -> None:
     bad = lambda self: np.array([0.0, np.nan, 0.0, 0.0])  # noqa: E731
     monkeypatch.setattr(Clock, "_observe", bad)
     with pytest.raises(ValueError, match=r"must be finite, got \[0.0, nan"):

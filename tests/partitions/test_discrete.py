@@ -68,7 +68,7 @@ def test_kernel_finds_the_cells_of_some_slots(
 
 
 @given(variables(), st.data())
-def test_what_is_no_state_is_named(
+def test_values_that_are_not_states_are_reported(
     case: tuple[list[int], list[int]], data: st.DataObject
 ) -> None:
     sizes, starts = case
@@ -148,7 +148,7 @@ def test_settings_build_it_again(space: Any, shape: tuple[int, ...]) -> None:
     again.check_space(space)
 
 
-def test_repr_tells_sizes_and_starts() -> None:
+def test_repr_shows_sizes_and_starts() -> None:
     assert repr(Discrete(5)) == "Discrete(5)"
     assert repr(Discrete(5, -1)) == "Discrete(5, starts=-1)"
     assert repr(Discrete([2, 3], 1)) == "Discrete([2, 3], starts=[1, 1])"

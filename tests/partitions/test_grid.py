@@ -347,5 +347,5 @@ def test_settings_build_it_again(grid: Grid) -> None:
             np.testing.assert_array_equal(ours, theirs)
 
 
-def test_repr_tells_the_shape() -> None:
+def test_repr_shows_the_shape() -> None:
     assert repr(Fuzzy(CENTRES, PERIODS)) == "Fuzzy(5 x 4 x 1 cells, circular=[0])"

@@ -41,7 +41,7 @@ def test_bad_centres_are_refused(kind: Any, centres: Any) -> None:
         kind(centres)
 
 
-def test_message_tells_where_centres_do_not_increase() -> None:
+def test_the_message_reports_where_centres_do_not_increase() -> None:
     with pytest.raises(
         ValueError, match=r"centres\[1\].*2 followed by 1.5.*position 2"
     ):

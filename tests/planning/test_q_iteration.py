@@ -84,9 +84,6 @@ class Puck(ControlSystem):
     def evaluation_states(self):
         return np.zeros((1, 4))
 
-    def draw(self, pygame, canvas, state, action):
-        """Nothing."""
-
 
 class PuckVectorEnv(ControlVectorEnv):
     system_type = Puck

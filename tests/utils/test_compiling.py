@@ -18,9 +18,9 @@ from acl_gym.utils import compiling
 TRIAL = """
 import gymnasium as gym
 from acl_gym import ACL
-from acl_gym.partitions import named
+from acl_gym.partitions.automatic import thesis_partition
 env = gym.make_vec("acl_gym/Pendulum-v0", num_envs=2)
-ACL(env, named.pendulum(), seed=0, max_steps=2).learn(trials=1)
+ACL(env, thesis_partition(env), seed=0, max_steps=2).learn(trials=1)
 """
 
 

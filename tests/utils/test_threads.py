@@ -15,7 +15,7 @@ import pytest
 
 import acl_gym
 from acl_gym import ACL, Crisp, Fuzzy, QLearning
-from acl_gym.partitions import named
+from acl_gym.partitions.automatic import thesis_partition
 from acl_gym.utils import threads
 
 BITS_FOR_EACH_COUNT = """
@@ -60,11 +60,13 @@ def same_with_two_threads(env_id: str, partition: Any, agent: Any) -> None:
 
 @pytest.mark.parametrize("agent", [ACL, QLearning])
 def test_a_fuzzy_colony_learns_the_same_bits(agent: Any) -> None:
-    same_with_two_threads("acl_gym/Pendulum-v0", named.pendulum(), agent)
+    same_with_two_threads(
+        "acl_gym/Pendulum-v0", thesis_partition(gym.make("acl_gym/Pendulum-v0")), agent
+    )
 
 
 def test_a_crisp_colony_learns_the_same_bits() -> None:
-    fuzzy = named.pendulum()
+    fuzzy = thesis_partition(gym.make("acl_gym/Pendulum-v0"))
     crisp = Crisp(fuzzy.centres, fuzzy.periods)
     same_with_two_threads("acl_gym/Pendulum-v0", crisp, ACL)
 
@@ -72,7 +74,11 @@ def test_a_crisp_colony_learns_the_same_bits() -> None:
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:tau0")
 def test_a_colony_of_vehicles_learns_the_same_bits() -> None:
-    same_with_two_threads("acl_gym/Navigation-v0", named.navigation("regular"), ACL)
+    same_with_two_threads(
+        "acl_gym/Navigation-v0",
+        thesis_partition(gym.make("acl_gym/Navigation-v0"), "regular"),
+        ACL,
+    )
 
 
 def test_any_number_of_threads_gives_the_same_bits() -> None:

@@ -1,1 +1,1 @@
-"""What all systems of this package share, whatever their dynamics."""
+"""What all control systems of this package share."""

@@ -1,9 +1,10 @@
-"""Small parts of `environments`: checks of what callers pass, and short kernels."""
+"""Checks of arguments and short kernels of the control environments."""
 
 from __future__ import annotations
 
 from typing import Any
 
+import gymnasium as gym
 import numpy as np
 from gymnasium.error import ResetNeeded
 from gymnasium.vector import AutoresetMode
@@ -11,13 +12,14 @@ from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from acl_gym.envs.control.system import ControlSystem
+from acl_gym.utils import validation
 from acl_gym.utils.typing import BoolArray, FloatArray, IntArray
 
 
 def checked_options(
     options: dict[str, Any] | None, allowed: tuple[str, ...]
 ) -> dict[str, Any]:
-    """Refuse reset options that would otherwise be ignored in silence."""
+    """Refuse reset options that would otherwise be ignored silently."""
     unknown = sorted(set(options or ()) - set(allowed), key=str)
     if unknown:
         raise ValueError(
@@ -44,7 +46,7 @@ def count_step(
 def finish(
     terminated: BoolArray, truncated: BoolArray, finished: BoolArray, walking: IntArray
 ) -> int:
-    """Note who has finished now; write who walks on into `walking`, return how many."""
+    """Record the finished slots; write the others into `walking`, return how many."""
     n_walking = 0
     for slot in range(finished.size):
         finished[slot] |= terminated[slot] | truncated[slot]
@@ -66,7 +68,7 @@ def copy_if_below(actions: IntArray, n_actions: int, copied: IntArray) -> bool:
 def draw_uniforms(
     system: ControlSystem, rng: np.random.Generator, count: int
 ) -> FloatArray | None:
-    """The random numbers of one step of `count` slots, None if the system has none."""
+    """Draw the random numbers of one step of `count` slots; None if it needs none."""
     if system.draws_per_step == 0:
         return None
     return rng.random((system.draws_per_step, count))
@@ -129,13 +131,13 @@ def checked_reset_mask(mask: Any, num_envs: int, *, begun: bool) -> BoolArray | 
 def final_infos(
     observations: NDArray[Any], finished: BoolArray, infos: dict[str, Any]
 ) -> dict[str, Any]:
-    """What the infos of a step say of slots that it ends and resets at once.
+    """Return the final observations and infos of slots that a step ends and resets.
 
     Args:
-        observations: the last ones, `(num_envs, ...)`.
-        finished: `(num_envs,)`.
-        infos: those of the last states, keys with arrays `(num_envs, ...)`; changed
-            where slots have not finished.
+        observations: of the last states, `(num_envs, ...)`.
+        finished: whether each slot has finished, `(num_envs,)`.
+        infos: of the last states, arrays `(num_envs, ...)`; set to 0 in place where
+            slots have not finished.
     """
     final_obs = np.full(finished.size, None, dtype=object)
     for slot in np.flatnonzero(finished):
@@ -169,3 +171,45 @@ def checked_render_mode(mode: str | None, metadata: dict[str, Any]) -> str | Non
             f"got {mode!r}."
         )
     return mode
+
+
+def warn_of_no_render_mode(metadata: dict[str, Any]) -> None:
+    """Warn that `render` was called on an environment that draws nothing."""
+    modes = " or ".join(f'"{mode}"' for mode in metadata["render_modes"])
+    gym.logger.warn(
+        "render() draws nothing without a render_mode; make the environment with "
+        f"render_mode={modes}."
+    )
+
+
+def states_of_slots(
+    given: Any, slots: IntArray, num_envs: int, current: FloatArray | None
+) -> FloatArray:
+    """Return `options["state"]` of a reset as rows for all slots.
+
+    Args:
+        given: one row for each slot; `(num_envs,)` for states of one variable.
+        slots: those that are reset.
+        num_envs: number of slots.
+        current: the states that the slots are in, `(num_envs, state_size)`; None
+            before the first reset. They take the place of given rows of slots that are
+            not reset, which may hold anything.
+
+    Raises:
+        ValueError: `given` does not have a row for each slot.
+    """
+    rows = validation.real_array("options['state']", given, finite=False)
+    if rows.shape[:1] != (num_envs,):
+        raise ValueError(
+            "options['state'] must hold one row for each slot, shape "
+            f"({num_envs}, ...), got shape {rows.shape}."
+        )
+    if current is None:
+        return rows
+    if rows.ndim == 1 and current.shape[1] == 1:
+        rows = rows[:, None]
+    if rows.shape != current.shape:
+        return rows
+    merged = current.copy()
+    merged[slots] = rows[slots]
+    return merged

@@ -1,8 +1,9 @@
-"""The bookkeeping that all control environments share, single and native vector.
+"""The native vector environment over a control system.
 
 A system (`ControlSystem`) says how states move. This module says when a slot starts,
-how long it may walk, what happens when it has finished, and which arrays are handed
-out. Every array that leaves `reset` or `step` is a new one.
+how long its episode may last, what happens when it has finished, and which arrays are
+handed out. Every array that `reset` or `step` returns is a new one. The single
+environment over the same systems is in `single`.
 """
 
 from __future__ import annotations
@@ -10,7 +11,6 @@ from __future__ import annotations
 import copy
 from typing import Any, ClassVar, Self
 
-import gymnasium as gym
 import numpy as np
 from gymnasium.error import ResetNeeded
 from gymnasium.vector import AutoresetMode, VectorEnv
@@ -27,6 +27,8 @@ from acl_gym.envs.control.bookkeeping import (
     draw_uniforms,
     final_infos,
     finish,
+    states_of_slots,
+    warn_of_no_render_mode,
 )
 from acl_gym.envs.control.rendering import Frame, Renderer
 from acl_gym.envs.control.stepping import PartialStep
@@ -38,157 +40,13 @@ Observation = NDArray[Any]
 StepResult = tuple[Observation, FloatArray, BoolArray, BoolArray, dict[str, Any]]
 
 
-class ControlEnv(gym.Env[Observation, np.int64]):
-    """The single-environment face of a control system.
-
-    It has no time limit of its own: `gym.make(id, max_episode_steps=T)` adds one.
-
-    Args:
-        render_mode: "human" shows a window, "rgb_array" lets `render` return frames,
-            None draws nothing.
-        parameters: the parameters of the system, see its class.
-    """
-
-    metadata: dict[str, Any] = {  # noqa: RUF012
-        "render_modes": ["human", "rgb_array"],
-        "render_fps": 10,
-    }
-    system_type: ClassVar[type[ControlSystem]]
-
-    def __init__(self, render_mode: str | None = None, **parameters: Any) -> None:
-        self.render_mode = checked_render_mode(render_mode, self.metadata)
-        self.system = self.system_type(**parameters)
-        self.observation_space = self.system.observation_space
-        self.action_space = self.system.action_space
-        self._n_actions = int(self.system.action_space.n)
-        self._renderer: Renderer | None = None
-        self._table: FloatArray | None = None
-        self._state: FloatArray | None = None
-        self._finished = False
-
-    def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[Observation, dict[str, Any]]:
-        """Start an episode.
-
-        Args:
-            seed: seeds the generator of initial states; None continues its stream.
-            options: `{"state": array}`, shape `(state_size,)`, sets the state
-                instead of drawing it; a state of one variable may be a number. Any
-                state of the system is allowed, also a goal: the episode then ends
-                when a step leads to a goal.
-
-        Returns:
-            The first observation and the info: empty, or `"action_mask"`, a bool
-            array `(n_actions,)`, where the system offers some actions only.
-
-        Raises:
-            ValueError: the state or a key of `options` is not valid.
-        """
-        options = checked_options(options, ("state",))
-        given = options.get("state")
-        state = None
-        if given is not None:
-            row = validation.real_array("options['state']", given, finite=False)
-            state = self.system.checked_states(row[None]).T.copy()
-        super().reset(seed=seed)
-        if state is None:
-            state = self.system.sample_states(self.np_random, 1)
-        self._state = state
-        self._finished = False
-        self._action: int | None = None
-        if self.render_mode == "human":
-            self.render()
-        return self.system.observe(state)[0], self._info(state)
-
-    def step(
-        self, action: np.int64 | int
-    ) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
-        """Apply an action for one sampling time.
-
-        Returns:
-            `(observation, reward, terminated, truncated, info)` with reward
-            = -(stage cost), `terminated` once the goal is reached and the info that
-            `reset` describes.
-
-        Raises:
-            ResetNeeded: there was no `reset`, or the goal has been reached since.
-            ValueError: `action` is not an action of this environment.
-        """
-        if self._state is None or self._finished:
-            raise ResetNeeded(
-                "step() needs a running episode, but this one "
-                + ("has not begun" if self._state is None else "reached its goal")
-                + "; call reset() first."
-            )
-        actions = checked_actions(np.asarray([action]), 1, self._n_actions)
-        rewards, reached = np.empty(1), np.empty(1, dtype=np.bool_)
-        uniforms = draw_uniforms(self.system, self.np_random, 1)
-        self.system.advance(self._state, actions, uniforms, rewards, reached)
-        self._finished = bool(reached[0])
-        self._action = int(actions[0])
-        if self.render_mode == "human":
-            self.render()
-        observation = self.system.observe(self._state)[0]
-        info = self._info(self._state)
-        return observation, float(rewards[0]), self._finished, False, info
-
-    def render(self) -> Frame | None:
-        """A frame `(480, 480, 3)` for "rgb_array"; shows it for "human".
-
-        Raises:
-            ResetNeeded: there was no `reset` yet.
-            DependencyNotInstalled: pygame is missing.
-        """
-        if self.render_mode is None:
-            gym.logger.warn(
-                "render() draws nothing without a render_mode; make the environment "
-                'with render_mode="rgb_array" or "human".'
-            )
-            return None
-        if self._state is None:
-            raise ResetNeeded("render() needs a state; call reset() first.")
-        if self._renderer is None:
-            self._renderer = Renderer(self.system, self.metadata["render_fps"])
-        state = self._state[:, 0]
-        if self.render_mode == "human":
-            self._renderer.show(state, self._action, self._table)
-            return None
-        return self._renderer.frame(state, self._action, self._table)
-
-    def show_table(self, table: FloatArray | None) -> None:
-        """Draw a table of (state, action) values over the frames from now on.
-
-        Args:
-            table: `(n_states, n_actions)`, such as the pheromone of a colony. The
-                array is kept, not copied, so that frames follow it as it changes;
-                None draws no table any more.
-
-        Raises:
-            ValueError: the system draws no tables, or the table does not fit it.
-            TypeError: it is not a NumPy array.
-        """
-        if table is not None:
-            self.system.check_table(table)
-        self._table = table
-
-    def close(self) -> None:
-        """Close the window if there is one."""
-        if self._renderer is not None:
-            self._renderer.close()
-
-    def _info(self, state: FloatArray) -> dict[str, Any]:
-        mask = self.system.action_mask(state)
-        return {} if mask is None else {"action_mask": mask[0]}
-
-
 class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
     """Native vector environment over a control system: one kernel call a step.
 
     Args:
         num_envs: number of slots, >= 1.
         max_episode_steps: an episode is truncated after this many steps; None sets
-            no limit, so that an agent's own T rules.
+            no limit, so that the agent's own T applies.
         autoreset_mode: what happens to a slot that has finished: "NextStep" (reset
             on the next step, whose action is ignored), "SameStep" (reset at once,
             last observation in `infos["final_obs"]`) or "Disabled" (the caller
@@ -209,6 +67,8 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
         "autoreset_mode": AutoresetMode.NEXT_STEP,
     }
     system_type: ClassVar[type[ControlSystem]]
+    painter: ClassVar[str | None] = None
+    """"module:class" of what draws the system, see `Renderer`; None draws nothing."""
 
     def __init__(
         self,
@@ -237,8 +97,8 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
         )
         self.action_space = batch_space(self.single_action_space, self.num_envs)
         self._n_actions = int(self.system.action_space.n)
-        self._renderer: Renderer | None = None
-        self._table: FloatArray | None = None
+        fps = self.metadata["render_fps"]
+        self._renderer = Renderer(self.system, self.painter, fps)
         self._actions: IntArray | None = None  # the last ones, to be drawn
 
         self._state: FloatArray | None = None  # (state_size, num_envs)
@@ -260,20 +120,20 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
             options: any of
 
                 - `"state"`: array `(num_envs, state_size)`, sets the states instead
-                  of drawing them (rows outside the mask are not looked at); states
+                  of drawing them (rows outside the mask are ignored); states
                   of one variable may have shape `(num_envs,)`, goals are allowed;
                 - `"reset_mask"`: bool array `(num_envs,)`, the slots to reset, the
                   others are left as they are;
                 - `"finished"`: `"wait"`, in any autoreset mode: from now to the next
                   full reset a slot that finishes stands still. Its finish is
                   reported once; after that its action is ignored, its observation
-                  stays, its reward is 0 and its flags are False. A synchronous
-                  trial of a colony is this, and costs nothing for idle slots.
+                  stays, its reward is 0 and its flags are False. This is a
+                  synchronous trial of a colony; idle slots cost nothing.
 
         Returns:
             The observations of all slots, `(num_envs, ...)`, and the infos: empty,
-            or, where the system offers some actions only, `"action_mask"`, a bool
-            array `(num_envs, n_actions)` of the states that all slots are in now.
+            or, if not all actions are always available, `"action_mask"`, a bool array
+            `(num_envs, n_actions)` for the states that the slots are in now.
 
         Raises:
             ValueError: a state, the mask or a key of `options` is not valid.
@@ -286,7 +146,7 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
         )
         slots = np.arange(self.num_envs) if mask is None else np.flatnonzero(mask)
         given = options.get("state")
-        states = None if given is None else self._given_states(given, slots)
+        states = None if given is None else self._checked_states(given, slots)
         if "finished" in options:
             validation.one_of("options['finished']", options["finished"], ("wait",))
 
@@ -366,13 +226,8 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
             DependencyNotInstalled: pygame is missing.
         """
         if self.render_mode is None:
-            gym.logger.warn(
-                "render() draws nothing without a render_mode; make the environment "
-                'with render_mode="rgb_array".'
-            )
+            warn_of_no_render_mode(self.metadata)
             return None
-        if self._renderer is None:
-            self._renderer = Renderer(self.system, self.metadata["render_fps"])
         started = self._steps == 0
         idle = self._finished & self._wait_when_finished
         return tuple(
@@ -381,19 +236,16 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
                 None
                 if self._actions is None or started[slot] or idle[slot]
                 else int(self._actions[slot]),
-                self._table,
             )
             for slot in range(self.num_envs)
         )
 
     def show_table(self, table: FloatArray | None) -> None:
         """Draw a table over the frames from now on; see `ControlEnv.show_table`."""
-        if table is not None:
-            self.system.check_table(table)
-        self._table = table
+        self._renderer.show_table(table)
 
     def with_slots(self, num_envs: int) -> Self:
-        """Make a new environment of the same system and limits with other slots."""
+        """Make a new environment that differs in its number of slots only."""
         return type(self)(
             num_envs,
             max_episode_steps=self.max_episode_steps,
@@ -415,7 +267,7 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
         return np.flatnonzero(self._finished)
 
     def _start(self, slots: IntArray, states: FloatArray | None) -> None:
-        """Put `slots` at the given `(state_size, n)` states, or at random ones."""
+        """Start `slots` in the given `(state_size, n)` states, or in random ones."""
         if states is None:
             states = self.system.sample_states(self.np_random, slots.size)
         if slots.size == self.num_envs:
@@ -452,17 +304,7 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
     def _observe(self) -> Observation:
         return self.system.observe(self._states)
 
-    def _given_states(self, given: Any, slots: IntArray) -> FloatArray:
-        rows = validation.real_array("options['state']", given, finite=False)
-        if rows.shape[:1] != (self.num_envs,):
-            raise ValueError(
-                "options['state'] must hold one row for each slot, shape "
-                f"({self.num_envs}, ...), got shape {rows.shape}."
-            )
-        if rows.ndim == 1 and self._state is not None and len(self._state) == 1:
-            rows = rows[:, None]
-        if self._state is not None and rows.shape == (current := self.states).shape:
-            # Rows outside the mask may hold anything, so they are not looked at.
-            current[slots] = rows[slots]
-            rows = current
+    def _checked_states(self, given: Any, slots: IntArray) -> FloatArray:
+        current = None if self._state is None else self._state.T
+        rows = states_of_slots(given, slots, self.num_envs, current)
         return self.system.checked_states(rows)[slots].T.copy()

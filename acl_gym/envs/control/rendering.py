@@ -1,8 +1,11 @@
-"""Frames of a control system with pygame, drawn off screen and shown if asked to."""
+"""Frames of a control system with pygame, drawn off screen and shown in a window."""
 
 from __future__ import annotations
 
-from typing import Any
+import pkgutil
+from abc import ABC, abstractmethod
+from functools import cached_property
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 from gymnasium.error import DependencyNotInstalled
@@ -12,28 +15,95 @@ from acl_gym.envs.control.system import ControlSystem
 from acl_gym.utils.typing import FloatArray
 
 Frame = NDArray[np.uint8]
+System = TypeVar("System", bound=ControlSystem)
 
 SIZE = 480  # pixels, of a square frame
 _OVERSAMPLING = 2  # drawn larger and scaled down: smooth edges
 
 
-class Renderer:
-    """Draws one state at a time.
+class Painter(ABC, Generic[System]):
+    """Draws the states of one system.
+
+    pygame is an argument, not an import: a painter checks tables without it.
 
     Args:
-        system: what is drawn; its `draw` does the work.
+        system: what is drawn.
+    """
+
+    def __init__(self, system: System) -> None:
+        self.system = system
+
+    @abstractmethod
+    def draw(
+        self, pygame: Any, canvas: Any, state: FloatArray, action: int | None
+    ) -> None:
+        """Draw a state.
+
+        Args:
+            pygame: the module.
+            canvas: a square pygame surface to fill.
+            state: `(state_size,)`.
+            action: the one that led to it; None at the start of an episode.
+        """
+
+    def check_table(self, table: Any) -> None:
+        """Refuse a (state, action) table that `draw_table` cannot draw.
+
+        Raises:
+            ValueError: always, unless the painter can draw tables.
+        """
+        raise ValueError(
+            "only the grids (GridSearch1D, GridSearch2D) draw tables, one value for "
+            f"each state and action, not {type(self.system).__name__}; use frames "
+            "without a table."
+        )
+
+    def draw_table(self, pygame: Any, canvas: Any, table: FloatArray) -> None:
+        """Draw a (state, action) table over what `draw` has drawn.
+
+        Args:
+            pygame: the module.
+            canvas: the surface that `draw` has filled.
+            table: `(n_states, n_actions)`, for instance levels of pheromone.
+
+        Raises:
+            ValueError: the system or the table does not allow it, see `check_table`.
+        """
+        self.check_table(table)
+
+
+class Renderer:
+    """Draws one state at a time, and over it a table if there is one.
+
+    Args:
+        system: what is drawn.
+        painter: "module:class" of its `Painter`, imported when it is first needed;
+            None if the system has none.
         frames_per_second: of the window.
     """
 
-    def __init__(self, system: ControlSystem, frames_per_second: int) -> None:
-        self._system = system
+    def __init__(
+        self, system: ControlSystem, painter: str | None, frames_per_second: int
+    ) -> None:
+        self._system, self._location = system, painter
         self._frames_per_second = frames_per_second
+        self._table: FloatArray | None = None
         self._window: Any = None
         self._clock: Any = None
 
     def __getstate__(self) -> dict[str, Any]:
         """A copy has no window until it shows something."""
         return {**self.__dict__, "_window": None, "_clock": None}
+
+    @cached_property
+    def _painter(self) -> Painter[Any]:
+        if self._location is None:
+            raise NotImplementedError(
+                f"{type(self._system).__name__} cannot be drawn, its environment names "
+                "no painter; make it without a render_mode."
+            )
+        painter: Painter[Any] = pkgutil.resolve_name(self._location)(self._system)
+        return painter
 
     @property
     def _pygame(self) -> Any:
@@ -46,33 +116,42 @@ class Renderer:
             ) from error
         return pygame
 
-    def frame(
-        self, state: FloatArray, action: int | None, table: FloatArray | None = None
-    ) -> Frame:
-        """The picture of a state, `(height, width, 3)`.
+    def show_table(self, table: FloatArray | None) -> None:
+        """Draw `table` over the frames from now on; see `ControlEnv.show_table`."""
+        if table is not None:
+            self._painter.check_table(table)
+        self._table = table
+
+    def frame(self, state: FloatArray, action: int | None) -> Frame:
+        """Return the picture of a state, `(height, width, 3)`.
 
         Args:
             state: `(state_size,)`.
-            action: what was done to reach it; None at the start of an episode.
-            table: `(n_states, n_actions)`, drawn on top; None draws none.
+            action: the one that led to it; None at the start of an episode.
 
         Raises:
             DependencyNotInstalled: pygame is missing.
         """
-        pixels = self._pygame.surfarray.array3d(self._surface(state, action, table))
+        pixels = self._pygame.surfarray.array3d(self._surface(state, action))
         return np.ascontiguousarray(pixels.transpose(1, 0, 2))
 
-    def show(
-        self, state: FloatArray, action: int | None, table: FloatArray | None = None
-    ) -> None:
-        """Show the picture in a window, no faster than real time."""
+    def show(self, state: FloatArray, action: int | None) -> None:
+        """Show the picture of a state in a window, no faster than real time.
+
+        Args:
+            state: `(state_size,)`.
+            action: the one that led to it; None at the start of an episode.
+
+        Raises:
+            DependencyNotInstalled: pygame is missing.
+        """
         pygame = self._pygame
         if self._window is None:
             pygame.display.init()  # the screen only: no sound is needed
             self._window = pygame.display.set_mode((SIZE, SIZE))
             pygame.display.set_caption(type(self._system).__name__)
             self._clock = pygame.time.Clock()
-        self._window.blit(self._surface(state, action, table), (0, 0))
+        self._window.blit(self._surface(state, action), (0, 0))
         pygame.event.pump()
         self._clock.tick(self._frames_per_second)
         pygame.display.flip()
@@ -83,11 +162,9 @@ class Renderer:
             self._pygame.display.quit()
             self._window = None
 
-    def _surface(
-        self, state: FloatArray, action: int | None, table: FloatArray | None
-    ) -> Any:
+    def _surface(self, state: FloatArray, action: int | None) -> Any:
         large = self._pygame.Surface((_OVERSAMPLING * SIZE, _OVERSAMPLING * SIZE))
-        self._system.draw(self._pygame, large, state, action)
-        if table is not None:
-            self._system.draw_table(self._pygame, large, table)
+        self._painter.draw(self._pygame, large, state, action)
+        if self._table is not None:
+            self._painter.draw_table(self._pygame, large, self._table)
         return self._pygame.transform.smoothscale(large, (SIZE, SIZE))

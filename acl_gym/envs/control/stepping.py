@@ -1,4 +1,4 @@
-"""A step of some slots of a vector environment, those that walk."""
+"""A step of the slots whose episodes go on, while the others are idle."""
 
 from __future__ import annotations
 
@@ -8,18 +8,18 @@ from numba import njit
 from acl_gym.envs.control.system import ControlSystem
 from acl_gym.utils.typing import BoolArray, FloatArray, IntArray
 
-MOST = 0.75
-"""If more of the slots walk, moving the idle ones too and taking that back is faster."""
+RESTORE_ABOVE = 0.75
+"""Share of walking slots above which it is faster to step all and restore the rest."""
 
 
 class PartialStep:
     """Gathers some slots side by side, advances them, and puts them back.
 
-    Idle slots cost nothing, and nothing is allocated. Where most slots walk, all are
-    advanced where they are, and the idle ones put back; for a slot it is the same.
+    Idle slots cost nothing, and nothing is allocated. If most slots walk, all are
+    advanced in place and the idle ones restored; the results are the same.
 
     Args:
-        system: what moves.
+        system: whose states are advanced.
         num_envs: number of slots.
         limit: steps after which a slot is truncated; 0 means none.
     """
@@ -30,7 +30,7 @@ class PartialStep:
         self._actions: IntArray = np.empty(num_envs, dtype=np.int64)
         self._rewards: FloatArray = np.empty(num_envs)
         self._reached: BoolArray = np.empty(num_envs, dtype=np.bool_)
-        self._room: tuple[FloatArray, IntArray, FloatArray, BoolArray] | None = None
+        self._scratch: tuple[FloatArray, IntArray, FloatArray, BoolArray] | None = None
         self._before: FloatArray = np.empty((0, 0))
 
     def __call__(
@@ -45,11 +45,11 @@ class PartialStep:
         terminated: BoolArray,
         truncated: BoolArray,
     ) -> int:
-        """Step `slots`, `(m,)`; entries of other slots stay as they are.
+        """Step some slots; the entries of the others stay as they are.
 
         Args:
-            slots: who steps.
-            idle: whether each slot does not, `(num_envs,)`.
+            slots: those that step, `(m,)`.
+            idle: whether each slot does not step, `(num_envs,)`.
             states: of all slots, `(state_size, num_envs)`, replaced by the next ones.
             steps: of all slots so far, counted up.
             actions: of all slots.
@@ -59,9 +59,9 @@ class PartialStep:
             truncated: of all slots, False; receives whether the limit is reached.
 
         Returns:
-            How many have finished.
+            How many slots have finished.
         """
-        if uniforms is None and slots.size > MOST * idle.size:
+        if uniforms is None and slots.size > RESTORE_ABOVE * idle.size:
             if self._before.shape != states.shape:
                 self._before = np.empty_like(states)
             np.copyto(self._before, states)
@@ -78,7 +78,9 @@ class PartialStep:
                     truncated,
                 )
             )
-        part, part_actions, part_rewards, part_reached = self._room_for(slots, states)
+        part, part_actions, part_rewards, part_reached = self._scratch_for(
+            slots, states
+        )
         gather_slots(slots, states, actions, part, part_actions)
         self._system.advance(part, part_actions, uniforms, part_rewards, part_reached)
         n_finished: int = put_slots_back(
@@ -95,19 +97,19 @@ class PartialStep:
         )
         return n_finished
 
-    def _room_for(
+    def _scratch_for(
         self, slots: IntArray, states: FloatArray
     ) -> tuple[FloatArray, IntArray, FloatArray, BoolArray]:
-        """Scratch side by side, that of the last step if as many slots walk."""
+        """Return scratch arrays, those of the last step if as many slots walk."""
         size, m = len(states), slots.size
-        room = self._room
-        if room is None or room[0].shape != (size, m):
+        scratch = self._scratch
+        if scratch is None or scratch[0].shape != (size, m):
             if self._states.size != states.size:
                 self._states = np.empty(states.size)
             part = self._states[: size * m].reshape(size, m)
-            room = part, self._actions[:m], self._rewards[:m], self._reached[:m]
-            self._room = room
-        return room
+            scratch = part, self._actions[:m], self._rewards[:m], self._reached[:m]
+            self._scratch = scratch
+        return scratch
 
 
 @njit(cache=True)
@@ -139,7 +141,7 @@ def put_slots_back(
     terminated: BoolArray,
     truncated: BoolArray,
 ) -> int:
-    """Undo `gather_slots` after a step, and count it; `limit` 0 means none.
+    """Undo `gather_slots` after a step and count the step; `limit` 0 means none.
 
     Returns how many slots have finished.
     """
@@ -167,7 +169,7 @@ def put_idle_back(
     terminated: BoolArray,
     truncated: BoolArray,
 ) -> int:
-    """Undo the step of the idle slots, and count that of the others; vectorised.
+    """Undo the step of the idle slots and count that of the others; vectorised.
 
     Returns how many slots have finished.
     """

@@ -14,11 +14,11 @@ from acl_gym.utils import compiling as _compiling  # noqa: F401 - it says what t
 from acl_gym.utils.typing import BoolArray, FloatArray, IntArray
 
 BLOCK = 512
-"""Slots that a kernel advances at a time: what it needs stays in the nearest cache."""
+"""Slots that a kernel advances at a time, so that their data stays in the nearest cache."""
 
 
 class ControlSystem(ABC):
-    """A discrete-time system x(t+1) = f(x(t), u(t)) (4.1) with a goal and a cost.
+    """A discrete-time system x(t+1) = f(x(t), u(t)), eq. (4.1), with goal and cost.
 
     A system is an immutable set of parameters and pure functions of arrays. It owns
     no state and no random numbers: `ControlEnv` and `ControlVectorEnv` hold those and
@@ -34,10 +34,10 @@ class ControlSystem(ABC):
     """How many uniform random numbers `advance` takes for each slot and step."""
 
     circular: ClassVar[tuple[int, ...]] = ()
-    """The state variables whose high end is their low end, such as angles."""
+    """The state variables that wrap around, such as angles: both ends are one value."""
 
     evaluation_steps: ClassVar[int] = 300
-    """T for the evaluation of a policy from `evaluation_states`."""
+    """T, the longest episode when a policy is evaluated from `evaluation_states`."""
 
     @property
     @abstractmethod
@@ -97,67 +97,51 @@ class ControlSystem(ABC):
 
     @abstractmethod
     def evaluation_states(self) -> FloatArray:
-        """The fixed initial states of the policy cost (3.47), `(n, state_size)`."""
+        """Return the fixed initial states of the policy cost (3.47), `(n, state_size)`."""
 
-    @abstractmethod
-    def draw(
-        self, pygame: Any, canvas: Any, state: FloatArray, action: int | None
-    ) -> None:
-        """Draw a state.
+    def thesis_centres(self, cells: Any = None) -> tuple[FloatArray, ...] | None:
+        """The centres that the thesis gives each state variable, for a partition.
 
         Args:
-            pygame: the module.
-            canvas: a square pygame surface to fill.
-            state: `(state_size,)`.
-            action: what was done to reach it; None at the start of an episode.
+            cells: which of them, where the thesis has several or a formula; see the
+                system. None takes its default.
+
+        Returns:
+            For each variable its centres, increasing, in the unit of the variable;
+            None if the thesis has none, as where a state is a cell already.
+
+        Raises:
+            ValueError: there are no such centres.
+            TypeError: `cells` is of another type than the system takes.
         """
+        if cells is not None:
+            raise ValueError(
+                f"cells must be None for {type(self).__name__}, for which the thesis "
+                f"has no centres, got {cells!r}."
+            )
+        return None
 
     def observe(self, states: FloatArray) -> NDArray[Any]:
-        """Return what is seen of `states` `(state_size, n)`: a new array `(n, ...)`."""
-        seen = np.empty(states.shape[::-1])
-        _transpose(states, seen)
-        return seen
+        """Return the observations of `states` `(state_size, n)`: a new array `(n, ...)`."""
+        observations = np.empty(states.shape[::-1])
+        _transpose(states, observations)
+        return observations
 
     def action_mask(self, states: FloatArray) -> BoolArray | None:
-        """Return U_q of (3.4): which actions each of `states` offers.
+        """Return which actions are available in each state, U_q of (3.4).
 
         Args:
             states: `(state_size, n)`.
 
         Returns:
-            A new array `(n, n_actions)`; None if all actions are always offered.
+            A new bool array `(n, n_actions)`; None if all are always available.
         """
         return None
 
-    def check_table(self, table: Any) -> None:
-        """Refuse a (state, action) table that `draw_table` cannot draw.
-
-        Raises:
-            ValueError: always, unless the system can draw tables of its states.
-        """
-        raise ValueError(
-            "only the grids (GridSearch1D, GridSearch2D) draw tables, one value for "
-            f"each state and action, not {type(self).__name__}, whose states are "
-            "continuous; use frames without a table."
-        )
-
-    def draw_table(self, pygame: Any, canvas: Any, table: FloatArray) -> None:
-        """Draw a (state, action) table over what `draw` has drawn.
-
-        Args:
-            pygame: the module.
-            canvas: the surface that `draw` has filled.
-            table: `(n_states, n_actions)`, for instance levels of pheromone.
-
-        Raises:
-            ValueError: the system or the table does not allow it, see `check_table`.
-        """
-        self.check_table(table)
-
 
 @njit(cache=True)
-def _transpose(states: FloatArray, seen: FloatArray) -> None:
-    """Several times as fast as NumPy's copy of a transpose that has few columns."""
+def _transpose(states: FloatArray, observations: FloatArray) -> None:
+    """Copy the transpose, several times as fast as NumPy if it has few columns."""
     for row in range(states.shape[0]):
         for slot in range(states.shape[1]):
-            seen[slot, row] = states[row, slot]
+            observations[slot, row] = states[row, slot]

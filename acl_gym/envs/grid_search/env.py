@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from acl_gym.envs.control.environments import ControlEnv, ControlVectorEnv
+from acl_gym.envs.control.environments import ControlVectorEnv
+from acl_gym.envs.control.single import ControlEnv
 from acl_gym.envs.grid_search.system import GridSearch1D, GridSearch2D
 
 
@@ -52,20 +53,22 @@ class GridSearch1DEnv(ControlEnv):
     """
 
     system_type = GridSearch1D
+    painter = "acl_gym.envs.grid_search.painter:GridSearchPainter"
 
 
 class GridSearch1DVectorEnv(ControlVectorEnv):
     """Many ants in one row, one a slot; see `GridSearch1DEnv`."""
 
     system_type = GridSearch1D
+    painter = "acl_gym.envs.grid_search.painter:GridSearchPainter"
 
 
 class GridSearch2DEnv(ControlEnv):
     """Find the goal in the centre of a world of walls.
 
     ## Description
-    A square world of 11 by 11 cells (or 21 by 21, 31 by 31, or a map of one's own), of
-    which some are obstacles (§3.6.6). They leave fewer ways that are equally short
+    A square world of 11 by 11 cells (or 21 by 21, 31 by 31, or a map of your own), of
+    which some are obstacles (§3.6.6). They leave fewer shortest paths of equal length
     than an open square would. The goal is in the centre.
 
     ## Action Space
@@ -80,8 +83,8 @@ class GridSearch2DEnv(ControlEnv):
 
     A move against an obstacle or the border is blocked: the ant stays where it is.
     With a `transition_probability` p below 1, any move fails with probability 1 - p.
-    With `mask_blocked=True`, `info["action_mask"]` tells which moves are not blocked
-    (bool; `env.action_space.sample(mask)` asks for `mask.astype(np.int8)`).
+    With `mask_blocked=True`, `info["action_mask"]` reports which moves are not blocked
+    (bool; `env.action_space.sample(mask)` needs `mask.astype(np.int8)`).
 
     ## Observation Space
     `Discrete(87)`: the number of the cell, counted from 0 row by row from the
@@ -114,9 +117,11 @@ class GridSearch2DEnv(ControlEnv):
     """
 
     system_type = GridSearch2D
+    painter = "acl_gym.envs.grid_search.painter:GridSearchPainter"
 
 
 class GridSearch2DVectorEnv(ControlVectorEnv):
     """Many ants in one world, one a slot; see `GridSearch2DEnv`."""
 
     system_type = GridSearch2D
+    painter = "acl_gym.envs.grid_search.painter:GridSearchPainter"

@@ -1,7 +1,7 @@
 """The worlds of the 2-D grid search (§3.6.6) as text, and the program that made them.
 
-The maps of the thesis are lost with its figures. These have as many free cells as
-they had (§3.6.8), and the goal in the centre. A character is a cell: `#` an obstacle,
+The maps of the thesis are not available. These have the same number of free cells
+(§3.6.8) and the goal in the centre. Each character is a cell: `#` an obstacle,
 `.` a free cell, `G` the goal.
 
     python -m acl_gym.envs.grid_search            prints the maps
@@ -25,15 +25,15 @@ from acl_gym.utils.typing import BoolArray, IntArray
 WALL, FREE, GOAL = "#", ".", "G"
 
 # Name -> arguments of `make_map`. The counts are those of §3.6.8; the mean path of
-# 11x11 is the "about 10" of §3.6.7, for the others the thesis states none.
+# 11x11 is the "about 10" of §3.6.7, for the others the thesis gives none.
 MAPS: dict[str, dict[str, Any]] = {
     "11x11": {"size": 11, "free_cells": 86, "seed": 1, "mean_path": 10.0},
     "21x21": {"size": 21, "free_cells": 278, "seed": 1},
     "31x31": {"size": 31, "free_cells": 640, "seed": 1},
 }
 
-_ATTEMPTS = 2_000  # maps begun before `make_map` gives up
-_TOLERANCE = 0.05  # steps between the mean path that was asked for and that made
+_ATTEMPTS = 2_000  # maps that `make_map` starts before it gives up
+_TOLERANCE = 0.05  # steps between the requested mean path and that of a map
 
 
 def load_map(name: str) -> tuple[str, ...]:
@@ -55,12 +55,12 @@ def checked_map(desc: Any) -> tuple[str, ...]:
 
     Args:
         desc: the map as text of several lines or as a sequence of rows, from north to
-            south. White space around a line, and empty lines at both ends of a text,
-            are not part of it.
+            south. White space around a line and empty lines at both ends of a text
+            are ignored.
 
     Raises:
         TypeError: `desc` is neither text nor a sequence of texts.
-        ValueError: it is no world in which every free cell has a way to a goal.
+        ValueError: it is not a map in which every free cell has a way to a goal.
     """
     lines = desc.strip().split("\n") if isinstance(desc, str) else desc
     if not isinstance(lines, Sequence) or not all(isinstance(x, str) for x in lines):
@@ -113,7 +113,7 @@ def goal_distances(open_cells: BoolArray, goals: BoolArray) -> IntArray:
     """The length of the shortest way from each cell to the nearest goal, in steps.
 
     Args:
-        open_cells: `(rows, columns)`, where one may walk, the goals included.
+        open_cells: `(rows, columns)`, whether a cell is no obstacle; goals are open.
         goals: `(rows, columns)`.
 
     Returns:
@@ -138,18 +138,19 @@ def make_map(
 ) -> tuple[str, ...]:
     """Make a square world of walls around a goal in its centre.
 
-    A random maze with one way between any two cells loses cells of its walls one by
-    one until it has its free cells: first where ways end, then obstacles that stand
-    alone, then any that parts two free cells. What is left are walls, corridors and
-    small squares, all connected, without dead ends and without lone obstacles.
+    It starts from a random maze with exactly one path between any two cells and removes
+    obstacles one by one until it has enough free cells: first at dead ends, then
+    obstacles that stand alone, then any that separate two free cells. The result has
+    walls, corridors and small squares, all connected, without dead ends and without
+    lone obstacles.
 
     Args:
         size: rows and columns, odd, >= 5.
-        free_cells: how many free cells there are besides the goal; possible are about
-            0.6 to 0.8 of all cells.
+        free_cells: how many free cells there are besides the goal, about 0.6 to 0.8 of
+            all cells.
         seed: of the generator; the same arguments give the same map.
-        mean_path: the mean shortest way to the goal over the free cells, steps, met
-            within 0.05; None takes the first map that has its cells.
+        mean_path: the mean over the free cells of the shortest path to the goal, in
+            steps, met within 0.05; None takes the first map with enough free cells.
 
     Returns:
         The rows of the map, from north to south.
@@ -183,10 +184,10 @@ def make_map(
 
 
 def _maze(size: int, rng: np.random.Generator) -> BoolArray:
-    """Where one may walk in a maze whose crossings are at even rows and columns.
+    """Return the free cells of a maze whose crossings are at even rows and columns.
 
-    Depth first: from the last crossing a way is dug to a random new one two cells
-    off, and if there is none, from the crossing before.
+    Depth first: a passage is dug from the last crossing to a random new one two cells
+    away, or, if there is none, from the crossing before.
     """
     free = np.zeros((size, size), dtype=np.bool_)
     free[0, 0] = True
@@ -211,7 +212,7 @@ def _maze(size: int, rng: np.random.Generator) -> BoolArray:
 
 
 def _thinned(walls: BoolArray, count: int, rng: np.random.Generator) -> bool:
-    """Take cells from the walls, in place, until `count` are left; False if stuck."""
+    """Remove obstacles, in place, until `count` are left; return whether it worked."""
     while True:
         ways = _neighbours(~walls)
         dead_ends = ~walls & (ways < 2)

@@ -7,7 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from acl_gym.envs.control.rendering import Painter
 from acl_gym.envs.grid_search.maps import GOAL, WALL
+from acl_gym.envs.grid_search.system import GridSearch
 from acl_gym.utils.typing import FloatArray, IntArray
 
 Characters = NDArray[np.str_]
@@ -22,6 +24,56 @@ _GREEN = (0, 158, 115)
 _BLUE = (0, 114, 178)
 _BEST = (20, 20, 20)
 _FAINT, _FAINTEST = 130, 225  # grey of another action with half of a cell, with none
+
+
+class GridSearchPainter(Painter[GridSearch]):
+    """Draws the map, the ant with a tip towards its last move, and tables as arrows."""
+
+    def __init__(self, system: GridSearch) -> None:
+        super().__init__(system)
+        self._characters: Characters = np.array([list(row) for row in system.rows])
+        self._cells = system.cells
+        self._starts = np.setdiff1d(np.arange(system.n_states), system.goal_states)
+
+    def draw(
+        self, pygame: Any, canvas: Any, state: FloatArray, action: int | None
+    ) -> None:
+        """See `Painter.draw`."""
+        heading = None if action is None else self.system.directions[action]
+        draw_map(pygame, canvas, self._characters)
+        cell = self._cells[int(state[0])]
+        draw_ant(pygame, canvas, self._characters, cell, heading)
+
+    def check_table(self, table: Any) -> None:
+        """Refuse anything but a table of levels >= 0, `(n_states, n_actions)`.
+
+        Raises:
+            TypeError: it is not a NumPy array.
+            ValueError: it has another shape or holds negative or infinite values.
+        """
+        if not isinstance(table, np.ndarray):
+            raise TypeError(
+                f"table must be a NumPy array, got {type(table).__name__}; it is kept, "
+                "so that frames follow it."
+            )
+        shape = (self.system.n_states, len(self.system.directions))
+        if table.shape != shape:
+            raise ValueError(
+                "table must have a row for each state and a column for each action, "
+                f"shape {shape}, got {table.shape}."
+            )
+        if not (np.isfinite(table) & (table >= 0)).all():
+            raise ValueError(
+                "table must hold finite levels >= 0, whose share in a cell is drawn; "
+                "subtract the least value of each row from other values."
+            )
+
+    def draw_table(self, pygame: Any, canvas: Any, table: FloatArray) -> None:
+        """Draw an arrow for each action, the longer the larger its share of the cell."""
+        self.check_table(table)
+        cells, levels = self._cells[self._starts], table[self._starts]
+        directions = self.system.directions
+        draw_arrows(pygame, canvas, self._characters, cells, levels, directions)
 
 
 class _Layout:

@@ -1,4 +1,4 @@
-"""The grid searches of §3.6.2 and §3.6.6: cells, moves, exact model, two kernels."""
+"""The grid searches of §3.6.2 and §3.6.6: cells, moves and the exact model."""
 
 from __future__ import annotations
 
@@ -10,54 +10,16 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from gymnasium import spaces
-from numba import njit
 from numpy.typing import NDArray
 
+from acl_gym.envs.control import parameters
 from acl_gym.envs.control.system import ControlSystem
-from acl_gym.envs.grid_search import painter
+from acl_gym.envs.grid_search import kernels
 from acl_gym.envs.grid_search.maps import FREE, GOAL, MAPS, WALL, checked_map, load_map
 from acl_gym.utils import validation
 from acl_gym.utils.typing import BoolArray, FloatArray, IntArray
 
 NORTH, SOUTH, EAST, WEST = (-1, 0), (1, 0), (0, 1), (0, -1)  # row, column
-
-
-@njit(cache=True, error_model="numpy")
-def _move(
-    states: FloatArray,
-    actions: IntArray,
-    next_state: IntArray,
-    goal: BoolArray,
-    rewards: FloatArray,
-    reached: BoolArray,
-) -> None:
-    """Every move is carried out, in place."""
-    for i in range(actions.size):
-        cell = next_state[int(states[i]), actions[i]]
-        states[i] = cell
-        rewards[i] = -1.0
-        reached[i] = goal[cell]
-
-
-@njit(cache=True, error_model="numpy")
-def _move_or_fail(
-    states: FloatArray,
-    actions: IntArray,
-    uniforms: FloatArray,
-    probability: float,
-    next_state: IntArray,
-    goal: BoolArray,
-    rewards: FloatArray,
-    reached: BoolArray,
-) -> None:
-    """A move is carried out with some probability, in place."""
-    for i in range(actions.size):
-        cell = int(states[i])
-        if uniforms[i] < probability:
-            cell = next_state[cell, actions[i]]
-        states[i] = cell
-        rewards[i] = -1.0
-        reached[i] = goal[cell]
 
 
 class Outcomes(NamedTuple):
@@ -132,12 +94,12 @@ class GridSearch(ControlSystem):
 
     @cached_property
     def _offered(self) -> BoolArray:
-        """Whether each action leads away, `(n_states, n_actions)`."""
+        """Whether each action leads to another state, `(n_states, n_actions)`."""
         return np.asarray(self._next_state != np.arange(self.n_states)[:, None])
 
     @property
     def n_states(self) -> int:
-        """How many cells are no obstacles, goals included."""
+        """The number of cells that are not obstacles, goals included."""
         return int(self._goal.size)
 
     @property
@@ -160,8 +122,8 @@ class GridSearch(ControlSystem):
     def evaluation_steps(self) -> int:  # type: ignore[override]
         """T = 5 n_states / p, rounded up.
 
-        A decision: the thesis states no T. That long a walk of random moves from a
-        random state finds the goal with a probability of 0.50 on 11x11, 0.29 on 21x21,
+        A decision: the thesis gives no T. A random walk of this length from a random
+        state finds the goal with a probability of 0.50 on 11x11, 0.29 on 21x21,
         0.45 on 31x31 and 0.57 on the row of 10 states, where T is 50; the expected
         steps of any walk grow by 1 / p.
         """
@@ -183,7 +145,7 @@ class GridSearch(ControlSystem):
         return 1.0
 
     def sample_states(self, rng: np.random.Generator, count: int) -> FloatArray:
-        """Draw states uniformly over those that are no goals, shape `(1, count)`."""
+        """Draw states uniformly over those that are not goals, shape `(1, count)`."""
         starts = np.flatnonzero(~self._goal)
         drawn = starts[rng.integers(starts.size, size=(1, count))]
         return drawn.astype(np.float64)
@@ -192,23 +154,10 @@ class GridSearch(ControlSystem):
         """Return states given as `(n,)` or `(n, 1)` in the shape `(n, 1)`.
 
         Raises:
-            ValueError: wrong shape, or a state is no integer of 0..n_states - 1.
+            ValueError: wrong shape, or a state is not an integer of 0..n_states - 1.
         """
-        array = validation.real_array("states", states, finite=False)
-        if array.shape not in ((array.size,), (array.size, 1)):
-            raise ValueError(
-                "states must be one integer each, shape (n,) or (n, 1), got "
-                f"{array.shape}."
-            )
-        array = array.reshape(-1, 1)
-        good = (array >= 0) & (array < self.n_states) & (array == np.floor(array))
-        if not good.all():
-            row = int(np.flatnonzero(~good[:, 0])[0])
-            raise ValueError(
-                f"states must be integers of 0..{self.n_states - 1}, got "
-                f"{array[row, 0]:g} in row {row}; `cells` lists the cell of each state."
-            )
-        return array + 0.0  # no -0
+        hint = "`cells` lists the cell of each state"
+        return parameters.numbered_states(states, self.n_states, hint)
 
     def observe(self, states: FloatArray) -> IntArray:
         """Return the states `(1, n)` as int64 `(n,)`."""
@@ -224,12 +173,14 @@ class GridSearch(ControlSystem):
     ) -> None:
         """One move of each ant; see `ControlSystem.advance`.
 
-        A state that is a goal already is left like any other.
+        A goal is left like any other state.
         """
         if uniforms is None:
-            _move(states[0], actions, self._next_state, self._goal, rewards, reached)
+            kernels.move(
+                states[0], actions, self._next_state, self._goal, rewards, reached
+            )
         else:
-            _move_or_fail(
+            kernels.move_or_fail(
                 states[0],
                 actions,
                 uniforms[0],
@@ -266,48 +217,8 @@ class GridSearch(ControlSystem):
         return np.asarray(self._offered[states[0].astype(np.int64)], dtype=np.bool_)
 
     def evaluation_states(self) -> FloatArray:
-        """Every state that is no goal, `(n, 1)`."""
+        """Return every state that is not a goal, `(n, 1)`."""
         return np.flatnonzero(~self._goal).astype(np.float64)[:, None]
-
-    def draw(
-        self, pygame: Any, canvas: Any, state: FloatArray, action: int | None
-    ) -> None:
-        """The map, and the ant with a tip towards the move it tried."""
-        cell = self.cells[int(state[0])]
-        heading = None if action is None else self.directions[action]
-        painter.draw_map(pygame, canvas, self._map)
-        painter.draw_ant(pygame, canvas, self._map, cell, heading)
-
-    def check_table(self, table: Any) -> None:
-        """Refuse what is no table of levels >= 0, `(n_states, n_actions)`.
-
-        Raises:
-            TypeError: it is not a NumPy array.
-            ValueError: it has another shape or holds negative or infinite values.
-        """
-        if not isinstance(table, np.ndarray):
-            raise TypeError(
-                f"table must be a NumPy array, got {type(table).__name__}; it is kept, "
-                "so that frames follow it."
-            )
-        if table.shape != self._next_state.shape:
-            raise ValueError(
-                "table must have a row for each state and a column for each action, "
-                f"shape {self._next_state.shape}, got {table.shape}."
-            )
-        if not (np.isfinite(table) & (table >= 0)).all():
-            raise ValueError(
-                "table must hold finite levels >= 0, whose share in a cell is drawn; "
-                "subtract the least value of each row from other values."
-            )
-
-    def draw_table(self, pygame: Any, canvas: Any, table: FloatArray) -> None:
-        """An arrow for each action, as long as its share of the cell is large."""
-        self.check_table(table)
-        cells, starts = self.cells, ~self._goal
-        painter.draw_arrows(
-            pygame, canvas, self._map, cells[starts], table[starts], self.directions
-        )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -344,9 +255,9 @@ class GridSearch2D(GridSearch):
 
     Attributes:
         map_name: "11x11", "21x21" or "31x31", with 86, 278 and 640 free cells and the
-            goal in the centre. A decision: the maps of the thesis are lost; `maps`
-            made these. The mean shortest way is 9.99, 19.85 and 19.97 steps.
-        desc: a map of one's own, as text or as a sequence of rows, instead of
+            goal in the centre. A decision: the maps of the thesis are not available;
+            `maps` made these. The mean shortest path has 9.99, 19.85 and 19.97 steps.
+        desc: a map of your own, as text or as a sequence of rows, instead of
             `map_name`: `#` obstacle, `.` free, `G` goal, one or more.
         transition_probability: p, in (0, 1]: a move fails with probability 1 - p.
         mask_blocked: whether infos carry `"action_mask"`, U_q of (3.4), which leaves

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from acl_gym.envs.control.environments import ControlEnv, ControlVectorEnv
+from acl_gym.envs.control.environments import ControlVectorEnv
+from acl_gym.envs.control.single import ControlEnv
 from acl_gym.envs.navigation.system import Navigation
 
 
@@ -60,9 +61,11 @@ class NavigationEnv(ControlEnv):
     """
 
     system_type = Navigation
+    painter = "acl_gym.envs.navigation.painter:NavigationPainter"
 
 
 class NavigationVectorEnv(ControlVectorEnv):
     """Many vehicles, one a slot, advanced by one kernel; see `NavigationEnv`."""
 
     system_type = Navigation
+    painter = "acl_gym.envs.navigation.painter:NavigationPainter"

@@ -84,20 +84,20 @@ def settle(
     position_max: float,
     velocity_max: float,
     weight: tuple[float, ...],
-    cost_action: FloatArray,
+    action_costs: FloatArray,
     product: bool,
     goal_position: float,
     goal_velocity: float,
     rewards: FloatArray,
     reached: BoolArray,
 ) -> None:
-    """Clip the next states to X; reward (3.2) and goal test on them, in place.
+    """Clip the next states to X; reward (3.2) and goal test for them, in place.
 
     The goal is a product of triangles > 0.5 if `product`, else a box. `weight` is the
     symmetric Q, row by row.
     """
     w11, w12, w13, w14, _, w22, w23, w24, _, _, w33, w34, _, _, _, w44 = weight
-    price = cost_action[action]
+    action_cost = action_costs[action]
     for i in range(c1.size):
         x1 = min(max(c1[i], -position_max), position_max)
         x2 = min(max(c2[i], -position_max), position_max)
@@ -109,7 +109,7 @@ def settle(
             + (w22 * s1 + 2.0 * (w23 * x2 + w24 * s2)) * s1
             + (w33 * x2 + 2.0 * w34 * s2) * x2
             + w44 * s2 * s2
-            + price[i]
+            + action_cost[i]
         )
         x1, s1, x2, s2 = abs(x1), abs(s1), abs(x2), abs(s2)
         if product:
@@ -136,7 +136,7 @@ def advance_block(
 ) -> None:
     """Do what `advance` does for the `BLOCK` slots from `block` * `BLOCK` on."""
     push, base, peaks, step, substeps = dynamics
-    x_max, v_max, weight, price, product, goal_x, goal_v = goal_and_cost
+    x_max, v_max, weight, action_costs, product, goal_x, goal_v = goal_and_cost
     part = slice(block * BLOCK, min((block + 1) * BLOCK, actions.size))
     c1, v1 = states[0, part], states[1, part]
     c2, v2 = states[2, part], states[3, part]
@@ -151,7 +151,7 @@ def advance_block(
         x_max,
         v_max,
         weight,
-        price,
+        action_costs,
         product,
         goal_x,
         goal_v,
@@ -185,8 +185,8 @@ def advance_in_parallel(
 ) -> None:
     """Do what `advance` does, its blocks shared among threads."""
     push, base, peaks, step, substeps = dynamics
-    x_max, v_max, weight, price, product, goal_x, goal_v = goal_and_cost
+    x_max, v_max, weight, action_costs, product, goal_x, goal_v = goal_and_cost
     for block in prange((actions.size + BLOCK - 1) // BLOCK):
         move = push, base, peaks, step, substeps
-        target = x_max, v_max, weight, price, product, goal_x, goal_v
+        target = x_max, v_max, weight, action_costs, product, goal_x, goal_v
         advance_block(states, actions, move, target, rewards, reached, block)

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 from functools import lru_cache
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
+from acl_gym.envs.control.rendering import Painter
+from acl_gym.envs.navigation.system import Navigation
 from acl_gym.utils.typing import FloatArray
 
 Colour = tuple[int, int, int]
@@ -26,67 +28,38 @@ _FORCE_LENGTH = 0.1  # of the largest force, beyond the vehicle
 _VELOCITY_SECONDS = 1.0  # the velocity line is how far the vehicle would drift
 
 
-class Scene(Protocol):
-    """What the picture shows of a `Navigation`, which says what it means."""
+class NavigationPainter(Painter[Navigation]):
+    """Draws the vehicle with its velocity and force, over the damping and the goal."""
 
-    @property
-    def base_damping(self) -> float:
-        """b_0."""
+    def draw(
+        self, pygame: Any, canvas: Any, state: FloatArray, action: int | None
+    ) -> None:
+        """See `Painter.draw`; c1 is to the right, c2 upwards."""
+        size = canvas.get_width()
+        scale = (0.5 - _MARGIN) * size / self.system.position_max
+        pygame.surfarray.blit_array(canvas, _background(self.system, size))
+        low, high = _MARGIN * size, (1.0 - _MARGIN) * size
+        wall = [(low, low), (high, low), (high, high), (low, high)]
+        pygame.draw.lines(canvas, _WALL, True, wall, max(1, round(0.004 * size)))
 
-    @property
-    def forces(self) -> tuple[tuple[float, float], ...]:
-        """U."""
+        centre = np.array([0.5, 0.5]) * size
+        outline = [tuple(centre + scale * point) for point in goal_outline(self.system)]
+        pygame.draw.circle(canvas, _GOAL, tuple(centre), 0.045 * size, _line(size))
+        pygame.draw.polygon(canvas, _GOAL, outline)
 
-    @property
-    def position_max(self) -> float:
-        """The ends of the plane."""
-
-    @property
-    def goal_rule(self) -> str:
-        """Which goal."""
-
-    @property
-    def goal_bounds(self) -> tuple[float, float]:
-        """The goal of the rule "bounds"."""
-
-    @property
-    def goal_spacing(self) -> tuple[float, float]:
-        """The goal of the rule "membership"."""
-
-    def damping(self, c1: ArrayLike, c2: ArrayLike) -> FloatArray:
-        """The damping at positions."""
-
-    def __hash__(self) -> int:
-        """Of its parameters, by which the background is kept."""
+        c1, v1, c2, v2 = state.tolist()
+        vehicle = centre + scale * np.array([c1, -c2])
+        drift = vehicle + _VELOCITY_SECONDS * scale * np.array([v1, -v2])
+        _draw_bar(pygame, canvas, _VEHICLE, vehicle, drift, 0.005 * size)
+        if action is not None:
+            _draw_force(self.system, pygame, canvas, vehicle, action, size)
+        pygame.draw.circle(
+            canvas, _PAPER, tuple(vehicle), (_VEHICLE_RADIUS + 0.003) * size
+        )
+        pygame.draw.circle(canvas, _VEHICLE, tuple(vehicle), _VEHICLE_RADIUS * size)
 
 
-def draw_vehicle(
-    system: Scene, pygame: Any, canvas: Any, state: FloatArray, action: int | None
-) -> None:
-    """Fill a canvas; see `ControlSystem.draw`. c1 is to the right, c2 upwards."""
-    size = canvas.get_width()
-    scale = (0.5 - _MARGIN) * size / system.position_max
-    pygame.surfarray.blit_array(canvas, _background(system, size))
-    low, high = _MARGIN * size, (1.0 - _MARGIN) * size
-    wall = [(low, low), (high, low), (high, high), (low, high)]
-    pygame.draw.lines(canvas, _WALL, True, wall, max(1, round(0.004 * size)))
-
-    centre = np.array([0.5, 0.5]) * size
-    outline = [tuple(centre + scale * point) for point in goal_outline(system)]
-    pygame.draw.circle(canvas, _GOAL, tuple(centre), 0.045 * size, _line(size))
-    pygame.draw.polygon(canvas, _GOAL, outline)
-
-    c1, v1, c2, v2 = state.tolist()
-    vehicle = centre + scale * np.array([c1, -c2])
-    drift = vehicle + _VELOCITY_SECONDS * scale * np.array([v1, -v2])
-    _draw_bar(pygame, canvas, _VEHICLE, vehicle, drift, 0.005 * size)
-    if action is not None:
-        _draw_force(system, pygame, canvas, vehicle, action, size)
-    pygame.draw.circle(canvas, _PAPER, tuple(vehicle), (_VEHICLE_RADIUS + 0.003) * size)
-    pygame.draw.circle(canvas, _VEHICLE, tuple(vehicle), _VEHICLE_RADIUS * size)
-
-
-def goal_outline(system: Scene) -> FloatArray:
+def goal_outline(system: Navigation) -> FloatArray:
     """The outline of the goal region for a vehicle at rest, m, shape `(n, 2)`."""
     if system.goal_rule == "bounds":
         half = min(system.goal_bounds[0], system.position_max)
@@ -105,7 +78,7 @@ def goal_outline(system: Scene) -> FloatArray:
 
 
 @lru_cache(maxsize=4)
-def _background(system: Scene, size: int) -> NDArray[np.uint8]:
+def _background(system: Navigation, size: int) -> NDArray[np.uint8]:
     """The shades of the damping, `(size, size, 3)`: columns first, as pygame has it."""
     # From the middle of one pixel to the next, in m.
     pixels = (np.arange(size) + 0.5) / size - 0.5
@@ -142,7 +115,7 @@ def _draw_bar(
 
 
 def _draw_force(
-    system: Scene,
+    system: Navigation,
     pygame: Any,
     canvas: Any,
     vehicle: FloatArray,

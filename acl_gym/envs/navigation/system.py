@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, ClassVar
 
@@ -12,11 +12,25 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import ArrayLike
 
+from acl_gym.envs.control import parameters, sampling
 from acl_gym.envs.control.system import ControlSystem
 from acl_gym.envs.navigation import kernels
 from acl_gym.envs.navigation.kernels import Peak, Row
 from acl_gym.utils import threads, validation
 from acl_gym.utils.typing import BoolArray, FloatArray, IntArray
+
+_VELOCITY = (-2.0, 0.0, 2.0)
+_REGULAR = (-5.0, -2.0, -0.3, -0.1, 0.0, 0.1, 0.3, 2.0, 5.0)
+_DAMPING_1 = (-5.0, -3.75, -2.0, -0.3, 0.0, 0.3, 2.0, 2.45, 3.5, 3.75, 4.7, 5.0)
+_DAMPING_2 = (
+    *(-5.0, -4.55, -3.5, -2.3, -2.0, -1.1, -0.6, -0.3),
+    *(0.0, 0.3, 1.0, 2.6, 4.0, 5.0),
+)
+THESIS_CENTRES = {
+    "regular": (_REGULAR, _VELOCITY, _REGULAR, _VELOCITY),
+    "damping": (_DAMPING_1, _VELOCITY, _DAMPING_2, _VELOCITY),
+}
+"""Name -> centres of (c1, v1, c2, v2), in m and m/s (§4.5.2 and §4.5.3)."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,8 +52,8 @@ class Navigation(ControlSystem):
         substeps: Runge-Kutta steps in one sampling time, >= 1. Measured
             against DOP853 over the whole state space, one step of the default 0.2 s
             is off by at most 3e-2 m and 0.2 m/s with 1 substep, 8e-4 and 6e-3 with 2,
-            4e-5 and 3e-4 with 4; the most where the damping is strongest. 2 is as
-            exact as the pendulum with 1 (a decision).
+            4e-5 and 3e-4 with 4; most where the damping is strongest. 2 is as exact
+            as the pendulum with 1 (a decision).
         position_max: m, > 0. Both positions are clipped to it after each step.
         velocity_max: m / s, > 0. Both velocities are clipped to it after each step.
             A wall stops the position only: the velocity towards it is kept until a
@@ -88,7 +102,6 @@ class Navigation(ControlSystem):
         validation.integer("substeps", self.substeps, at_least=1)
         validation.one_of("cost", self.cost, ("quadratic", "time"))
         validation.one_of("goal_rule", self.goal_rule, ("bounds", "membership"))
-        # Plain tuples and floats: the parameters stay immutable, hashable and JSON.
         canonical: dict[str, Any] = {
             "peaks": _checked_peaks(self.peaks),
             "forces": _checked_forces(self.forces),
@@ -99,11 +112,7 @@ class Navigation(ControlSystem):
             "goal_spacing": _checked_pair("goal_spacing", self.goal_spacing),
             "state_weight": _checked_weight(self.state_weight),
         }
-        for field in fields(self):
-            value = canonical.get(field.name)
-            if value is None:
-                value = float(getattr(self, field.name))
-            object.__setattr__(self, field.name, value)
+        parameters.set_canonical(self, canonical)
         with np.errstate(over="ignore", invalid="ignore"):  # the checks look for it
             self._check_step()
             self._check_cost()
@@ -116,7 +125,7 @@ class Navigation(ControlSystem):
 
     @cached_property
     def _kernel_peaks(self) -> tuple[float, ...]:
-        """The peaks for the kernel in a row: one of height 0 stands for none."""
+        """The peaks as one flat tuple; a peak of height 0 stands for none."""
         peaks = self.peaks or ((0.0, 0.0, 0.0, 1.0, 1.0),)
         scaled = (
             (height / self.mass, mean_1, mean_2, 1.0 / sigma_1, 1.0 / sigma_2)
@@ -126,7 +135,7 @@ class Navigation(ControlSystem):
 
     @cached_property
     def _dynamics(self) -> tuple[Any, ...]:
-        """The parameters of `integrate`."""
+        """Arguments of `kernels.integrate`."""
         return (
             self._acceleration,
             self.base_damping / self.mass,
@@ -137,7 +146,7 @@ class Navigation(ControlSystem):
 
     @cached_property
     def _goal_and_cost(self) -> tuple[Any, ...]:
-        """The parameters of `settle`."""
+        """Arguments of `kernels.settle`."""
         return (
             float(self.position_max),
             float(self.velocity_max),
@@ -149,14 +158,14 @@ class Navigation(ControlSystem):
 
     @cached_property
     def _stage_weight(self) -> tuple[Any, ...]:
-        """Q of the stage cost: that of time spent does not depend on the state."""
+        """Q of the stage cost: zero for cost="time", which does not depend on the state."""
         if self.cost == "time":
             return ((0.0,) * 4,) * 4
         return self.state_weight
 
     @cached_property
     def _action_cost(self) -> FloatArray:
-        """What each action adds to the stage cost: u' R u, or 1 for time spent."""
+        """What each action adds to the stage cost: u' R u, or 1 for cost="time"."""
         if self.cost == "time":
             return np.ones(len(self.forces))
         squares = np.square(np.array(self.forces)).sum(axis=1)
@@ -169,7 +178,7 @@ class Navigation(ControlSystem):
 
     @property
     def _goal(self) -> tuple[float, float]:
-        """The sizes of the goal that its rule goes by."""
+        """The sizes of the goal region that `goal_rule` uses."""
         return self.goal_bounds if self.goal_rule == "bounds" else self.goal_spacing
 
     @property
@@ -185,12 +194,12 @@ class Navigation(ControlSystem):
 
     @property
     def max_stage_cost(self) -> float:
-        """The stage cost at the dearest corner of X and the dearest force."""
+        """The largest stage cost over the corners of X and the forces."""
         corners = np.array(list(itertools.product((-1.0, 1.0), repeat=4)))
         corners *= self._limits[:, 0]
         weight = np.array(self._stage_weight)
-        dearest = np.einsum("ni,ij,nj->n", corners, weight, corners).max()
-        return float(dearest + self._action_cost.max())
+        largest = np.einsum("ni,ij,nj->n", corners, weight, corners).max()
+        return float(largest + self._action_cost.max())
 
     def damping(self, c1: ArrayLike, c2: ArrayLike) -> FloatArray:
         """The damping b(c1, c2), kg / s, of §4.5.1, for positions that broadcast."""
@@ -204,11 +213,9 @@ class Navigation(ControlSystem):
     def sample_states(self, rng: np.random.Generator, count: int) -> FloatArray:
         """Draw states uniformly over X without the goal, shape `(4, count)`."""
         limits = self._limits
-        states = limits * (2.0 * rng.random((4, count)) - 1.0)
-        # Each column is drawn again until it lies outside the goal region.
-        while (inside := np.flatnonzero(self._in_goal(states))).size:
-            states[:, inside] = limits * (2.0 * rng.random((4, inside.size)) - 1.0)
-        return states
+        return sampling.sample_outside(
+            lambda n: limits * (2.0 * rng.random((4, n)) - 1.0), self._in_goal, count
+        )
 
     def checked_states(self, states: Any) -> FloatArray:
         """Return states `(n, 4)`, rows [c1, v1, c2, v2].
@@ -216,24 +223,15 @@ class Navigation(ControlSystem):
         Raises:
             ValueError: wrong shape, not finite, or outside X.
         """
-        array = validation.real_array("states", states, finite=False)
-        if array.ndim != 2 or array.shape[1] != 4:
-            raise ValueError(
-                "states must be rows [c1, v1, c2, v2], shape (n, 4), got "
-                f"{array.shape}."
-            )
-        if not np.isfinite(array).all():
-            row = int(np.flatnonzero(~np.isfinite(array).all(axis=1))[0])
-            raise ValueError(
-                f"states must be finite, got {array[row].tolist()} in row {row}."
-            )
+        variables = ("c1", "v1", "c2", "v2")
+        array = parameters.real_states(states, variables)
         beyond = np.argwhere(np.abs(array) > self._limits[:, 0])
         if beyond.size:
             row, column = beyond[0]
             limit = self._limits[column, 0]
             setting = ("position_max", "velocity_max")[column % 2]
             raise ValueError(
-                f"states must have {('c1', 'v1', 'c2', 'v2')[column]} in "
+                f"states must have {variables[column]} in "
                 f"[-{limit:g}, {limit:g}], got {array[row, column]:g} in row {row}; "
                 f"set {setting} to allow more."
             )
@@ -254,27 +252,39 @@ class Navigation(ControlSystem):
         move(states, actions, self._dynamics, self._goal_and_cost, rewards, reached)
 
     def evaluation_states(self) -> FloatArray:
-        """The Halton points 1 to 100 in bases 2, 3, 5 and 7, stretched to X.
+        """Return the Halton points 1 to 100 in bases 2, 3, 5 and 7, scaled to X.
 
         A decision: the thesis says "100 predefined initial states, uniformly
         distributed over the state space" and does not list them.
         """
-        return (2.0 * halton_points(100) - 1.0) * self._limits[:, 0]
+        return (2.0 * sampling.halton_points(100) - 1.0) * self._limits[:, 0]
 
-    def draw(
-        self, pygame: Any, canvas: Any, state: FloatArray, action: int | None
-    ) -> None:
-        """The vehicle with its velocity and force, over the damping and the goal."""
-        # Only here: environments that draw nothing need not load it.
-        from acl_gym.envs.navigation.painter import draw_vehicle
+    def thesis_centres(self, cells: Any = None) -> tuple[FloatArray, ...]:
+        """The centres of c1, v1, c2 and v2 by name.
 
-        draw_vehicle(self, pygame, canvas, state, action)
+        With the 9 actions, "regular" (§4.5.2) has 729 cells and 6,561 pairs of cell and
+        action; "damping" (§4.5.3), finer around the two regions of stronger damping,
+        has 1,512 cells and 13,608 pairs.
+
+        Args:
+            cells: "regular" or "damping"; None takes "regular".
+
+        Returns:
+            Centres of the four variables, m and m/s. They span the default
+            `position_max` and `velocity_max`, whatever those of this system are.
+
+        Raises:
+            ValueError: there are no centres of that name.
+        """
+        name = "regular" if cells is None else cells
+        validation.one_of("cells", name, tuple(THESIS_CENTRES))
+        return tuple(np.array(centres) for centres in THESIS_CENTRES[name])
 
     def _check_step(self) -> None:
         """Refuse parameters for which Runge-Kutta would diverge (limit: 2.78)."""
         step = self.sampling_time / self.substeps
         push = np.abs(self._acceleration).max()
-        # How far a vehicle can come within one step, before it is clipped.
+        # How far a vehicle can get within one step, before it is clipped.
         reach = self.position_max + step * (self.velocity_max + step * push)
         if not (np.isfinite(push) and reach < 1e100):
             raise ValueError(
@@ -306,7 +316,7 @@ class Navigation(ControlSystem):
 
     def _check_goal(self) -> None:
         name = "goal_bounds" if self.goal_rule == "bounds" else "goal_spacing"
-        points = (2.0 * halton_points(1000).T - 1.0) * self._limits
+        points = (2.0 * sampling.halton_points(1000).T - 1.0) * self._limits
         share = float(self._in_goal(points).mean())
         if share > 0.99:
             raise ValueError(
@@ -320,22 +330,6 @@ class Navigation(ControlSystem):
             return np.asarray((np.abs(states) <= size).all(axis=0), dtype=np.bool_)
         degree = np.maximum(1.0 - np.abs(states) / size, 0.0).prod(axis=0)
         return np.asarray(degree > 0.5, dtype=np.bool_)
-
-
-def halton_points(count: int) -> FloatArray:
-    """The points 1 to `count` of Halton's sequence in four dimensions, `(count, 4)`.
-
-    Coordinate j of point i is the digits of i in the j-th prime base, mirrored at the
-    point. They fill [0, 1)^4 evenly, without randomness.
-    """
-    points = np.zeros((count, 4))
-    for column, base in enumerate((2, 3, 5, 7)):
-        rest, share = np.arange(1, count + 1), 1.0
-        while rest.any():
-            share /= base
-            points[:, column] += share * (rest % base)
-            rest = rest // base
-    return points
 
 
 def _checked_peaks(values: Any) -> tuple[Peak, ...]:
@@ -376,14 +370,7 @@ def _checked_weight(values: Any) -> tuple[Any, ...]:
     weight = validation.real_array("state_weight", values)
     if weight.shape == (4,):
         weight = np.diag(weight)
-    # Rounding may leave the smallest eigenvalue of v v' a hair below zero.
-    slack = 1e-12 * float(np.abs(weight).max())
-    valid = (
-        weight.shape == (4, 4)
-        and np.array_equal(weight, weight.T)
-        and np.linalg.eigvalsh(weight)[0] >= -slack
-    )
-    if not valid:
+    if not parameters.is_weight(weight, 4):
         raise ValueError(
             "state_weight must be a symmetric positive semi-definite (4, 4) matrix or "
             f"the 4 numbers >= 0 of its diagonal, got {values!r}."

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from acl_gym.envs.control.environments import ControlEnv, ControlVectorEnv
+from acl_gym.envs.control.environments import ControlVectorEnv
+from acl_gym.envs.control.single import ControlEnv
 from acl_gym.envs.pendulum.system import Pendulum
 
 
@@ -56,9 +57,11 @@ class PendulumEnv(ControlEnv):
     """
 
     system_type = Pendulum
+    painter = "acl_gym.envs.pendulum.painter:PendulumPainter"
 
 
 class PendulumVectorEnv(ControlVectorEnv):
     """Many pendulums, one a slot, advanced by one kernel; see `PendulumEnv`."""
 
     system_type = Pendulum
+    painter = "acl_gym.envs.pendulum.painter:PendulumPainter"

@@ -60,14 +60,14 @@ def settle(
     cost_theta: float,
     cost_cross: float,
     cost_omega: float,
-    cost_action: FloatArray,
+    action_costs: FloatArray,
     bound_theta: float,
     bound_omega: float,
     rewards: FloatArray,
     reached: BoolArray,
 ) -> None:
-    """Bring the next states into X; reward (5.4) and goal test on them, in place."""
-    price = cost_action[action]  # a look-up in the loop would keep it scalar
+    """Bring the next states into X; reward (5.4) and goal test for them, in place."""
+    action_cost = action_costs[action]  # a look-up in the loop would keep it scalar
     for i in range(theta.size):
         angle = theta[i] - TWO_PI * np.floor(theta[i] / TWO_PI)
         # A tiny negative angle rounds to 2 pi itself, which is the state 0.
@@ -79,7 +79,7 @@ def settle(
         rewards[i] = -(
             (cost_theta * error + 2.0 * cost_cross * speed) * error
             + cost_omega * speed * speed
-            + price[i]
+            + action_cost[i]
         )
         # Not `and`: a branch here would keep the loop from being vectorised.
         near = abs(error) <= bound_theta
@@ -98,7 +98,7 @@ def advance_block(
 ) -> None:
     """Do what `advance` does for the `BLOCK` slots from `block` * `BLOCK` on."""
     push, stiffness, friction, step, substeps = dynamics
-    omega_max, q1, q12, q2, price, bound_1, bound_2 = goal_and_cost
+    omega_max, q1, q12, q2, action_costs, bound_1, bound_2 = goal_and_cost
     part = slice(block * BLOCK, min((block + 1) * BLOCK, actions.size))
     theta, omega, action = states[0, part], states[1, part], actions[part]
     integrate(theta, omega, action, push, stiffness, friction, step, substeps)
@@ -110,7 +110,7 @@ def advance_block(
         q1,
         q12,
         q2,
-        price,
+        action_costs,
         bound_1,
         bound_2,
         rewards[part],
@@ -143,8 +143,8 @@ def advance_in_parallel(
 ) -> None:
     """Do what `advance` does, its blocks shared among threads."""
     push, stiffness, friction, step, substeps = dynamics
-    omega_max, q1, q12, q2, price, bound_1, bound_2 = goal_and_cost
+    omega_max, q1, q12, q2, action_costs, bound_1, bound_2 = goal_and_cost
     for block in prange((actions.size + BLOCK - 1) // BLOCK):
         move = push, stiffness, friction, step, substeps
-        target = omega_max, q1, q12, q2, price, bound_1, bound_2
+        target = omega_max, q1, q12, q2, action_costs, bound_1, bound_2
         advance_block(states, actions, move, target, rewards, reached, block)

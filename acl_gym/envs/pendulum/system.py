@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields
+from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
 from gymnasium import spaces
 
+from acl_gym.envs.control import parameters, sampling
 from acl_gym.envs.control.system import ControlSystem
 from acl_gym.envs.pendulum import kernels
 from acl_gym.envs.pendulum.kernels import TWO_PI
@@ -21,7 +23,7 @@ from acl_gym.utils.typing import BoolArray, FloatArray, IntArray
 class Pendulum(ControlSystem):
     """Parameters (Table 5.1) and dynamics (5.1) of the pendulum.
 
-    The state is x = [theta omega]: theta = 0 hangs, theta = pi stands.
+    The state is x = [theta omega]: theta = 0 hangs down, theta = pi stands upright.
 
     Attributes:
         inertia: J, kg m^2, > 0.
@@ -73,23 +75,18 @@ class Pendulum(ControlSystem):
         torques = validation.real_array("torques", self.torques, ndim=1)
         bounds = self._checked_bounds()
         weight = _weight_matrix(self.state_weight)
-        # Plain tuples and floats: the parameters stay immutable, hashable and JSON.
         canonical: dict[str, Any] = {
             "torques": tuple(torques.tolist()),
             "goal_bounds": tuple(bounds.tolist()),
             "state_weight": tuple(map(tuple, weight.tolist())),
             "substeps": int(self.substeps),
         }
-        for field in fields(self):
-            value = canonical.get(field.name)
-            if value is None:
-                value = float(getattr(self, field.name))
-            object.__setattr__(self, field.name, value)
+        parameters.set_canonical(self, canonical)
         self._check_step()
 
     @cached_property
     def _dynamics(self) -> tuple[Any, ...]:
-        """For `integrate`: accelerations K_m u / J in rad / s^2 of each torque, ..."""
+        """Arguments of `kernels.integrate`; first K_m u / J of each torque, rad / s^2."""
         return (
             self.motor_gain / self.inertia * np.array(self.torques),
             self.mass * self.gravity * self.length / self.inertia,
@@ -100,7 +97,7 @@ class Pendulum(ControlSystem):
 
     @cached_property
     def _goal_and_cost(self) -> tuple[Any, ...]:
-        """For `settle`: bounds, Q, R u^2 of each action, the goal."""
+        """Arguments of `kernels.settle`: bounds, Q, R u^2 of each action, the goal."""
         (cost_theta, cost_cross), (_, cost_omega) = self.state_weight
         return (
             float(self.omega_max),
@@ -127,23 +124,21 @@ class Pendulum(ControlSystem):
 
     @property
     def max_stage_cost(self) -> float:
-        """The stage cost (5.4) at its dearest corner of X and dearest torque."""
+        """The largest stage cost (5.4) over the corners of X and the torques."""
         weight = np.array(self.state_weight)
         corners = [
             np.array([math.pi, speed]) for speed in (-self.omega_max, self.omega_max)
         ]
-        dearest = max(float(e @ weight @ e) for e in corners)
-        return dearest + self.torque_weight * max(u * u for u in self.torques)
+        largest = max(float(e @ weight @ e) for e in corners)
+        return largest + self.torque_weight * max(u * u for u in self.torques)
 
     def sample_states(self, rng: np.random.Generator, count: int) -> FloatArray:
         """Draw states uniformly over X without the goal, shape `(2, count)`."""
         low = np.array([[0.0], [-self.omega_max]])
         span = np.array([[TWO_PI], [2.0 * self.omega_max]])
-        states = low + span * rng.random((2, count))
-        # Each column is drawn again until it lies outside the goal region.
-        while (inside := np.flatnonzero(self._in_goal(states))).size:
-            states[:, inside] = low + span * rng.random((2, inside.size))
-        return states
+        return sampling.sample_outside(
+            lambda n: low + span * rng.random((2, n)), self._in_goal, count
+        )
 
     def checked_states(self, states: Any) -> FloatArray:
         """Return states `(n, 2)` with theta brought into [0, 2 pi).
@@ -151,16 +146,7 @@ class Pendulum(ControlSystem):
         Raises:
             ValueError: wrong shape, not finite, or omega beyond omega_max.
         """
-        array = validation.real_array("states", states, finite=False)
-        if array.ndim != 2 or array.shape[1] != 2:
-            raise ValueError(
-                f"states must be rows [theta, omega], shape (n, 2), got {array.shape}."
-            )
-        if not np.isfinite(array).all():
-            row = int(np.flatnonzero(~np.isfinite(array).all(axis=1))[0])
-            raise ValueError(
-                f"states must be finite, got {array[row].tolist()} in row {row}."
-            )
+        array = parameters.real_states(states, ("theta", "omega"))
         if (beyond := np.flatnonzero(np.abs(array[:, 1]) > self.omega_max)).size:
             raise ValueError(
                 f"omega must lie in [-{self.omega_max:g}, {self.omega_max:g}] rad/s, "
@@ -186,7 +172,7 @@ class Pendulum(ControlSystem):
         move(states, actions, self._dynamics, self._goal_and_cost, rewards, reached)
 
     def evaluation_states(self) -> FloatArray:
-        """100 states: theta_i = 2 pi i / 10 + 0.01, omega_j over 10 values to the ends.
+        """Return 100 states: theta_i = 2 pi i / 10 + 0.01, 10 even values of omega.
 
         A decision: the thesis names no initial states for (3.47). The 0.01 keeps
         the set off the unstable symmetry axis.
@@ -197,56 +183,37 @@ class Pendulum(ControlSystem):
             -1, 2
         )
 
-    def draw(
-        self, pygame: Any, canvas: Any, state: FloatArray, action: int | None
-    ) -> None:
-        """The pole, the goal region behind it, and an arc for the torque."""
-        size = canvas.get_width()
-        pivot = np.array([0.5, 0.5]) * size
-        length = 0.36 * size
+    def thesis_centres(self, cells: Any = None) -> tuple[FloatArray, FloatArray]:
+        """The evenly spaced centres of theta, (5.2), and of omega, (5.3).
 
-        def point(angle: float, radius: float) -> tuple[float, float]:
-            """theta = 0 hangs down, positive angles turn counter-clockwise."""
-            x, y = math.sin(angle), math.cos(angle)
-            return float(pivot[0] + radius * x), float(pivot[1] + radius * y)
+        For a crisp partition choose an even number for theta and an odd one for omega.
+        Both equilibria are then centres. Otherwise they lie on the border between two
+        bins, and the cell of a resting pendulum would chatter (§5.2.2).
 
-        canvas.fill((255, 255, 255))
-        bound = self.goal_bounds[0]
-        edge = np.linspace(math.pi - bound, math.pi + bound, 9)
-        sector = [tuple(pivot), *(point(a, 1.12 * length) for a in edge)]
-        pygame.draw.polygon(canvas, (205, 232, 216), sector)
-        theta = float(state[0])
-        width = 0.035 * size
-        side = 0.5 * width
-        normal = np.array([math.cos(theta), -math.sin(theta)]) * side
-        tip = np.array(point(theta, length))
-        corners = [pivot - normal, pivot + normal, tip + normal, tip - normal]
-        pygame.draw.polygon(canvas, (0, 114, 178), [tuple(c) for c in corners])
-        pygame.draw.circle(canvas, (0, 114, 178), tuple(tip), 1.6 * width)
-        pygame.draw.circle(canvas, (40, 40, 40), tuple(pivot), 0.8 * width)
-        torque = 0.0 if action is None else self.torques[action]
-        if torque:
-            self._draw_torque(pygame, canvas, point, torque, size)
+        Args:
+            cells: `(n_theta, n_omega)`, the numbers of centres, each >= 3; None takes
+                (40, 41). Those of theta start at 0 and exclude 2 pi, which is the same
+                angle; those of omega include both ends, -omega_max and omega_max.
 
-    def _draw_torque(
-        self, pygame: Any, canvas: Any, point: Any, torque: float, size: int
-    ) -> None:
-        """An arc around the pivot, as long as the torque is large, with a head."""
-        share = torque / max(abs(u) for u in self.torques)
-        radius, thickness = 0.1 * size, max(2, round(0.012 * size))
-        angles = math.pi / 2 * np.linspace(0.0, 1.0, 25) * share
-        middle = math.pi  # the arc is centred above the pivot
-        arc = middle + angles - angles[-1] / 2
-        pygame.draw.lines(
-            canvas, (213, 94, 0), False, [point(a, radius) for a in arc], thickness
+        Returns:
+            Centres of theta, rad, and of omega, rad/s.
+
+        Raises:
+            ValueError: `cells` are not two numbers, or one is too small.
+            TypeError: a number is not an integer.
+        """
+        pair = (40, 41) if cells is None else cells
+        if not isinstance(pair, Sequence | np.ndarray) or len(pair) != 2:
+            raise ValueError(
+                "cells of the pendulum must be two integers (n_theta, n_omega), such "
+                f"as (40, 41), got {cells!r}."
+            )
+        n_theta = validation.integer("n_theta", pair[0], at_least=3)
+        n_omega = validation.integer("n_omega", pair[1], at_least=3)
+        return (
+            np.linspace(0.0, TWO_PI, n_theta, endpoint=False),
+            np.linspace(-self.omega_max, self.omega_max, n_omega),
         )
-        forward = math.copysign(0.35, torque)
-        head = [
-            point(arc[-1], radius + 0.025 * size),
-            point(arc[-1], radius - 0.025 * size),
-            point(arc[-1] + forward, radius),
-        ]
-        pygame.draw.polygon(canvas, (213, 94, 0), head)
 
     def _checked_bounds(self) -> FloatArray:
         bounds = validation.real_array("goal_bounds", self.goal_bounds, ndim=1)
@@ -287,14 +254,7 @@ class Pendulum(ControlSystem):
 
 def _weight_matrix(values: Any) -> FloatArray:
     weight = validation.real_array("state_weight", values, ndim=2)
-    # Rounding may leave the smaller eigenvalue of v v' a hair below zero.
-    slack = 1e-12 * float(np.abs(weight).max())
-    valid = (
-        weight.shape == (2, 2)
-        and weight[0, 1] == weight[1, 0]
-        and np.linalg.eigvalsh(weight)[0] >= -slack
-    )
-    if not valid:
+    if not parameters.is_weight(weight, 2):
         raise ValueError(
             "state_weight must be a symmetric positive semi-definite (2, 2) matrix, "
             f"got {values!r}."

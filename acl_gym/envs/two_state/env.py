@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from acl_gym.envs.control.environments import ControlEnv, ControlVectorEnv
+from acl_gym.envs.control.environments import ControlVectorEnv
+from acl_gym.envs.control.single import ControlEnv
 from acl_gym.envs.two_state.system import TwoState
 
 
 class TwoStateEnv(ControlEnv):
-    """The smallest system with a choice: one state before it, one with it.
+    """The smallest system with a choice: one state without a choice, then one with it.
 
     ## Description
     Figure 3.2: every ant starts in q, where a single action leads to q'. There it
@@ -16,8 +17,8 @@ class TwoStateEnv(ControlEnv):
     `acl_gym.theory` has its formulas.
 
     ## Action Space
-    `Discrete(3)`: in q' the ways to the goal, the best first. In q only action 0 is
-    offered (`infos["action_mask"]`); the environment takes any other for it.
+    `Discrete(3)`: in q' the ways to the goal, best first. In q only action 0 is
+    available (`infos["action_mask"]`); any other has the same effect.
 
     ## Observation Space
     `Discrete(3)`: 0 is q, 1 is q', 2 the goal.
@@ -47,9 +48,11 @@ class TwoStateEnv(ControlEnv):
     """
 
     system_type = TwoState
+    painter = "acl_gym.envs.two_state.painter:TwoStatePainter"
 
 
 class TwoStateVectorEnv(ControlVectorEnv):
     """Many ants, one a slot; see `TwoStateEnv`."""
 
     system_type = TwoState
+    painter = "acl_gym.envs.two_state.painter:TwoStatePainter"

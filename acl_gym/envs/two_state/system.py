@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, ClassVar
@@ -10,11 +9,12 @@ from typing import Any, ClassVar
 import numpy as np
 from gymnasium import spaces
 
+from acl_gym.envs.control import parameters
 from acl_gym.envs.control.system import ControlSystem
+from acl_gym.envs.two_state import kernels
+from acl_gym.envs.two_state.kernels import FIRST
 from acl_gym.utils import validation
 from acl_gym.utils.typing import BoolArray, FloatArray, IntArray
-
-FIRST, SECOND, AT_GOAL = 0, 1, 2
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -22,9 +22,9 @@ class TwoState(ControlSystem):
     """From q one action leads to q', from there N actions to the goal.
 
     Attributes:
-        costs: of the N actions in q', two or more, > 0 and rising, so that action 0 is
-            u* and action 1 the second-best. A decision: the text ranks the costs and
-            names none.
+        costs: of the N actions in q', two or more, > 0 and increasing, so that action 0
+            is u* and action 1 the second-best. A decision: the thesis ranks the costs
+            without giving values.
     """
 
     evaluation_steps: ClassVar[int] = 2
@@ -35,7 +35,7 @@ class TwoState(ControlSystem):
         costs = validation.real_array("costs", self.costs, ndim=1)
         if costs.size < 2 or not (costs > 0).all() or not (np.diff(costs) > 0).all():
             raise ValueError(
-                "costs must be two or more, positive and rising from the best action "
+                "costs must be two or more, positive and increasing from the best action "
                 f"to the worst, got {self.costs!r}."
             )
         object.__setattr__(self, "costs", tuple(costs.tolist()))
@@ -60,7 +60,7 @@ class TwoState(ControlSystem):
         return self.costs[-1]
 
     def sample_states(self, rng: np.random.Generator, count: int) -> FloatArray:
-        """All ants begin in q, shape `(1, count)`; nothing is drawn."""
+        """Return q for all ants, shape `(1, count)`; nothing is drawn at random."""
         return np.full((1, count), float(FIRST))
 
     def checked_states(self, states: Any) -> FloatArray:
@@ -69,21 +69,7 @@ class TwoState(ControlSystem):
         Raises:
             ValueError: wrong shape, or a state is none of 0, 1, 2.
         """
-        array = validation.real_array("states", states, finite=False)
-        if array.shape not in ((array.size,), (array.size, 1)):
-            raise ValueError(
-                "states must be one integer each, shape (n,) or (n, 1), got "
-                f"{array.shape}."
-            )
-        array = array.reshape(-1, 1)
-        known = np.isin(array[:, 0], (FIRST, SECOND, AT_GOAL))
-        if not known.all():
-            row = int(np.argmin(known))
-            raise ValueError(
-                f"states must be 0, 1 or 2 (the goal), got {array[row, 0]:g} in row "
-                f"{row}."
-            )
-        return array + 0.0  # no -0
+        return parameters.numbered_states(states, 3, "0 is q, 1 is q', 2 is the goal")
 
     def observe(self, states: FloatArray) -> IntArray:
         """Return the states `(1, n)` as int64 `(n,)`."""
@@ -97,10 +83,8 @@ class TwoState(ControlSystem):
         rewards: FloatArray,
         reached: BoolArray,
     ) -> None:
-        """One action of each ant; see `ControlSystem.advance`. The goal is not left."""
-        rewards[:] = np.where(states[0] == SECOND, -self._costs[actions], 0.0)
-        states[0] = np.minimum(states[0] + 1.0, AT_GOAL)
-        reached[:] = states[0] == AT_GOAL
+        """One action of each ant; see `ControlSystem.advance`. Ants stay at the goal."""
+        kernels.advance(states[0], actions, self._costs, rewards, reached)
 
     def action_mask(self, states: FloatArray) -> BoolArray:
         """U_q of (3.4), `(n, n_actions)`: in q there is one action, number 0."""
@@ -111,35 +95,3 @@ class TwoState(ControlSystem):
     def evaluation_states(self) -> FloatArray:
         """The state q, `(1, 1)`."""
         return np.array([[float(FIRST)]])
-
-    def draw(
-        self, pygame: Any, canvas: Any, state: FloatArray, action: int | None
-    ) -> None:
-        """The states as circles, the ways as lines; filled is where the ant is."""
-        size = canvas.get_width()
-        black, ant, way = (0, 0, 0), (213, 94, 0), (150, 150, 150)
-        places = [(int(x * size), size // 2) for x in (0.15, 0.5, 0.85)]
-        thin, thick = max(1, size // 240), max(3, size // 80)
-        canvas.fill((255, 255, 255))
-        taken = action is not None and int(state[0]) == AT_GOAL
-        pygame.draw.line(canvas, way, places[0], places[1], thin)
-        for u in range(len(self.costs)):
-            # Arcs between q' and the goal, side by side, the best way uppermost.
-            lift = (u - (len(self.costs) - 1) / 2) * 0.6 * size / len(self.costs)
-            points = [
-                (
-                    places[1][0] + share * (places[2][0] - places[1][0]),
-                    places[1][1] + lift * math.sin(math.pi * share),
-                )
-                for share in np.linspace(0, 1, 25)
-            ]
-            here = taken and u == action
-            pygame.draw.lines(
-                canvas, ant if here else way, False, points, thick if here else thin
-            )
-        for number, place in enumerate(places):
-            there = number == int(state[0])
-            pygame.draw.circle(canvas, (255, 255, 255), place, size // 16)
-            pygame.draw.circle(
-                canvas, ant if there else black, place, size // 16, 0 if there else thin
-            )

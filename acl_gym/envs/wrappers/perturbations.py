@@ -1,234 +1,240 @@
-"""What lies between a system and those who learn it: noise, hidden and rounded states.
+"""Perturbations between a system and its learners: noise, rounding, hidden variables.
 
-The environments stay as they are; these are ordinary vector wrappers around them. Their
-luck comes from the seed of `reset`, so that a run is a function of its seed.
+These are vector wrappers; the environments behind them stay as they are. Their random
+numbers come from the seed of `reset`, so that a run is a function of its seed.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Mapping, Sequence
+from typing import Any, TypeVar
 
 import numpy as np
 from gymnasium import spaces
-from gymnasium.vector import VectorEnv, VectorWrapper
+from gymnasium.vector import (
+    VectorActionWrapper,
+    VectorEnv,
+    VectorObservationWrapper,
+    VectorWrapper,
+)
 from gymnasium.vector.utils import batch_space
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from acl_gym.envs.control.environments import ControlVectorEnv
+from acl_gym.utils.typing import FloatArray, IntArray
+
+Element = TypeVar("Element", bound=np.generic)
+AnyVectorEnv = VectorEnv[Any, Any, Any]
 
 
 def perturbed(
-    env: ControlVectorEnv, perturbation: dict[str, Any]
+    env: ControlVectorEnv, perturbations: Mapping[str, Any]
 ) -> VectorEnv[Any, Any, Any]:
-    """Put wrappers around an environment.
+    """Wrap an environment in perturbations, in the order of the keys below.
 
     Args:
-        env: the system as it is.
-        perturbation: by name what there is of it: "slips", the probability that another
-            action than the chosen one is taken, drawn evenly from all; "noise", the
-            standard deviation of each variable's; "rounded", for each variable on how
-            many even values it is seen, 0: as it is; "hidden", variables that are not
-            seen.
+        env: the unperturbed environment.
+        perturbations: any of
+
+            - `"slips"`: the probability of `ActionNoise`;
+            - `"noise"`: the standard deviations of `ObservationNoise`;
+            - `"rounded"`: the counts of `RoundedObservation`;
+            - `"hidden"`: the variables of `HiddenVariables`.
+
+    Returns:
+        The wrapped environment; `env` itself if `perturbations` is empty.
 
     Raises:
-        ValueError: there is no perturbation of a name.
+        ValueError: a key is not one of these.
     """
-    unknown = set(perturbation) - {"slips", "noise", "rounded", "hidden"}
+    known = ("slips", "noise", "rounded", "hidden")
+    unknown = sorted(set(perturbations) - set(known), key=str)
     if unknown:
         raise ValueError(
-            "a perturbation must be made of slips, noise, rounded and hidden, got "
-            f"{sorted(unknown)[0]!r}."
+            f"perturbations must be among {list(known)}, got {unknown}; "
+            "check the spelling."
         )
-    found: VectorEnv[Any, Any, Any] = env
-    if "slips" in perturbation:
-        found = Slips(found, perturbation["slips"])
-    if "noise" in perturbation:
-        found = Noise(found, perturbation["noise"], env.system.circular)
-    if "rounded" in perturbation:
-        found = Rounded(found, perturbation["rounded"])
-    if "hidden" in perturbation:
-        found = Hidden(found, perturbation["hidden"])
-    return found
+    wrapped: AnyVectorEnv = env
+    if "slips" in perturbations:
+        wrapped = ActionNoise(wrapped, perturbations["slips"])
+    if "noise" in perturbations:
+        wrapped = ObservationNoise(wrapped, perturbations["noise"], env.system.circular)
+    if "rounded" in perturbations:
+        wrapped = RoundedObservation(wrapped, perturbations["rounded"])
+    if "hidden" in perturbations:
+        wrapped = HiddenVariables(wrapped, perturbations["hidden"])
+    return wrapped
 
 
-class _Lucky(VectorWrapper[Any, Any, Any, Any]):
-    """A wrapper that draws random numbers, begun anew whenever a seed comes."""
-
-    def __init__(self, env: VectorEnv[Any, Any, Any]) -> None:
-        super().__init__(env)
-        self._luck = np.random.default_rng()
-
-    def reset(
-        self,
-        *,
-        seed: int | None = None,
-        options: dict[str, Any] | None = None,
-    ) -> tuple[Any, dict[str, Any]]:
-        """Begin episodes."""
-        if seed is not None:
-            # Apart from the stream of the environment, which has the same seed.
-            self._luck = np.random.default_rng([seed, 1])
-        observation, infos = self.env.reset(seed=seed, options=options)
-        return self._seen(observation), infos
-
-    def step(self, actions: Any) -> Any:
-        """Take a step."""
-        observation, *rest = self.env.step(self._done(actions))
-        return self._seen(observation), *rest
-
-    def _seen(self, observation: Any) -> Any:
-        return observation
-
-    def _done(self, actions: Any) -> Any:
-        return actions
+def _generator(seed: int) -> np.random.Generator:
+    """A stream apart from that of the environment, which gets the same seed."""
+    return np.random.default_rng([seed, 1])
 
 
-class Slips(_Lucky):
-    """Now and then an action is replaced by one drawn evenly from all.
+class ActionNoise(VectorActionWrapper[Any, Any, Any, Any]):
+    """Replaces actions at random by one drawn uniformly from all of them.
+
+    Gymnasium has no such wrapper: its `StickyAction` repeats the previous action.
 
     Args:
         env: with discrete actions.
-        probability: of a draw, in each slot and step.
+        probability: of a replacement, for each slot and step, in [0, 1]. The draw may
+            give the chosen action again.
     """
 
-    def __init__(self, env: VectorEnv[Any, Any, Any], probability: float) -> None:
+    def __init__(self, env: AnyVectorEnv, probability: float) -> None:
         super().__init__(env)
         self.probability = probability
+        self._rng = np.random.default_rng()
 
-    def _done(self, actions: Any) -> Any:
-        draws = self._luck.random((2, self.num_envs))
-        count = int(self.single_action_space.n)  # type: ignore[attr-defined]
-        others = (draws[1] * count).astype(np.int64)
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Any, dict[str, Any]]:
+        """Start episodes; a seed also restarts the random numbers of this wrapper."""
+        if seed is not None:
+            self._rng = _generator(seed)
+        return super().reset(seed=seed, options=options)
+
+    def actions(self, actions: ArrayLike) -> IntArray:
+        """Return the actions that are carried out, `(num_envs,)`."""
+        space: Any = self.single_action_space
+        draws = self._rng.random((2, self.num_envs))
+        others = (draws[1] * int(space.n)).astype(np.int64)
         return np.where(draws[0] < self.probability, others, actions)
 
 
-class Noise(_Lucky):
-    """Normal noise on what is seen, kept within the bounds of the space.
+class ObservationNoise(VectorObservationWrapper[FloatArray, Any, Any, Any]):
+    """Adds normal noise to observations and keeps them within their space.
+
+    Gymnasium's `AddWhiteNoise` replaces pixels of single environments instead.
 
     Args:
         env: whose observations are a bounded box of one axis.
-        deviations: the standard deviation for each variable.
-        circular: variables that go round instead of ending at their bounds.
+        deviations: the standard deviation of each variable's noise, in its unit, >= 0.
+        circular: variables that are wrapped at their bounds, such as angles; the others
+            are clipped.
     """
 
     def __init__(
         self,
-        env: VectorEnv[Any, Any, Any],
+        env: AnyVectorEnv,
         deviations: Sequence[float],
         circular: Sequence[int] = (),
     ) -> None:
         super().__init__(env)
-        self._deviations = np.asarray(deviations, dtype=np.float64)
         space: Any = self.single_observation_space
         self._low, self._high = space.low, space.high
-        self._circular = list(circular)
+        self._deviations = np.asarray(deviations, dtype=np.float64)
+        self._circular = tuple(circular)
+        self._rng = np.random.default_rng()
 
-    def _seen(self, observation: Any) -> NDArray[np.float64]:
-        drawn = self._luck.standard_normal(observation.shape)
-        seen = np.asarray(observation + self._deviations * drawn)
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[FloatArray, dict[str, Any]]:
+        """Start episodes; a seed also restarts the random numbers of this wrapper."""
+        if seed is not None:
+            self._rng = _generator(seed)
+        return super().reset(seed=seed, options=options)
+
+    def observations(self, observations: FloatArray) -> FloatArray:
+        """Return noisy observations, `(num_envs, d)`."""
+        noise = self._rng.standard_normal(observations.shape)
+        noisy = np.asarray(observations + self._deviations * noise)
         for axis in self._circular:
             low, span = self._low[axis], self._high[axis] - self._low[axis]
-            seen[:, axis] = low + np.mod(seen[:, axis] - low, span)
-        return np.asarray(np.clip(seen, self._low, self._high))
+            noisy[:, axis] = low + np.mod(noisy[:, axis] - low, span)
+        return np.asarray(np.clip(noisy, self._low, self._high))
 
 
-class Rounded(VectorWrapper[Any, Any, Any, Any]):
-    """Variables are seen as the nearest of a few even values over their range.
+class RoundedObservation(VectorObservationWrapper[FloatArray, Any, Any, Any]):
+    """Rounds variables to the nearest of a few evenly spaced values.
+
+    Gymnasium's `DiscretizeObservation` returns numbers of bins of single environments;
+    here variables keep their units and the space stays as it is.
 
     Args:
         env: whose observations are a bounded box of one axis.
-        counts: how many values for each variable, 2 or more; 0: as it is.
+        counts: for each variable how many values it has, its bounds included, >= 2;
+            0 does not round it.
     """
 
-    def __init__(self, env: VectorEnv[Any, Any, Any], counts: Sequence[int]) -> None:
+    def __init__(self, env: AnyVectorEnv, counts: Sequence[int]) -> None:
         super().__init__(env)
         self._counts = tuple(counts)
 
-    def reset(self, **options: Any) -> tuple[Any, dict[str, Any]]:
-        """Begin episodes."""
-        observation, infos = self.env.reset(**options)
-        return self._seen(observation), infos
-
-    def step(self, actions: Any) -> Any:
-        """Take a step."""
-        observation, *rest = self.env.step(actions)
-        return self._seen(observation), *rest
-
-    def _seen(self, observation: Any) -> NDArray[np.float64]:
-        seen, space = np.array(observation), self.single_observation_space
+    def observations(self, observations: FloatArray) -> FloatArray:
+        """Return rounded observations, `(num_envs, d)`."""
+        space: Any = self.single_observation_space
+        rounded = np.array(observations)
         for axis, count in enumerate(self._counts):
             if count:
-                low, high = space.low[axis], space.high[axis]  # type: ignore[attr-defined]
-                place = np.rint((seen[:, axis] - low) / (high - low) * (count - 1))
-                seen[:, axis] = low + (high - low) * place / (count - 1)
-        return seen
+                low, high = space.low[axis], space.high[axis]
+                steps = np.rint((rounded[:, axis] - low) / (high - low) * (count - 1))
+                rounded[:, axis] = low + (high - low) * steps / (count - 1)
+        return rounded
 
 
-class Hidden(VectorWrapper[Any, Any, Any, Any]):
-    """Some variables are not seen.
+class HiddenVariables(VectorObservationWrapper[FloatArray, Any, Any, Any]):
+    """Leaves variables out of the observations.
+
+    A class instead of Gymnasium's `TransformObservation`, so that `thesis_partition`
+    can see which variables are left.
 
     Args:
         env: whose observations are a box of one axis.
-        variables: those that are not seen.
+        variables: which ones are hidden.
+
+    Attributes:
+        shown: the variables that are left, in order.
     """
 
-    def __init__(self, env: VectorEnv[Any, Any, Any], variables: Sequence[int]) -> None:
+    def __init__(self, env: AnyVectorEnv, variables: Sequence[int]) -> None:
         super().__init__(env)
         space: Any = env.single_observation_space
-        self._shown = [i for i in range(space.shape[0]) if i not in variables]
+        self.shown = tuple(i for i in range(space.shape[0]) if i not in variables)
+        shown = list(self.shown)
         self.single_observation_space = spaces.Box(
-            space.low[self._shown], space.high[self._shown], dtype=space.dtype
+            space.low[shown], space.high[shown], dtype=space.dtype
         )
         self.observation_space = batch_space(
             self.single_observation_space, self.num_envs
         )
 
-    def reset(self, **options: Any) -> tuple[Any, dict[str, Any]]:
-        """Begin episodes."""
-        observation, infos = self.env.reset(**options)
-        return observation[:, self._shown], infos
-
-    def step(self, actions: Any) -> Any:
-        """Take a step."""
-        observation, *rest = self.env.step(actions)
-        return observation[:, self._shown], *rest
+    def observations(self, observations: FloatArray) -> FloatArray:
+        """Return the variables that are shown, `(num_envs, len(shown))`."""
+        return observations[:, list(self.shown)]
 
 
 class ReversedSlots(VectorWrapper[Any, Any, Any, Any]):
     """The slots of an environment in reverse order.
 
-    With `ReversedLuck` in the agent, each ant meets the same luck as in the order as it
-    is: only the order changes in which what they learn is merged.
+    With `ReversedLuck` in the agent, each ant draws the same random numbers as in the
+    original order: only the order changes in which the ants' experience is merged.
 
     Args:
-        env: with native slots, whose infos nobody reads.
+        env: a native vector environment. Its infos are passed on in the original order.
     """
 
-    def reset(self, **options: Any) -> tuple[Any, dict[str, Any]]:
-        """Begin episodes; states, where given, are in reverse order too."""
-        given = options.get("options") or {}
-        if "state" in given:
-            options["options"] = {**given, "state": np.asarray(given["state"])[::-1]}
-        observation, infos = self.env.reset(**options)
-        return _flipped(observation), infos
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Any, dict[str, Any]]:
+        """Start episodes; `options["state"]`, if given, is in reverse order too."""
+        if options is not None and "state" in options:
+            options = {**options, "state": np.asarray(options["state"])[::-1]}
+        observations, infos = self.env.reset(seed=seed, options=options)
+        return _reversed(observations), infos
 
-    def step(self, actions: Any) -> Any:
-        """Take a step."""
-        observation, reward, terminated, truncated, infos = self.env.step(
-            _flipped(actions)
-        )
-        return (
-            _flipped(observation),
-            _flipped(reward),
-            _flipped(terminated),
-            _flipped(truncated),
-            infos,
-        )
+    def step(self, actions: ArrayLike) -> tuple[Any, Any, Any, Any, dict[str, Any]]:
+        """Apply one action to each slot."""
+        *results, infos = self.env.step(_reversed(np.asarray(actions)))
+        observations, rewards, terminated, truncated = map(_reversed, results)
+        return observations, rewards, terminated, truncated, infos
 
 
 class ReversedLuck:
-    """A generator whose random numbers come in reverse order along their last axis.
+    """A generator whose random numbers are in reverse order along their last axis.
+
+    It has the two methods of `numpy.random.Generator` that an agent uses.
 
     Args:
         rng: the generator.
@@ -237,15 +243,14 @@ class ReversedLuck:
     def __init__(self, rng: np.random.Generator) -> None:
         self._rng = rng
 
-    def random(self, size: Any) -> NDArray[np.float64]:
-        """Uniform numbers."""
+    def random(self, size: int | tuple[int, ...]) -> FloatArray:
+        """Uniform numbers from [0, 1) of the shape `size`."""
         return np.ascontiguousarray(self._rng.random(size)[..., ::-1])
 
     def integers(self, high: int) -> int:
-        """One integer, as it is."""
+        """One integer from [0, `high`), the same as that of the generator."""
         return int(self._rng.integers(high))
 
 
-def _flipped(slots: Any) -> Any:
-    """Slots, the first axis, in reverse order."""
-    return np.ascontiguousarray(np.asarray(slots)[::-1])
+def _reversed(slots: NDArray[Element]) -> NDArray[Element]:
+    return np.ascontiguousarray(slots[::-1])

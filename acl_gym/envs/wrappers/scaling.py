@@ -1,4 +1,4 @@
-"""Observations as a neural network likes them, for single and vector environments."""
+"""Observations scaled for neural networks, in single and vector environments."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ class Scaling:
 
     A circular variable x becomes two features, (cos a, sin a) with
     a = 2 pi (x - low) / (high - low), so that its two ends meet. Any other variable
-    becomes one, its place between its bounds, -1 at the low and 1 at the high one.
+    becomes one, its position between its bounds, -1 at the low and 1 at the high one.
     Features come in the order of the variables.
 
     Args:
         space: a bounded `Box` of one axis.
-        circular: the variables whose high end is their low end, such as angles.
+        circular: the variables that wrap around, such as angles.
 
     Attributes:
         space: the `Box` of the features, float32.
@@ -82,7 +82,7 @@ class ScaledObservation(
 
     Args:
         env: an environment whose observations are a bounded `Box` of one axis.
-        circular: the variables whose high end is their low end, such as angles.
+        circular: the variables that wrap around, such as angles.
 
     Raises:
         ValueError: the observation space is not such a box, or `circular` does not
@@ -117,7 +117,7 @@ class ScaledVectorObservation(
     Args:
         env: a vector environment whose single observations are a bounded `Box` of
             one axis, and which does not reset slots in the step that ends them.
-        circular: the variables whose high end is their low end, such as angles.
+        circular: the variables that wrap around, such as angles.
 
     Raises:
         TypeError: `env` is not a vector environment.

@@ -1,4 +1,4 @@
-"""Single environments as slots of a vector in which those that have finished wait."""
+"""Single environments as slots of a vector environment whose finished slots wait."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from acl_gym.utils import validation
 class WaitingVectorEnv(SyncVectorEnv):
     """A `SyncVectorEnv` that steps only the slots whose episodes go on.
 
-    Ants wait for the last of them. A `SyncVectorEnv` goes on stepping, and resetting,
-    the slots of those that have finished; where episodes differ much in length that
-    is most of its work. Here a finished slot stands still until it is reset: its
-    observation stays as it is, its reward is 0 and both its flags are False. What an
-    agent learns is the same in either.
+    In a trial, ants wait until the last of them has finished. Meanwhile a
+    `SyncVectorEnv` goes on stepping and resetting finished slots; where episodes differ
+    much in length, this is most of its work. Here a finished slot stands still until it
+    is reset: its observation stays as it is, its reward is 0 and both its flags are
+    False. An agent learns the same with either.
 
     Args:
         env_fns: functions that make the environments, one for each slot; their
@@ -62,7 +62,7 @@ class WaitingVectorEnv(SyncVectorEnv):
         seed: int | list[int | None] | None = None,
         options: dict[str, Any] | None = None,
     ) -> tuple[NDArray[Any], dict[str, Any]]:
-        """Begin episodes in all slots, or in those of `options["reset_mask"]`."""
+        """Start episodes in all slots, or in those of `options["reset_mask"]`."""
         mask = None if options is None else options.get("reset_mask")
         observation, infos = super().reset(seed=seed, options=options)
         if mask is None:
@@ -70,7 +70,7 @@ class WaitingVectorEnv(SyncVectorEnv):
             self._shown = np.array(observation)
         else:
             self._finished[mask] = False
-            # Of the other slots, the base class knows only how they began.
+            # The base class returns the first observations of the other slots.
             self._shown[mask] = np.asarray(observation)[mask]
         return self._shown.copy(), infos
 

@@ -162,7 +162,7 @@ def test_next_step_ignores_the_action_of_a_restart(case: SystemCase) -> None:
     assert np.any(observations[0] != last[0])
 
 
-def test_same_step_tells_how_the_episode_ended(case: SystemCase) -> None:
+def test_same_step_reports_how_the_episode_ended(case: SystemCase) -> None:
     env = native_env(case, "SameStep", num_envs=3, **case.narrow)
     states = case.rows(case.away, case.near, case.away)
     env.reset(seed=3, options={"state": states})

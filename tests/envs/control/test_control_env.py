@@ -13,7 +13,7 @@ from gymnasium.utils.env_checker import check_env
 from gymnasium.wrappers import TimeLimit
 
 from acl_gym.envs import ENVIRONMENTS, register_environments
-from acl_gym.envs.control.environments import ControlEnv
+from acl_gym.envs.control.single import ControlEnv
 from acl_gym.envs.pendulum import PendulumEnv
 from tests.envs.systems import LASTING, SYSTEMS, SystemCase, by_id
 from tests.envs.vector_helpers import assert_same_bits, beside_masks

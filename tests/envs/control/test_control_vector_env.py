@@ -285,7 +285,7 @@ def test_slots_step_alike_however_many_are_idle(
     options = {"finished": "wait"}
     seen = []
     for most in (0.0, 1.0):  # idle slots are put back, and left out
-        monkeypatch.setattr(stepping, "MOST", most)
+        monkeypatch.setattr(stepping, "RESTORE_ABOVE", most)
         env = case.vector(9, autoreset_mode=mode, max_episode_steps=30, **case.easy)
         first = env.reset(seed=3, options=options)
         seen.append([first, *walk(env, 60, 4)])
@@ -353,7 +353,7 @@ def test_counting_kernels_run_the_same_without_the_compiler() -> None:
         (np.array([0, 200, 0], np.uint8), 1, "200"),
     ],
 )
-def test_the_first_action_out_of_range_is_named(
+def test_the_first_action_out_of_range_is_reported(
     actions: Any, slot: int, shown: str
 ) -> None:
     with pytest.raises(ValueError, match=rf"0\.\.2, got {shown} in slot {slot}\."):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import subprocess
 import sys
 
 import gymnasium as gym
@@ -125,3 +126,26 @@ def test_without_pygame_the_error_says_what_to_install(case, monkeypatch) -> Non
 def test_a_system_without_cells_draws_no_table(kind) -> None:
     with pytest.raises(ValueError, match=r"GridSearch1D.*not Pendulum"):
         kind(render_mode="rgb_array").show_table(np.ones((4, 3)))
+
+
+def test_an_environment_without_a_painter_cannot_be_drawn() -> None:
+    class Bare(PendulumEnv):
+        painter = None
+
+    env = Bare(render_mode="rgb_array")
+    env.reset(seed=0)
+    with pytest.raises(NotImplementedError, match="Pendulum cannot be drawn"):
+        env.render()
+
+
+def test_environments_import_painters_only_to_draw() -> None:
+    program = """
+import sys, gymnasium as gym, acl_gym
+for name in ("Pendulum", "Navigation", "GridSearch1D", "GridSearch2D", "TwoState"):
+    gym.make_vec(f"acl_gym/{name}-v0", 2).reset(seed=0)
+print([name for name in sys.modules if "painter" in name or "pygame" in name])
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, check=True
+    )
+    assert done.stdout.strip() == "[]"

@@ -6,7 +6,7 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from acl_gym.envs.control.environments import ControlEnv
+from acl_gym.envs.control.single import ControlEnv
 from acl_gym.envs.grid_search import (
     GridSearch1DEnv,
     GridSearch2DEnv,

@@ -19,8 +19,8 @@ from acl_gym.envs.grid_search import (
     GridSearch2D,
     GridSearch2DEnv,
     GridSearch2DVectorEnv,
+    kernels,
 )
-from acl_gym.envs.grid_search import system as grids
 from acl_gym.envs.grid_search.maps import MAPS
 from acl_gym.envs.grid_search.system import GridSearch
 from tests.envs.grid_search import reference_grid as reference
@@ -197,8 +197,8 @@ def test_kernels_run_the_same_without_the_compiler() -> None:
     states, actions = rng.integers(0, system.n_states, 60), rng.integers(0, 4, 60)
     uniforms = rng.random(60)
     for kernel, chance in (
-        (grids._move, ()),
-        (grids._move_or_fail, (uniforms, 0.5)),
+        (kernels.move, ()),
+        (kernels.move_or_fail, (uniforms, 0.5)),
     ):
         results = []
         for run in (kernel, kernel.py_func):

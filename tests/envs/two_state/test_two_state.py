@@ -1,4 +1,4 @@
-"""The system of Figure 3.2: every walk is known by heart."""
+"""The system of Figure 3.2, whose few walks are all known."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 
 from acl_gym import ACL, evaluate_policy_cost
-from acl_gym.envs.two_state import TwoState, TwoStateVectorEnv
+from acl_gym.envs.two_state import TwoState, TwoStateVectorEnv, kernels
 
 ENV_ID = "acl_gym/TwoState-v0"
 
@@ -32,7 +32,7 @@ def test_two_steps_lead_to_the_goal(action: int) -> None:
     assert (seen, reward, terminated, truncated) == (2, -[1, 2, 4][action], True, False)
 
 
-def test_slots_are_the_single_environment_many_times() -> None:
+def test_each_slot_is_like_the_single_environment() -> None:
     env = gym.make_vec(ENV_ID, num_envs=4, costs=(0.5, 0.7, 9.0))
     env.reset(options={"state": [0, 1, 1, 2], "finished": "wait"})
     seen, rewards, terminated, _, _ = env.step(np.array([2, 2, 1, 1]))
@@ -41,16 +41,27 @@ def test_slots_are_the_single_environment_many_times() -> None:
     assert terminated.tolist() == [False, True, True, True]
 
 
+def test_the_kernel_runs_the_same_without_the_compiler() -> None:
+    states = np.array([0.0, 1.0, 1.0, 2.0])
+    actions, costs = np.array([2, 0, 2, 1]), np.array([0.5, 0.7, 9.0])
+    results = []
+    for run in (kernels.advance, kernels.advance.py_func):
+        arrays = states.copy(), np.empty(4), np.empty(4, dtype=np.bool_)
+        run(arrays[0], actions, costs, *arrays[1:])
+        results.append(b"".join(array.tobytes() for array in arrays))
+    assert results[0] == results[1]
+
+
 @pytest.mark.parametrize(
     "costs", [(1.0,), (1.0, 1.0), (2.0, 1.0), (0.0, 1.0), (1.0, np.inf), "12", ()]
 )
-def test_costs_that_cannot_be(costs: Any) -> None:
+def test_invalid_costs_are_refused(costs: Any) -> None:
     with pytest.raises(ValueError, match="costs must be"):
         TwoState(costs=costs)
 
 
 @pytest.mark.parametrize("state", [3, -1, 0.5, np.nan, [[0]], "0"])
-def test_states_that_cannot_be(state: Any) -> None:
+def test_invalid_states_are_refused(state: Any) -> None:
     env = gym.make(ENV_ID)
     with pytest.raises(ValueError, match="state"):
         env.reset(options={"state": state})

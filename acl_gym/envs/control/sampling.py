@@ -1,0 +1,47 @@
+"""Points of a state space: random ones without the goal, and evenly spread ones."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from acl_gym.utils.typing import BoolArray, FloatArray
+
+
+def sample_outside(
+    draw: Callable[[int], FloatArray],
+    inside: Callable[[FloatArray], BoolArray],
+    count: int,
+) -> FloatArray:
+    """Draw states, each one again until it lies outside a region.
+
+    Args:
+        draw: returns so many random states, `(state_size, m)`.
+        inside: whether each of `(state_size, m)` states lies in the region, `(m,)`.
+        count: how many states, >= 0.
+
+    Returns:
+        Array of shape `(state_size, count)`.
+    """
+    states = draw(count)
+    while (again := np.flatnonzero(inside(states))).size:
+        states[:, again] = draw(again.size)
+    return states
+
+
+def halton_points(count: int) -> FloatArray:
+    """The points 1 to `count` of Halton's sequence in four dimensions, `(count, 4)`.
+
+    Coordinate j of point i consists of the digits of i in the j-th prime base, in
+    reverse order behind the point. They fill [0, 1)^4 evenly, without randomness.
+    SciPy has the sequence too, but its import takes longer than all of this package.
+    """
+    points = np.zeros((count, 4))
+    for column, base in enumerate((2, 3, 5, 7)):
+        rest, share = np.arange(1, count + 1), 1.0
+        while rest.any():
+            share /= base
+            points[:, column] += share * (rest % base)
+            rest = rest // base
+    return points

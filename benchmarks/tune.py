@@ -1,56 +1,65 @@
 """Search for the settings of every method, alike: what the comparison `versus` runs with.
 
-In each arena (a system as it is, or made harder) each method gets the same number of
+On each task (a system as it is, or made harder) each method gets the same number of
 evaluations by Optuna's TPE sampler, the first of them its defaults. An evaluation is one
 run for each tuning seed; its value is the mean cost of the last policies, so that a policy
-that fails counts as what it costs. The whole search is kept, one JSON file for each arena
-and method, after every evaluation: a search that was stopped goes on where it was, and
+that fails counts as what it costs. The search is logged after every evaluation, in one
+JSON file for each task and method: a search that was stopped goes on where it was, and
 ends as if it had not been stopped. One process, one thread; needs Optuna (extra `dev`).
 
 examples:
   python benchmarks/tune.py                        everything, an hour or so
-  python benchmarks/tune.py --only pendulum-acl    one method in one arena
-  python benchmarks/tune.py --only grid            every method in one arena
+  python benchmarks/tune.py --only pendulum-acl    one method on one task
+  python benchmarks/tune.py --only grid            every method on one task
   python benchmarks/tune.py --table                what was found, as Markdown
+  python benchmarks/tune.py --write                the comparison takes what was found
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 
 from tqdm import tqdm
 
-from acl_gym.reproduction.versus.arenas import ARENAS, LABELS
-from acl_gym.reproduction.versus.spaces import METHODS
-from acl_gym.reproduction.versus.tuned import (
-    FOLDER,
-    best_of,
-    methods_in,
-    path_of,
-    read_search,
-)
-from acl_gym.reproduction.versus.tuning import EVALUATIONS, SEEDS, search
+try:
+    from acl_gym.experiments.comparison.tuning import (
+        EVALUATIONS,
+        PAIRS,
+        best_of,
+        found_in,
+        open_log,
+        path_of,
+        search,
+    )
+except ModuleNotFoundError as error:
+    sys.exit(
+        f"tune.py needs a module that is not installed ({error.name}); "
+        "pip install 'acl-gym[dev]'."
+    )
+from acl_gym.experiments.comparison.tasks import METHODS, SETTINGS_FILE, TASKS
+from acl_gym.utils.files import write_atomically
 
-PAIRS = [(name, method) for name in ARENAS for method in methods_in(ARENAS[name])]
+FOLDER = Path(__file__).with_name("tuning")
 
 
 def chosen(names: Sequence[str] | None) -> list[tuple[str, str]]:
-    """The pairs of arena and method that names stand for.
+    """The pairs of task and method that names stand for.
 
     Raises:
         ValueError: a name stands for none.
     """
     if names is None:
         return PAIRS
-    known = {*ARENAS, *(f"{name}-{method}" for name, method in PAIRS)}
+    known = {*TASKS, *(f"{name}-{method}" for name, method in PAIRS)}
     for each in names:
         if each not in known:
             raise ValueError(
-                f"--only must be arenas or arena-method, got {each!r}; arenas are "
-                f"{', '.join(ARENAS)}, methods {', '.join(METHODS)}."
+                f"--only must be tasks or task-method, got {each!r}; tasks are "
+                f"{', '.join(TASKS)}, methods {', '.join(METHODS)}."
             )
     wanted = set(names)
     return [
@@ -63,21 +72,21 @@ def chosen(names: Sequence[str] | None) -> list[tuple[str, str]]:
 def table(pairs: Sequence[tuple[str, str]], folder: Path) -> str:
     """What was found, as Markdown."""
     lines = [
-        "| arena | method | defaults | best | best settings | seconds |",
+        "| task | method | defaults | best | best settings | seconds |",
         "| --- | --- | --- | --- | --- | --- |",
     ]
     for name, method in pairs:
         if not path_of(name, method, folder).is_file():
             continue
-        found = read_search(name, method, folder)
-        best, first = best_of(found), found["evaluations"][0]
+        log = open_log(name, method, folder)
+        best, first = best_of(log), log["evaluations"][0]
         settings = ", ".join(
             f"{key} {value:.3g}" if isinstance(value, float) else f"{key} {value}"
             for key, value in best["parameters"].items()
         )
-        seconds = sum(each["seconds_in_all"] for each in found["evaluations"])
+        seconds = sum(each["seconds_in_all"] for each in log["evaluations"])
         lines.append(
-            f"| {LABELS[name]} | {METHODS[method]} | {first['value']:.4g} "
+            f"| {TASKS[name].label} | {METHODS[method].label} | {first['value']:.4g} "
             f"| {best['value']:.4g} | {settings} | {seconds:.0f} |"
         )
     return "\n".join(lines)
@@ -91,7 +100,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "--only",
         nargs="+",
         metavar="NAME",
-        help=f"arenas, or arena-method; arenas: {', '.join(ARENAS)}",
+        help=f"tasks, or task-method; tasks: {', '.join(TASKS)}",
     )
     parser.add_argument(
         "--evaluations",
@@ -105,10 +114,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
         type=Path,
         default=FOLDER,
         metavar="DIR",
-        help="where the files are (default: those that the comparison reads)",
+        help=f"where the logs are (default {FOLDER.name}, beside this script)",
     )
     parser.add_argument(
         "--table", action="store_true", help="print what was found, and search nothing"
+    )
+    parser.add_argument(
+        "--write",
+        action="store_true",
+        help=f"write the best settings of all logs to {SETTINGS_FILE.name} of the package, "
+        "from which the comparison reads them, and search nothing",
     )
     options = parser.parse_args(arguments)
     try:
@@ -117,24 +132,28 @@ def main(arguments: Sequence[str] | None = None) -> int:
         parser.error(str(error))
     if options.evaluations < 1:
         parser.error(f"--evaluations must be at least 1, got {options.evaluations}.")
-    if not options.table:
-        total = len(pairs) * options.evaluations
-        with tqdm(total=total, unit="evaluation", smoothing=0.05) as bar:
-            for name, method in pairs:
-                bar.set_description(f"{name}-{method}")
-                try:
+    try:
+        if options.write:
+            text = json.dumps(found_in(options.out), indent=1)
+            write_atomically(SETTINGS_FILE, f"{text}\n".encode())
+            print(f"Written: {SETTINGS_FILE}")
+            return 0
+        if not options.table:
+            total = len(pairs) * options.evaluations
+            with tqdm(total=total, unit="evaluation", smoothing=0.05) as bar:
+                for name, method in pairs:
+                    bar.set_description(f"{name}-{method}")
                     search(
                         name,
                         method,
                         options.out,
                         evaluations=options.evaluations,
-                        seeds=SEEDS,
-                        tell=bar.update,
+                        after_each=bar.update,
                     )
-                except (ValueError, ModuleNotFoundError) as error:
-                    print(f"tune.py: {error}", file=sys.stderr)
-                    return 1
-    print(table(pairs, options.out))
+        print(table(pairs, options.out))
+    except ValueError as error:
+        print(f"tune.py: {error}", file=sys.stderr)
+        return 1
     return 0
 
 

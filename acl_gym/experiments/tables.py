@@ -339,7 +339,7 @@ def _cell(key: str, entry: dict[str, Any]) -> str:
     text = number(key, found["median"])
     if found["median"] is None and reached:
         text = "–"
-    if key.endswith("_cost") and found["low"] is not None:
+    if key.endswith("cost") and found["low"] is not None:
         text += f"\n{number(key, found['low'])}–{number(key, found['high'])}"
     return f"{text}\n{reached} of {seeds}" if 0 < reached < seeds else text
 
@@ -355,7 +355,7 @@ def number(key: str, value: float | None) -> str:
         return f"{rounded / 1e3:.3g}k" if rounded >= 1e3 else f"{rounded:,.0f}"
     if key.startswith("seconds"):
         return f"{value:.0f}" if value >= 9.95 else f"{value:#.2g}"
-    if key.endswith("_cost"):
+    if key.endswith("cost"):
         return f"{value:.2f}" if abs(value) < 19.995 else f"{value:.1f}"
     if key.endswith("success_rate"):
         return f"{100 * value:.3g}%"  # 100% is all, 99.6% is not

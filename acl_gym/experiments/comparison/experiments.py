@@ -119,7 +119,7 @@ def _of_rows(
         plots=("sweep" if "x" in options else "strips",),
         table=table,
         text=text,
-        options={"rows": rows, "names": LABELS, **options},
+        options={"rows": rows, **options},
     )
 
 

@@ -104,6 +104,11 @@ class System:
         return self.colony.task.env_id
 
     @property
+    def short_name(self) -> str:
+        """The environment in the names of files."""
+        return self.colony.task.short_name
+
+    @property
     def max_steps(self) -> int:
         """T, the longest episode."""
         return int(self.colony.settings["max_steps"])

@@ -11,8 +11,13 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from acl_gym import ACL, WaitingVectorEnv, automatic_partition, evaluate_policy_cost
-from acl_gym import PolicyEvaluation
+from acl_gym import (
+    ACL,
+    PolicyEvaluation,
+    WaitingVectorEnv,
+    automatic_partition,
+    evaluate_policy_cost,
+)
 from acl_gym.colony.deposits import Rank
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -188,6 +188,12 @@ def best_of(log: Log) -> dict[str, Any]:
     every setting finds the optimum, the soonest.
     """
     evaluations: list[dict[str, Any]] = log["evaluations"]
+    if not evaluations:
+        name = f"{log['task']}-{log['method']}"
+        raise ValueError(
+            f"the search of {name} must have an evaluation, got none; "
+            f"`python benchmarks/tune.py --only {name}` makes them."
+        )
     # Sums over the same states in another order of slots may differ in their last bits.
     return min(
         evaluations, key=lambda each: (round(each["value"], 9), each["on_the_way"])

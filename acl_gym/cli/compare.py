@@ -141,7 +141,7 @@ def compare(
     _check_choice("--env", env, list(BY_ENV_ID))
     system = BY_ENV_ID[env]
     if out is None:
-        name = "" if env == default else f"-{system.short_name}"
+        name = "" if env == default else f"-{system.colony.task.short_name}"
         out = Path(f"results/compare{name}")
     names = list(system.agents)
     if agents is not None:

@@ -163,7 +163,7 @@ def _times(
 
 def _time(at: FloatArray, x: str) -> str:
     """The interquartile mean of times, and how many runs got there."""
-    count, middle = int(np.isfinite(at).sum()), estimate(at).value
+    count, middle = int(np.isfinite(at).sum()), float(iqm(at))
     text = NEVER
     if math.isfinite(middle):
         text = f"{float(f'{middle:.3g}'):,.0f}" if x == "env_steps" else f"{middle:.2g}"
@@ -221,7 +221,7 @@ def slots(experiment: Experiment, results: Results) -> Table:
     line = [f"{most} over the best number"]
     for method in table[most]:
         costs = {label: results.last(row[method]) for label, row in table.items()}
-        best = min(costs, key=lambda label: estimate(costs[label]).value)
+        best = min(costs, key=lambda label: float(iqm(costs[label])))
         line.append(f"{ratio(costs[most], costs[best])} times that of {best}")
     line += [""] * (len(found.headings) - len(line))
     return replace(found, rows=[*found.rows, line])

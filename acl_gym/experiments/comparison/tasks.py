@@ -104,11 +104,6 @@ class System:
         return self.colony.task.env_id
 
     @property
-    def short_name(self) -> str:
-        """The environment in the names of files."""
-        return self.colony.task.short_name
-
-    @property
     def max_steps(self) -> int:
         """T, the longest episode."""
         return int(self.colony.settings["max_steps"])
@@ -140,13 +135,8 @@ class System:
         _, method, kind = self.agents[one_of("agent", name, tuple(self.agents))]
         budget, task = self.budgets[preset], Task(env_id=self.env_id)
         if method == "dqn":
-            return Study(
-                task=task,
-                method="dqn",
-                settings=self.settings_of("dqn", budget.length),
-                steps=budget.dqn_steps,
-                evaluate_every=budget.evaluate_every,
-            )
+            settings = self.settings_of("dqn", budget.length)
+            return _dqn(task, settings, budget.dqn_steps, budget.evaluate_every)
         return replace(
             self.colony,
             task=task,
@@ -164,6 +154,12 @@ class System:
         """Dynamic programming on some cells."""
         task = Task(env_id=self.env_id)
         return Study(task=task, method="planning", cells=cells, most_runs=1)
+
+
+def _dqn(task: Task, settings: dict[str, Any], steps: int, every: int) -> Study:
+    return Study(
+        task=task, method="dqn", settings=settings, steps=steps, evaluate_every=every
+    )
 
 
 def _both_ways(*distances: float) -> list[float]:
@@ -330,14 +326,7 @@ class TunedTask:
         if method == "dqn":
             if "learning_rate" in settings:
                 settings["final_learning_rate"] = settings["learning_rate"]
-            return Study(
-                task=self.task,
-                method="dqn",
-                settings=settings,
-                steps=self.dqn_steps,
-                evaluate_every=self.evaluate_every,
-                most_runs=most_runs,
-            )
+            return _dqn(self.task, settings, self.dqn_steps, self.evaluate_every)
         return Study(
             task=self.task,
             method=METHODS[method].key,
@@ -347,7 +336,6 @@ class TunedTask:
             cells=self.cells or self.system.colony.cells,
             steps=self.steps,
             spacing=self.spacing,
-            most_runs=most_runs,
         )
 
 
@@ -425,4 +413,5 @@ def tuned(name: str, method: str, most_runs: int | None = None) -> Study:
         method: one of the methods of the task.
         most_runs: see `Study`.
     """
-    return TASKS[name].study(method, tuned_settings()[name][method], most_runs)
+    study = TASKS[name].study(method, tuned_settings()[name][method])
+    return replace(study, most_runs=most_runs)

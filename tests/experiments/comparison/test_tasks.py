@@ -21,13 +21,13 @@ from acl_gym.experiments.comparison.tasks import (
     tuned,
     tuned_settings,
 )
-from acl_gym.experiments.comparison.tuning import PAIRS
 from acl_gym.experiments.episode_costs import EPISODE_COSTS, Peak, Switches
 from acl_gym.experiments.methods import make_agent, run
 from acl_gym.experiments.study import Study
 from acl_gym.partitions import Crisp, Discrete, Fuzzy
 
 BY_NAME = {experiment.name: experiment for experiment in EXPERIMENTS}
+PAIRS = [(name, method) for name, task in TASKS.items() for method in task.methods]
 AGENTS = [(name, agent) for name, system in SYSTEMS.items() for agent in system.agents]
 
 

@@ -3,24 +3,22 @@
 from __future__ import annotations
 
 import json
+import runpy
 import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import pandas as pd
 import pytest
 
-tuning = pytest.importorskip("acl_gym.experiments.comparison.tuning")
+from acl_gym.experiments.comparison.tasks import SETTINGS_FILE, TASKS, tuned
 
-from acl_gym.experiments.comparison.tasks import (  # noqa: E402
-    SETTINGS_FILE,
-    TASKS,
-    tuned,
-)
-
+pytest.importorskip("optuna")
 SCRIPT = Path(__file__).resolve().parents[3] / "benchmarks" / "tune.py"
-FOLDER = SCRIPT.with_name("tuning")
+tuning = SimpleNamespace(**runpy.run_path(str(SCRIPT)))
+FOLDER = tuning.FOLDER
 
 
 @pytest.mark.parametrize(("name", "method"), tuning.PAIRS)

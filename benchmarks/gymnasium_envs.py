@@ -14,7 +14,7 @@ import json
 import statistics
 import warnings
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -27,11 +27,10 @@ from acl_gym import ACL, Crisp, Fuzzy, PolicyEvaluation, QLearning, WaitingVecto
 from acl_gym.agents.acl import PheromoneBoundWarning
 from acl_gym.colony.episodes import Episode
 from acl_gym.evaluation import Predictor, evaluate_policy_cost
-from acl_gym.experiments.runner import Task, run_tasks
+from acl_gym.experiments.provenance import circumstances, code_of_runs, hashed, versions
 from acl_gym.partitions.automatic import automatic_partition
 from acl_gym.utils.files import write_atomically
 
-Report = Callable[[float], None]
 Run = dict[str, Any]
 
 METHODS = {"acl": "ACL", "q-learning": "Q-learning", "dqn": "DQN"}
@@ -85,7 +84,16 @@ def follow(
     }
 
 
-def run(name: str, method: str, candidate: Candidate, seed: int, report: Report) -> Run:
+@dataclass(frozen=True)
+class Task:
+    """One run: its file's name, the arguments of `run`, and what identifies it."""
+
+    name: str
+    arguments: tuple[Any, ...]
+    settings: dict[str, Any]
+
+
+def run(name: str, method: str, candidate: Candidate, seed: int) -> Run:
     """Train once and follow the final and the best policy."""
     warnings.simplefilter("ignore", PheromoneBoundWarning)
     environment, settings = ENVIRONMENTS[name], dict(candidate)
@@ -93,7 +101,7 @@ def run(name: str, method: str, candidate: Candidate, seed: int, report: Report)
         episodes = settings.pop("episodes")
         environment = replace(environment, episodes=episodes, choosing=episodes)
     train = train_dqn if method == "dqn" else train_tabular
-    result = train(environment, method, settings, seed, report)
+    result = train(environment, method, settings, seed)
     return {"env": name, "method": method, "seed": seed, **result}
 
 
@@ -102,7 +110,6 @@ def train_tabular(
     method: str,
     settings: Candidate,
     seed: int,
-    report: Report,
 ) -> Run:
     """ACL or Q-learning; Numba has compiled before the clock starts."""
     slots, trials, every, kind, cells, bounds, angles = (
@@ -131,10 +138,7 @@ def train_tabular(
         max_steps=time_limit(environment),
         seed=CHOOSING_SEED,
     )
-    agent.learn(
-        trials=trials,
-        callback=[watch, lambda agent, row: report(row["trial"] / trials)],
-    )
+    agent.learn(trials=trials, callback=watch)
     rows = [row for row in agent.history if "policy_cost" in row]
     return outcome(agent.policy, watch.best_policy, rows, environment, angles)
 
@@ -144,12 +148,10 @@ def train_dqn(
     method: str,
     settings: Candidate,
     seed: int,
-    report: Report,
 ) -> Run:
     """DQN of Stable-Baselines3; discrete observations become one-hot there."""
     import torch
     from stable_baselines3 import DQN
-    from stable_baselines3.common.callbacks import ConvertCallback
 
     from acl_gym.sb3.adapter import VectorEnvAdapter
     from acl_gym.sb3.callback import PolicyCostCallback
@@ -175,12 +177,7 @@ def train_dqn(
         max_steps=time_limit(environment),
         seed=CHOOSING_SEED,
     )
-
-    def tell(local: dict[str, Any], _: dict[str, Any]) -> bool:
-        report(min(local["self"].num_timesteps / steps, 1.0))
-        return True
-
-    model.learn(steps, callback=[watch, ConvertCallback(tell)])
+    model.learn(steps, callback=watch)
     final = follow(model, environment)
     watch.restore_best()
     result = outcome(model, model, watch.history, environment)
@@ -218,7 +215,7 @@ def highest_point(episode: Episode) -> float:
 
 
 COSTS: dict[str, Callable[[Episode], float]] = {"highest_point": highest_point}
-"""Costs of whole solutions that candidates name."""
+"""Costs of whole episodes that candidates name."""
 
 
 SMOKE: dict[str, Candidate] = {
@@ -252,7 +249,6 @@ def list_tasks(
                 tasks += [
                     Task(
                         f"{name}-{method}-{number}-{seed}",
-                        run,
                         (name, method, candidate, seed),
                         {"number": number, "settings": shown},
                     )
@@ -263,6 +259,23 @@ def list_tasks(
 
 def _shown(value: Any) -> Any:
     return value if isinstance(value, (int, float, str, bool)) else repr(value)
+
+
+def run_tasks(tasks: Sequence[Task], directory: Path) -> list[tuple[Task, Run]]:
+    """The result of each task; those that are not there are made and kept."""
+    directory.mkdir(parents=True, exist_ok=True)
+    done = []
+    for task in tasks:
+        path = directory / f"{task.name}.json"
+        key = hashed([task.settings, code_of_runs(), versions()])
+        stored = json.loads(path.read_text()) if path.exists() else {}
+        if stored.get("key") != key:
+            result = {**run(*task.arguments), "made": circumstances(1)}
+            stored = {"key": key, "settings": task.settings, "result": result}
+            write_atomically(path, json.dumps(stored).encode())
+        print(f"done: {task.name}", flush=True)
+        done.append((task, stored["result"]))
+    return done
 
 
 def kept_runs(tasks: Sequence[Task], directory: Path) -> list[tuple[Task, Run]]:
@@ -338,11 +351,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         seeds = {"smoke": [0], "search": [100], "full": [0, 1, 2]}[options.preset]
     tasks = list_tasks(options.env, options.agents, seeds, options.preset)
     folder = options.out / "runs"
-    if options.table_only:
-        done = kept_runs(tasks, folder)
-    else:
-        results = run_tasks(tasks, folder, workers=1, progress=_tell)
-        done = list(zip(tasks, results, strict=True))
+    done = (kept_runs if options.table_only else run_tasks)(tasks, folder)
     if not done:
         print(f"There are no runs in {folder}; leave out --table-only to make them.")
         return 1
@@ -370,11 +379,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     write_atomically(options.out / "table.md", table.encode())
     print(table)
     return 0
-
-
-def _tell(name: str, fraction: float) -> None:
-    if fraction == 1.0:
-        print(f"done: {name}", flush=True)
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -15,6 +15,12 @@ from acl_gym.cli.common import (
     JsonOption,
     console,
 )
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from acl_gym.experiments.results import Results
+    from acl_gym.experiments.study import Experiment
 
 HELP = """Compare ACL with reinforcement learning on one task.
 
@@ -36,19 +42,21 @@ class CompareCommand(Command):
 
     def format_help(self, ctx: Any, formatter: Any) -> None:
         """Write the help."""
-        from acl_gym.experiments.contestants import CONTESTANTS, PRESETS
-        from acl_gym.experiments.courses import CONTINUOUS, COURSES
+        from acl_gym.experiments.comparison.tasks import PRESETS, SYSTEMS
 
         presets = "\n".join(
             f"  {name:8} runs of each method: {seeds}"
             for name, seeds in PRESETS.items()
         )
-        methods = "\n".join(f"  {name:15} {CONTINUOUS[name]}" for name in CONTESTANTS)
+        systems = list(SYSTEMS.values())
+        methods = "\n".join(
+            f"  {name:15} {agent.label}" for name, agent in systems[0].agents.items()
+        )
         environments = "\n".join(
-            f"  {env_id}\n    trials: {budget.trials}, steps of DQN: "
-            f"{budget.dqn_steps:,} (quick)\n    {', '.join(course.methods)}"
-            for env_id, course in COURSES.items()
-            for budget in (course.budgets["quick"],)
+            f"  {system.env_id}\n    trials: {system.budgets['quick'].trials}, steps of "
+            f"DQN: {system.budgets['quick'].dqn_steps:,} (quick)\n"
+            f"    {', '.join(system.agents)}"
+            for system in systems
         )
         self.epilog = (
             f"\b\nPresets:\n{presets}\n\n\b\nMethods:\n{methods}\n\n"
@@ -124,18 +132,18 @@ def compare(
     debug: DebugOption = False,
 ) -> None:
     """Compare; see `HELP`."""
-    from acl_gym.experiments import comparison
-    from acl_gym.experiments.contestants import PRESETS
-    from acl_gym.experiments.courses import COURSES
+    from acl_gym.experiments.comparison.compare import compare as run_comparison
+    from acl_gym.experiments.comparison.tasks import BY_ENV_ID, PRESETS
 
     _check_choice("--preset", preset, list(PRESETS))
-    env = env or comparison.ENVIRONMENTS[0]
-    _check_choice("--env", env, list(comparison.ENVIRONMENTS))
+    default, *_ = BY_ENV_ID
+    env = env or default
+    _check_choice("--env", env, list(BY_ENV_ID))
+    system = BY_ENV_ID[env]
     if out is None:
-        first = env == comparison.ENVIRONMENTS[0]
-        name = "" if first else f"-{comparison.short_name(env)}"
+        name = "" if env == default else f"-{system.colony.task.short_name}"
         out = Path(f"results/compare{name}")
-    names = list(COURSES[env].methods)
+    names = list(system.agents)
     if agents is not None:
         wanted = [name.strip() for name in agents.split(",") if name.strip()]
         if not wanted or not set(wanted) <= set(names):
@@ -143,9 +151,10 @@ def compare(
                 f"--agents must be among {', '.join(names)} for {env}, got {agents!r}."
             )
         names = list(dict.fromkeys(wanted))
+    terminal = console(stderr=as_json)
     try:
-        comparison.compare(
-            env,
+        found = run_comparison(
+            system,
             preset,
             names,
             seeds,
@@ -153,14 +162,46 @@ def compare(
             first_seed=seed,
             fresh=fresh,
             workers=workers,
-            console=console(stderr=as_json),
+            console=terminal,
         )
     except KeyboardInterrupt as error:
         raise InterruptedRunError(
             "interrupted; finished runs are kept, give the same command to go on."
         ) from error
+    _print_summary(*found, terminal)
+    terminal.print(f"\nReport: {out / 'report.html'}\nResults: {out / 'results.json'}")
     if as_json:
         typer.echo((out / "results.json").read_text())
+
+
+def _print_summary(experiment: Experiment, results: Results, terminal: Console) -> None:
+    """Print the summary as a table of at most 100 columns."""
+    from rich import box
+    from rich.table import Table
+    from rich.text import Text
+
+    from acl_gym.experiments import tables
+
+    symbol = "J*" if experiment.options["optimum"] else "best known"
+    cost = tables.number("cost", tables.reference_cost(experiment, results))
+    shown = tables.summary(experiment, results)
+    table = Table(
+        title=f"Medians over seeds; {symbol} = {cost}",
+        box=box.SIMPLE_HEAD,
+        show_edge=False,
+        padding=0,
+    )
+    for place, heading in enumerate(shown.headings):
+        table.add_column(heading, justify="right" if place else "left", no_wrap=True)
+    for line, row in enumerate(shown.rows):
+        cells = []
+        for place, cell in enumerate(row):
+            first, _, second = cell.partition("\n")
+            text = Text(first, style="bold" if (line, place) in shown.best else "")
+            cells.append(text.append(f"\n{second}", style="dim") if second else text)
+        table.add_row(*cells)
+    terminal.print(table)
+    terminal.print(experiment.text, style="dim", highlight=False)
 
 
 def _check_choice(option: str, value: str, choices: list[str]) -> None:

@@ -58,11 +58,10 @@ def test_help_and_version() -> None:
 
 
 def test_help_of_compare_lists_what_there_is() -> None:
-    from acl_gym.experiments import comparison
-    from acl_gym.experiments.contestants import CONTESTANTS, PRESETS
+    from acl_gym.experiments.comparison.tasks import BY_ENV_ID, PRESETS, SYSTEMS
 
     text = invoke("compare", "--help").stdout
-    for name in (*CONTESTANTS, *PRESETS, *comparison.ENVIRONMENTS):
+    for name in (*SYSTEMS["pendulum"].agents, *PRESETS, *BY_ENV_ID):
         assert f"  {name}" in text
 
 
@@ -306,7 +305,10 @@ def test_compare_prints_results_as_json(tmp_path: Path) -> None:
     results = json.loads(done.stdout)
     assert results == json.loads((out / "results.json").read_text())
     assert {row["seed"] for row in results["rows"]} == {5, 6}
-    assert "python -m acl_gym compare" in (out / "report.html").read_text()
+    command = (
+        f"acl-gym compare --env {PENDULUM} --preset smoke --agents q-crisp --seeds 2"
+    )
+    assert f"{command} --seed 5" in (out / "report.html").read_text()
 
 
 # --- the parts -----------------------------------------------------------------

@@ -31,7 +31,7 @@ def test_an_interrupted_command_says_what_is_kept(
     def interrupt(*_: Any, **__: Any) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("acl_gym.experiments.comparison.compare", interrupt)
+    monkeypatch.setattr("acl_gym.experiments.comparison.compare.compare", interrupt)
     monkeypatch.setattr("acl_gym.cli.envs.describe", interrupt)
     assert "interrupted; " in refused(130, argument)
 

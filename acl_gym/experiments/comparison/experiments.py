@@ -1,0 +1,220 @@
+"""ACL against Q-learning, Q(lambda) and DQN (§7.3): on the four systems, and on harder ones.
+
+The settings are those that the searches have found, see `tasks.tuned_settings`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+from acl_gym.experiments.comparison.tasks import (
+    METHODS,
+    PLAIN,
+    TABLE_METHODS,
+    TASKS,
+    tuned,
+)
+from acl_gym.experiments.study import Experiment, Study
+
+LONG = "acl-long"
+"""ACL with more interactions than the others: whether it is only these that it lacks."""
+
+MORE = 4
+"""How many times the interactions of the others ACL gets in its long runs."""
+
+LABELS = {
+    **{name: each.label for name, each in METHODS.items()},
+    LONG: f"ACL with {MORE} times the interactions",
+}
+"""What the methods are called in tables and figures."""
+
+FEWER_RUNS = 10
+"""Of each study outside of the four systems."""
+
+SLOTS = (25, 100, 400, 1600)
+
+_TUNED = (
+    "Each method has the best of 16 settings that the same search found for it on this "
+    "task, its defaults among them, with other seeds (docs/versus.md)."
+)
+_LONG = (
+    "The methods get the same number of interactions; ACL is run a second time with four "
+    "times as many and the same settings, to see whether it lacks no more than these."
+)
+_JUDGED = (
+    "ACL wins or loses where the 95% bootstrap interval of the ratio of interquartile "
+    "means, ACL's over the rival's, lies on one side of 1."
+)
+
+Rows = dict[str, dict[str, Study]]
+"""By the label of a row the studies of the methods."""
+
+
+def _overview() -> Experiment:
+    rows = {
+        task.label: {method: tuned(name, method) for method in task.methods}
+        for name, task in PLAIN.items()
+    }
+    text = (
+        "The four systems at a glance; each has a figure of its own below. "
+        f"{_TUNED} {_JUDGED}"
+    )
+    found = _of_rows(
+        "versus",
+        "ACL against reinforcement learning",
+        rows,
+        text,
+        "overview",
+        of="System",
+    )
+    references = {task.label: task.system.reference() for task in PLAIN.values()}
+    return replace(found, references=references)
+
+
+def _system(name: str) -> Experiment:
+    task = PLAIN[name]
+    return Experiment(
+        name=f"versus-{name}",
+        title=f"ACL against reinforcement learning: {task.label}",
+        section="§7.3",
+        studies={METHODS[method].label: tuned(name, method) for method in task.methods},
+        references={"dynamic programming": task.system.reference()},
+        plots=("race",),
+        table="system",
+        text=(
+            f"{_TUNED} {task.steps:,} interactions for the methods with a table, "
+            f"{task.dqn_steps:,} for DQN, which takes as many seconds or more: both are "
+            f"reported. {_JUDGED}"
+        ),
+        options={"optimum": task.system.optimum},
+    )
+
+
+def _harder(
+    name: str, title: str, tasks: tuple[str, ...], text: str, **options: Any
+) -> Experiment:
+    rows = {}
+    for each in tasks:
+        row = {method: tuned(each, method, FEWER_RUNS) for method in TABLE_METHODS}
+        steps = MORE * TASKS[each].steps
+        rows[TASKS[each].label] = {**row, LONG: replace(row["acl"], steps=steps)}
+    text = f"{text} {_LONG} {_TUNED} {_JUDGED}"
+    return _of_rows(name, title, rows, text, "harder", **options)
+
+
+def _of_rows(
+    name: str, title: str, rows: Rows, text: str, table: str, **options: Any
+) -> Experiment:
+    """Several tasks, a row each; with `x` in the options they are drawn over it."""
+    return Experiment(
+        name=name,
+        title=title,
+        section="§7.3",
+        studies={
+            f"{label}, {LABELS[method]}": study
+            for label, row in rows.items()
+            for method, study in row.items()
+        },
+        plots=("sweep" if "x" in options else "strips",),
+        table=table,
+        text=text,
+        options={"rows": rows, **options},
+    )
+
+
+def _slots() -> Experiment:
+    rows = {
+        f"{slots} slots": {
+            method: replace(tuned("pendulum-40x41", method, FEWER_RUNS), slots=slots)
+            for method in TABLE_METHODS
+        }
+        for slots in SLOTS
+    }
+    text = (
+        "The more slots learn in parallel, the fewer steps one after the other the same "
+        "number of interactions takes. The other settings are those found for 40 x 41 "
+        f"cells. {_JUDGED}"
+    )
+    return _of_rows(
+        "versus-slots",
+        "More slots, the same number of interactions: pendulum",
+        rows,
+        text,
+        "slots",
+        of="Slots",
+        x=SLOTS,
+        xlabel="slots",
+    )
+
+
+def _order() -> Experiment:
+    pairs = {}
+    for method in TABLE_METHODS:
+        forth = tuned("pendulum-40x41", method, FEWER_RUNS)
+        pairs[METHODS[method].label] = (forth, replace(forth, reversed_slots=True))
+    return Experiment(
+        name="versus-order",
+        title="The same random numbers, slots in reverse order: pendulum",
+        section="§4.4",
+        studies={
+            f"{label}, {way}": study
+            for label, pair in pairs.items()
+            for way, study in zip(("in order", "in reverse order"), pair, strict=True)
+        },
+        plots=("order",),
+        table="order",
+        text=(
+            "What ACL's ants learn can be merged in any order (Theorem 4.1); parallel "
+            "Q-learning goes from slot to slot, and each update uses the values that "
+            "the one before it left. Each run is made twice with the same initial "
+            "states and the same random numbers for every slot, the second time in "
+            "reverse order. A sum in another order may differ in its last bits."
+        ),
+        options={"pairs": pairs},
+    )
+
+
+EXPERIMENTS = (
+    _overview(),
+    *map(_system, PLAIN),
+    _harder(
+        "versus-cells",
+        "Coarse partitions: pendulum",
+        ("pendulum-10x11", "pendulum-16x17", "pendulum-24x25", "pendulum-40x41"),
+        "The same number of interactions with ever more cells.",
+        of="Cells",
+        x=(110, 272, 600, 1640),
+        xlabel="cells",
+    ),
+    _harder(
+        "versus-noise",
+        "Noise",
+        ("grid-p0.7", "grid-p0.5", "pendulum-noise", "pendulum-slips"),
+        "Moves that fail with probability 1 - p; observations with normal noise of 0.1 "
+        "rad and 0.5 rad/s; actions of which every fifth is replaced by one drawn from "
+        "all. Policies are evaluated under the same noise.",
+        of="Task",
+    ),
+    _harder(
+        "versus-partial",
+        "Partial states",
+        ("navigation-hidden", "pendulum-sign"),
+        "The vehicle does not observe its velocity along the second axis; the pendulum "
+        "observes in which direction it turns, but not how fast.",
+        of="Task",
+    ),
+    _harder(
+        "versus-episode-costs",
+        "Costs of whole episodes: pendulum",
+        ("pendulum-settling", "pendulum-switches", "pendulum-peak"),
+        "Settling time to within 0.3 rad and half the overshoot; the time and a half for "
+        "each change of torque; the time and the top speed. ACL learns from these costs; "
+        "no reward per step expresses them, so the others learn from the stage costs or "
+        "from the number of steps, whichever their search found better.",
+        of="Cost",
+    ),
+    _slots(),
+    _order(),
+)
+"""The comparison of tuned methods, part of the reproduction."""

@@ -1,0 +1,417 @@
+"""The systems and tasks on which methods are compared, and what each method runs with.
+
+All of it is data. A `System` is one of the four systems as `acl-gym compare` runs it, a
+`TunedTask` is a system, as it is or made harder, for which each method was tuned. A
+system more is one entry of `SYSTEMS`, a task more one of `TASKS`, a method more one of
+`METHODS` with its settings in each system. How settings were chosen is in
+docs/comparison-settings.md and docs/versus.md.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cache
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from acl_gym.experiments import systems
+from acl_gym.experiments.study import Study, Task
+from acl_gym.utils.validation import one_of
+
+Settings = Mapping[str, Any]
+
+SETTINGS_FILE = Path(__file__).with_name("settings.json")
+"""The tuned settings: task -> method -> what its search has found."""
+
+
+class Method(NamedTuple):
+    """A method: its label, and the key of `methods.METHODS` that runs it."""
+
+    label: str
+    key: str
+
+
+METHODS = {
+    "acl": Method("ACL", "acl"),
+    "q": Method("Q-learning", "q-learning"),
+    "q-lambda": Method("Q(λ)", "q-learning"),
+    "dqn": Method("DQN", "dqn"),
+}
+"""The methods by the names that commands and files have for them."""
+
+TABLE_METHODS = tuple(name for name, each in METHODS.items() if each.key != "dqn")
+"""Those that keep a table over a partition."""
+
+PRESETS = {"smoke": 1, "quick": 3, "full": 10}
+"""How many runs of each method `acl-gym compare` makes; a system has its budgets."""
+
+
+class Agent(NamedTuple):
+    """A method with its kind of partition, as `acl-gym compare` runs it."""
+
+    label: str
+    method: str
+    kind: str
+
+
+class Budget(NamedTuple):
+    """How much of a system a preset runs.
+
+    Attributes:
+        trials: K of the methods with a table.
+        dqn_steps: interactions of DQN.
+        evaluate_every: interactions between two evaluations of DQN.
+        cells: on which the reference is found, see `Task.make_partition`; None where a
+            state is a cell.
+        length: of the runs of DQN; where it is "long" DQN has its settings for that.
+    """
+
+    trials: int
+    dqn_steps: int
+    evaluate_every: int
+    cells: Any = None
+    length: str = "short"
+
+
+@dataclass(frozen=True, kw_only=True)
+class System:
+    """One system and how the methods run on it.
+
+    Attributes:
+        label: what it is called.
+        colony: the thesis's colony on it, whose settings, slots, cells and T hold here.
+        settings: what a method runs with, by its name; of DQN, what differs from the
+            defaults of `DQNSettings`. Under a name with a suffix, "q-crisp" or
+            "dqn-long", is what differs there.
+        budgets: one for each preset.
+        finite: whether a state is a cell, so that nothing is fuzzy.
+        optimum: whether the reference is taken for the optimum J*, or only for the
+            best policy known.
+    """
+
+    label: str
+    colony: Study
+    settings: Mapping[str, Settings]
+    budgets: Mapping[str, Budget]
+    finite: bool = False
+    optimum: bool = True
+
+    @property
+    def env_id(self) -> str:
+        """Its environment."""
+        return self.colony.task.env_id
+
+    @property
+    def max_steps(self) -> int:
+        """T, the longest episode."""
+        return int(self.colony.settings["max_steps"])
+
+    @property
+    def agents(self) -> dict[str, Agent]:
+        """What `acl-gym compare` runs, by name, in order."""
+        found = {
+            f"{name}-{kind}": Agent(
+                METHODS[name].label + ("" if self.finite else f", {kind}"), name, kind
+            )
+            for name in TABLE_METHODS
+            for kind in (("crisp",) if self.finite else ("fuzzy", "crisp"))
+        }
+        return {**found, "dqn": Agent(METHODS["dqn"].label, "dqn", "")}
+
+    def settings_of(self, method: str, suffix: str) -> dict[str, Any]:
+        """What a method runs with, for a kind of partition or a length of run."""
+        own = self.colony.settings if method == "acl" else self.settings.get(method, {})
+        return {**own, **self.settings.get(f"{method}-{suffix}", {})}
+
+    def study(self, name: str, preset: str) -> Study:
+        """An agent as `acl-gym compare` runs it.
+
+        Args:
+            name: a key of `agents`.
+            preset: a key of `PRESETS`.
+        """
+        _, method, kind = self.agents[one_of("agent", name, tuple(self.agents))]
+        budget, task = self.budgets[preset], Task(env_id=self.env_id)
+        if method == "dqn":
+            settings = self.settings_of("dqn", budget.length)
+            return _dqn(task, settings, budget.dqn_steps, budget.evaluate_every)
+        return replace(
+            self.colony,
+            task=task,
+            method=METHODS[method].key,
+            settings={"max_steps": self.max_steps, **self.settings_of(method, kind)},
+            kind=kind,
+            trials=budget.trials,
+        )
+
+    def reference(self, preset: str = "quick") -> Study:
+        """Dynamic programming: on states that are cells, else on fine fuzzy cells."""
+        return self.planned(self.budgets[preset].cells)
+
+    def planned(self, cells: Any) -> Study:
+        """Dynamic programming on some cells."""
+        task = Task(env_id=self.env_id)
+        return Study(task=task, method="planning", cells=cells, most_runs=1)
+
+
+def _dqn(task: Task, settings: dict[str, Any], steps: int, every: int) -> Study:
+    return Study(
+        task=task, method="dqn", settings=settings, steps=steps, evaluate_every=every
+    )
+
+
+def _both_ways(*distances: float) -> list[float]:
+    """0, and distances from it in both directions, in order."""
+    return sorted({0.0, *distances, *(-each for each in distances)})
+
+
+# Centres of a position and of a velocity of the navigation, along either axis.
+_COARSE = [_both_ways(0.1, 0.3, 1.0, 2.0, 3.5, 5.0), _both_ways(0.25, 1.0, 2.0)]
+_MEDIUM = [
+    _both_ways(0.1, 0.25, 0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0),
+    _both_ways(0.1, 0.3, 0.7, 1.3, 2.0),
+]
+_FINE = [
+    _both_ways(
+        *(0.08, 0.16, 0.25, 0.4, 0.7, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5, 4.0, 4.5, 5.0)
+    ),
+    _both_ways(0.05, 0.15, 0.4, 0.8, 1.3, 2.0),
+]
+
+_LONG_RUN = {"exploration_fraction": 0.02, "final_learning_rate": 1e-5}
+_Q_ON_PENDULUM = {"learning_rate": 0.3, "discount": 0.98, "epsilon": 0.1}
+_Q_ON_NAVIGATION = {"learning_rate": 0.3, "discount": 0.9, "epsilon": 0.1}
+_Q_ON_GRIDS = {"learning_rate": 0.5, "discount": 1.0, "epsilon": 0.1}
+_ON_GRIDS = {"q": _Q_ON_GRIDS, "q-lambda": {**_Q_ON_GRIDS, "trace_decay": 0.8}}
+
+SYSTEMS = {
+    "pendulum": System(
+        label="pendulum",
+        colony=systems.pendulum("fuzzy"),
+        settings={
+            "q": _Q_ON_PENDULUM,
+            "q-lambda": {**_Q_ON_PENDULUM, "trace_decay": 0.5},
+            "dqn-long": _LONG_RUN,
+        },
+        budgets={
+            # To see that all of it works; its figures mean nothing.
+            "smoke": Budget(2, 1_200, 400, [100, 101]),
+            "quick": Budget(100, 20_000, 1_000, [400, 401]),
+            "full": Budget(100, 200_000, 2_000, [1600, 1601], "long"),
+        },
+    ),
+    "navigation": System(
+        label="navigation",
+        colony=systems.navigation("quadratic", "fuzzy"),
+        settings={
+            "q": _Q_ON_NAVIGATION,
+            "q-lambda": {**_Q_ON_NAVIGATION, "discount": 0.95, "trace_decay": 0.9},
+            # Bins make the next state uncertain: smaller steps average over it.
+            "q-crisp": {"learning_rate": 0.1, "discount": 0.95},
+            "q-lambda-crisp": {"learning_rate": 0.1},
+            "dqn": {"reward_scale": 1.0},
+            "dqn-long": _LONG_RUN,
+        },
+        budgets={
+            "smoke": Budget(2, 1_200, 600, 2 * _COARSE),
+            "quick": Budget(200, 20_000, 1_000, 2 * _MEDIUM),
+            "full": Budget(200, 200_000, 2_000, 2 * _FINE, "long"),
+        },
+        optimum=False,
+    ),
+    "row": System(
+        label="1-D grid",
+        colony=systems.grid_1d(),
+        settings={
+            **_ON_GRIDS,
+            "dqn": {"max_episode_steps": 50, "learning_starts": 200},
+        },
+        budgets={
+            "smoke": Budget(3, 400, 200),
+            "quick": Budget(100, 4_000, 200),
+            "full": Budget(100, 10_000, 200),
+        },
+        finite=True,
+    ),
+    "grid": System(
+        label="2-D grid",
+        # tabu: the assumption of §3.4.2 that no ant walks in circles.
+        colony=systems.grid_2d(local_decay=0.01, tabu=True),
+        settings={**_ON_GRIDS, "dqn": {"max_episode_steps": 50}},
+        budgets={
+            "smoke": Budget(3, 1_200, 600),
+            "quick": Budget(200, 10_000, 500),
+            "full": Budget(200, 20_000, 500),
+        },
+        finite=True,
+    ),
+}
+"""The systems, the default one first."""
+
+BY_ENV_ID = {system.env_id: system for system in SYSTEMS.values()}
+
+
+@dataclass(frozen=True)
+class TunedTask:
+    """A system as learners meet it, and how much of it they get.
+
+    Attributes:
+        label: what it is called in tables and figures.
+        system: which one.
+        steps: interactions of a method with a table, all slots together.
+        spacing: the factor by which interactions grow from one evaluation to the next.
+        changes: of the task, keywords of `Task`: what makes it harder.
+        cells: see `Task.make_partition`; None takes those of the system.
+        max_steps: T, the longest episode; None takes that of the system.
+        dqn_steps: interactions of DQN; 0: it does not take part.
+        evaluate_every: interactions between two evaluations of DQN.
+    """
+
+    label: str
+    system: System
+    steps: int
+    spacing: float
+    changes: Settings = field(default_factory=dict)
+    cells: Any = None
+    max_steps: int | None = None
+    dqn_steps: int = 0
+    evaluate_every: int = 500
+
+    @property
+    def methods(self) -> tuple[str, ...]:
+        """The methods that take part."""
+        return tuple(METHODS) if self.dqn_steps else TABLE_METHODS
+
+    @property
+    def task(self) -> Task:
+        """What the learners meet."""
+        return Task(env_id=self.system.env_id, **self.changes)
+
+    def defaults(self, method: str) -> dict[str, Any]:
+        """A method's settings before any search, those that are not searched included.
+
+        `slots` and `kind` are among those of the methods with a table.
+        """
+        if method == "dqn":
+            return self.system.settings_of("dqn", "short")
+        finite, judged = self.system.finite, self.task.cost is not None
+        kind = "crisp" if finite else "fuzzy"
+        settings = self.system.settings_of(method, kind)
+        if method == "acl":
+            # Boltzmann's rule is Max-Boltzmann's with epsilon = 0, which can be searched.
+            if settings["selection"] == "boltzmann":
+                settings |= {"selection": "max_boltzmann", "epsilon": 0.0}
+            if finite:
+                settings.setdefault("tabu", False)
+            if judged:
+                settings["tau0"] = 1e-3  # these costs are a hundred times smaller
+        elif judged:
+            settings["reward"] = "stage"
+        settings["max_steps"] = self.max_steps or self.system.max_steps
+        return {"slots": self.system.colony.slots, "kind": kind, **settings}
+
+    def study(
+        self, method: str, found: Settings, most_runs: int | None = None
+    ) -> Study:
+        """A method with the settings that a search has found.
+
+        Args:
+            method: one of `methods`.
+            found: what differs from `defaults`.
+            most_runs: see `Study`.
+        """
+        settings = {**self.defaults(method), **found}
+        if method == "dqn":
+            if "learning_rate" in settings:
+                settings["final_learning_rate"] = settings["learning_rate"]
+            return _dqn(self.task, settings, self.dqn_steps, self.evaluate_every)
+        return Study(
+            task=self.task,
+            method=METHODS[method].key,
+            slots=settings.pop("slots"),
+            kind=settings.pop("kind"),
+            settings=settings,
+            cells=self.cells or self.system.colony.cells,
+            steps=self.steps,
+            spacing=self.spacing,
+        )
+
+
+OFTEN, SELDOM = 1.04, 1.3
+"""Spacings of evaluations: where times count, and where only the last policy does."""
+
+
+def _plain(name: str, steps: int, dqn_steps: int, every: int = 500) -> TunedTask:
+    system = SYSTEMS[name]
+    return TunedTask(
+        *(system.label, system, steps, OFTEN), dqn_steps=dqn_steps, evaluate_every=every
+    )
+
+
+def _pendulum(label: str, cells: Any = None, **changes: Any) -> TunedTask:
+    return TunedTask(label, SYSTEMS["pendulum"], 2_000_000, SELDOM, changes, cells)
+
+
+def _slippery(p: float) -> TunedTask:
+    return TunedTask(
+        *(f"2-D grid, p = {p:g}", SYSTEMS["grid"], 1_000_000, SELDOM),
+        changes={"env": {"transition_probability": p}, "repeats": 3},
+        max_steps=systems.grid_2d(p=p).settings["max_steps"],
+    )
+
+
+PLAIN = {
+    "row": _plain("row", 5_000, 3_000, 100),
+    "grid": _plain("grid", 200_000, 10_000, 250),
+    "navigation": _plain("navigation", 2_500_000, 15_000),
+    "pendulum": _plain("pendulum", 2_500_000, 15_000),
+}
+"""The four systems as they are."""
+
+TASKS = {
+    **PLAIN,
+    # Where ACL might win: coarse cells, noise, partial states, costs of whole episodes.
+    "pendulum-10x11": _pendulum("10 x 11 cells", [10, 11]),
+    "pendulum-16x17": _pendulum("16 x 17 cells", [16, 17]),
+    "pendulum-24x25": _pendulum("24 x 25 cells", [24, 25]),
+    "pendulum-40x41": _pendulum("40 x 41 cells"),
+    "grid-p0.7": _slippery(0.7),
+    "grid-p0.5": _slippery(0.5),
+    "pendulum-noise": _pendulum(
+        "pendulum, noisy observations", perturbations={"noise": [0.1, 0.5]}
+    ),
+    "pendulum-slips": _pendulum(
+        "pendulum, slipping actions", perturbations={"slips": 0.2}
+    ),
+    "navigation-hidden": TunedTask(
+        *("navigation, a velocity hidden", SYSTEMS["navigation"], 1_000_000, SELDOM),
+        changes={"perturbations": {"hidden": [3]}},
+    ),
+    "pendulum-sign": _pendulum(
+        "pendulum, the velocity's sign only", [40, 3], perturbations={"rounded": [0, 2]}
+    ),
+    "pendulum-settling": _pendulum("settling time and overshoot", cost="settling"),
+    "pendulum-switches": _pendulum("time and switching", cost="switches"),
+    "pendulum-peak": _pendulum("time and top speed", cost="peak"),
+}
+"""All tasks by name."""
+
+
+@cache
+def tuned_settings() -> dict[str, dict[str, dict[str, Any]]]:
+    """What the searches have found: task -> method -> settings."""
+    return json.loads(SETTINGS_FILE.read_text())  # type: ignore[no-any-return]
+
+
+def tuned(name: str, method: str, most_runs: int | None = None) -> Study:
+    """A method on a task with the settings that its search has found.
+
+    Args:
+        name: a key of `TASKS`.
+        method: one of the methods of the task.
+        most_runs: see `Study`.
+    """
+    study = TASKS[name].study(method, tuned_settings()[name][method])
+    return replace(study, most_runs=most_runs)

@@ -1,0 +1,162 @@
+"""The command from its arguments to its files, on the smoke preset."""
+
+from __future__ import annotations
+
+import json
+import re
+import runpy
+import subprocess
+import sys
+from pathlib import Path
+
+import pandas as pd
+import pytest
+from typer.testing import CliRunner
+
+ROOT = Path(__file__).resolve().parents[3]
+SCRIPT = ROOT / "benchmarks" / "compare_acl_rl.py"
+COLUMNS = ["agent", "seed", "env_steps", "seconds", "policy_cost", "success_rate"]
+SMALL = ("--preset", "smoke", "--agents", "acl-fuzzy,q-crisp,dqn", "--seeds", "2")
+
+
+def compare(*arguments: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-W", "error::UserWarning:acl_gym", str(SCRIPT), *arguments],
+        capture_output=True,
+        text=True,
+        cwd=ROOT,
+        check=False,
+    )
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("comparison")
+
+
+@pytest.fixture(scope="module")
+def finished(folder: Path) -> subprocess.CompletedProcess[str]:
+    return compare(*SMALL, "--out", str(folder))
+
+
+def test_it_ends_well_and_says_where_its_files_lie(finished, folder: Path) -> None:
+    assert finished.returncode == 0, finished.stderr
+    for label in ("ACL, fuzzy", "Q-learning, crisp", "DQN", "J* = 39.", "report.html"):
+        assert label in finished.stdout
+    assert max(map(len, finished.stdout.splitlines())) <= 100
+    names = {path.name for path in folder.iterdir()}
+    assert {"results.json", "results.parquet", "report.html", "runs"} <= names
+    drawn = {"summary", "learning_curves", "policy_maps", "trajectories"}
+    assert {path.stem for path in folder.glob("*.png")} == drawn
+
+
+def test_results_hold_what_was_promised(finished, folder: Path) -> None:
+    results = json.loads((folder / "results.json").read_text())
+    assert set(results) == {"env", "preset", "reference", "rows", "summary"}
+    assert (results["env"], results["preset"]) == ("acl_gym/Pendulum-v0", "smoke")
+    reference = results["reference"]
+    assert reference["optimal_cost"] == pytest.approx(39.0, abs=0.7)
+    assert (reference["method"], reference["success_rate"]) == ("fuzzy Q-iteration", 1)
+    assert reference["cells"] == [100, 101]
+    assert reference["coarse"]["cells"] == [40, 41]
+    assert reference["coarse"]["policy_cost"] > 1.2 * reference["optimal_cost"]
+    rows = pd.DataFrame(results["rows"])
+    assert list(rows) == COLUMNS
+    assert set(zip(rows["agent"], rows["seed"], strict=True)) == {
+        (agent, seed) for agent in ("acl-fuzzy", "q-crisp", "dqn") for seed in (0, 1)
+    }
+    last = rows.groupby(["agent", "seed"])["policy_cost"].last()
+    for entry in results["summary"]:
+        assert entry["seeds"] == 2
+        found = entry["final_policy_cost"]["median"]
+        assert found == pytest.approx(last[entry["agent"]].mean())
+    pd.testing.assert_frame_equal(pd.read_parquet(folder / "results.parquet"), rows)
+
+
+def test_the_report_is_one_file(finished, folder: Path) -> None:
+    page = (folder / "report.html").read_text()
+    assert not re.search(r"""(?:src|href)=["'](?:https?:|//|[^"'#d])""", page)
+    assert page.count("data:image/png;base64,") == 4
+
+
+def test_a_second_call_runs_nothing_again_and_a_fresh_one_everything(
+    finished, folder: Path
+) -> None:
+    def times() -> list[int]:
+        return [
+            path.stat().st_mtime_ns for path in sorted((folder / "runs").glob("*-*"))
+        ]
+
+    before = times()
+    assert len(before) == 2 * 3 + 2  # of them two of dynamic programming
+    again = compare(*SMALL, "--out", str(folder))
+    assert again.returncode == 0, again.stderr
+    assert times() == before
+    rows = json.loads((folder / "results.json").read_text())["rows"]
+    fresh = compare(*SMALL, "--out", str(folder), "--fresh")
+    assert fresh.returncode == 0, fresh.stderr
+    assert min(times()) > max(before)
+    for one, other in zip(
+        rows, json.loads((folder / "results.json").read_text())["rows"], strict=True
+    ):
+        assert {**one, "seconds": 0} == {**other, "seconds": 0}
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--preset", "huge"], "invalid choice"),
+        (["--agents", "acl-fuzzy,sarsa"], "must be among"),
+        (["--seeds", "0"], "whole number >= 1"),
+        (["--env", "CartPole-v1"], "invalid choice"),
+        (
+            ["--env", "acl_gym/GridSearch1D-v0", "--agents", "acl-fuzzy"],
+            "must be among acl-crisp, q-crisp, q-lambda-crisp, dqn for",
+        ),
+    ],
+)
+def test_bad_arguments_exit_with_2(arguments: list[str], message: str) -> None:
+    failed = compare(*arguments)
+    assert failed.returncode == 2
+    assert message in failed.stderr
+    assert len(failed.stderr.strip().splitlines()) == 1
+
+
+@pytest.mark.parametrize("name", ["Navigation", "GridSearch1D", "GridSearch2D"])
+def test_the_other_systems(name: str, tmp_path: Path) -> None:
+    env_id, moving = f"acl_gym/{name}-v0", name == "Navigation"
+    agents = "acl-crisp,q-lambda-crisp"
+    (tmp_path / "trajectories.png").write_text("of a system before")
+    # In this process; only the runs are in one of their own.
+    script = runpy.run_path(str(SCRIPT))
+    done = CliRunner().invoke(
+        script["app"],
+        [
+            *("--preset", "smoke", "--env", env_id, "--agents", agents),
+            *("--workers", "1", "--out", str(tmp_path)),
+        ],
+    )
+    assert done.exit_code == 0, done.output
+    results = json.loads((tmp_path / "results.json").read_text())
+    assert {row["agent"] for row in results["rows"]} == set(agents.split(","))
+    assert [entry["seeds"] for entry in results["summary"]] == [1, 1]
+    wanted = "best_known_cost" if moving else "optimal_cost"
+    assert results["reference"][wanted] > 0
+    assert ("coarse" in results["reference"]) == moving
+    assert ("best known = " in done.output) == moving
+    drawn = {"summary", "learning_curves", "policy_maps"}
+    drawn |= {"trajectories"} if moving else set()
+    assert {path.stem for path in tmp_path.glob("*.png")} == drawn
+
+
+def test_a_folder_that_cannot_be_made_is_one_line(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    failed = compare("--preset", "smoke", "--out", str(tmp_path / "file" / "x"))
+    assert failed.returncode == 1
+    assert len(failed.stderr.strip().splitlines()) == 1
+
+
+def test_help_teaches() -> None:
+    text = compare("--help").stdout
+    for word in ("--preset", "--env", "--agents", "--seeds", "--out", "acl-fuzzy"):
+        assert word in text

@@ -206,7 +206,7 @@ def _restore_dqn(study: Study, run: Run) -> Predictor:
     from acl_gym.sb3.dqn import ScaledPolicy
 
     model = _make_dqn(study, run.seed)
-    weights = torch.as_tensor(run.table, dtype=torch.float32)
+    weights = torch.as_tensor(run.table.copy(), dtype=torch.float32)
     torch.nn.utils.vector_to_parameters(weights, model.q_net.parameters())
     env = study.task.make_system_env(1)
     if isinstance(env.single_observation_space, FINITE_SPACES):

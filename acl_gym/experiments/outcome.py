@@ -12,12 +12,16 @@ from acl_gym.experiments.results import Results
 from acl_gym.experiments.statistics import estimate
 from acl_gym.experiments.study import Experiment, Study
 from acl_gym.experiments.tables import TABLES
+from acl_gym.utils.typing import FloatArray
 
 Outcome = dict[str, Any]
 """JSON types."""
 
 CURVES = ("policy_cost", "ants_cost", "policy_variation", "sensitivity")
 """The measures whose curves a report shows."""
+
+POINTS = 250
+"""How many points a curve has at most: one of `every` so many is kept."""
 
 
 def summary(
@@ -64,13 +68,14 @@ def summary(
 
 
 def _study(label: str, study: Study, results: Results) -> Outcome:
-    costs = results.last(study)
+    costs, points = results.last(study), study.curve_points()
+    every = -(-results.values(study).shape[1] // POINTS)
+    seconds = [run.seconds for run in results.runs(study)]
     return {
         "label": label,
         "key": study.key,
         "setting": study.inputs,
         "parameters": str(study),
-        "positions": study.curve_points(),
         "runs": len(costs),
         "policy_cost": {
             **estimate(costs).as_json("interquartile_mean"),
@@ -78,35 +83,31 @@ def _study(label: str, study: Study, results: Results) -> Outcome:
             "max": float(costs.max()),
         },
         "success_rate": float(results.last(study, "success_rate").mean()),
-        "seconds": float(np.median([run.seconds for run in results.runs(study)])),
-        "curves": curves(study, results),
+        "seconds": float(np.median(seconds)),
+        "every": every,
+        "positions": points and points[::every],
+        "curves": {
+            measure: _curve(results.values(study, measure)[:, ::every])
+            for measure in CURVES
+            if measure in results.runs(study)[0].rows
+        },
     }
 
 
-def curves(study: Study, results: Results) -> Outcome:
-    """Mean, lowest and highest value of each measure at each point, to 5 digits."""
-    found = {}
-    for measure in CURVES:
-        if measure in results.runs(study)[0].rows:
-            values = results.values(study, measure)
-            lines = (values.mean(axis=0), values.min(axis=0), values.max(axis=0))
-            found[measure] = {
-                name: [float(f"{value:.5g}") for value in line]
-                for name, line in zip(("mean", "low", "high"), lines, strict=True)
-            }
-    return found
+def _curve(values: FloatArray) -> dict[str, list[float]]:
+    """Mean, lowest and highest value of the runs at each point, to 5 digits."""
+    lines = (values.mean(axis=0), values.min(axis=0), values.max(axis=0))
+    return {
+        name: [float(f"{value:.5g}") for value in line]
+        for name, line in zip(("mean", "low", "high"), lines, strict=True)
+    }
 
 
 def without_curves(outcome: Outcome) -> Outcome:
     """An outcome without its curves, to be printed."""
-    experiments = [
-        {
-            **each,
-            "studies": [
-                {name: value for name, value in study.items() if name != "curves"}
-                for study in each["studies"]
-            ],
-        }
+    studies = [
+        [{k: v for k, v in study.items() if k != "curves"} for study in each["studies"]]
         for each in outcome["experiments"]
     ]
-    return {**outcome, "experiments": experiments}
+    experiments = zip(outcome["experiments"], studies, strict=True)
+    return {**outcome, "experiments": [{**e, "studies": s} for e, s in experiments]}

@@ -16,9 +16,6 @@ from acl_gym.experiments.outcome import Outcome
 from acl_gym.experiments.statistics import Estimate, digits
 from acl_gym.utils.files import write_atomically
 
-POINTS = 250
-"""How many points of a curve a page shows at most."""
-
 _CLASSES = {HOLDS: "yes", IN_PART: "part", NOT: "no", UNDECIDED: "open"}
 
 
@@ -79,7 +76,7 @@ def write_report(
         names={each["name"] for each in experiments},
         images=images,
         animation=_encoded(figures / animation) if animation else "",
-        curves=explorable(experiments),
+        curves=_explorable(experiments),
         command=command,
         made={
             name: ", ".join(map(str, value)) if isinstance(value, list) else value
@@ -138,30 +135,22 @@ def _encoded(path: Path) -> str:
     return base64.b64encode(path.read_bytes()).decode() if path.is_file() else ""
 
 
-def explorable(experiments: Sequence[Outcome]) -> Outcome:
-    """The curves that a page shows: each once, and which of them experiments have."""
-    curves: Outcome = {}
-    labels: dict[str, list[dict[str, str]]] = {}
-    for each in experiments:
-        for study in each["studies"]:
-            entry = {"label": study["label"], "key": study["key"]}
-            labels.setdefault(each["name"], []).append(entry)
-            curves[study["key"]] = _thinned(study["curves"], study["positions"])
-    return {"experiments": labels, "curves": curves}
-
-
-def _thinned(curves: Outcome, positions: list[int] | None) -> Outcome:
-    """At most `POINTS` points of each curve, 4 digits each: one of `every` so many."""
-    every = -(-max(len(curve["mean"]) for curve in curves.values()) // POINTS)
+def _explorable(experiments: Sequence[Outcome]) -> Outcome:
+    """The curves of a page, each once, and which of them experiments have."""
+    names = ("label", "key")
     return {
-        "every": every,
-        "positions": positions and positions[::every],
-        **{
-            measure: {
-                name: [float(f"{value:.4g}") for value in line[::every]]
-                for name, line in curve.items()
+        "experiments": {
+            each["name"]: [{n: study[n] for n in names} for study in each["studies"]]
+            for each in experiments
+        },
+        "curves": {
+            study["key"]: {
+                "every": study["every"],
+                "positions": study["positions"],
+                **study["curves"],
             }
-            for measure, curve in curves.items()
+            for each in experiments
+            for study in each["studies"]
         },
     }
 
@@ -177,19 +166,19 @@ def write_claims(
         names: of the experiments that were run.
         facts: how much was run.
     """
-    lines = ["# The claims of the thesis", "", facts, ""]
-    lines += ["| claim | verdict | statement | measured | |"]
-    lines += ["| --- | --- | --- | --- | --- |"]
+    rows = [("claim", "verdict", "statement", "measured", ""), ("---",) * 5]
     for claim in claims:
         shown = [n for n in (*claim["experiments"], *claim["trials"]) if n in names]
         source = "; ".join(filter(None, [claim["section"], ", ".join(shown)]))
         text = f"**{claim['text']}** {source}"
-        lines.append(f"| {claim['claim']} | {claim['verdict']} | {text} | | |")
+        rows.append((claim["claim"], claim["verdict"], text, "", ""))
         for part in claim["parts"]:
             mark = "yes" if part["holds"] else "no"
-            lines.append(f"| | | {part['statement']} | {part['measured']} | {mark} |")
+            rows.append(("", "", part["statement"], part["measured"], mark))
         for each in claim["tried"]:
-            lines.append(f"| | | tried: {each['what']} | {each['found']} | |")
+            rows.append(("", "", f"tried: {each['what']}", each["found"], ""))
         if claim["understanding"]:
-            lines.append(f"| | | {claim['understanding']} | | |")
-    write_atomically(path, ("\n".join(lines) + "\n").encode())
+            rows.append(("", "", claim["understanding"], "", ""))
+    table = "\n".join(f"| {' | '.join(row)} |" for row in rows)
+    text = f"# The claims of the thesis\n\n{facts}\n\n{table}\n"
+    write_atomically(path, text.encode())

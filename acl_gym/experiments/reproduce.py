@@ -5,11 +5,9 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
-import pandas as pd
 from rich.console import Console
 
 from acl_gym.experiments import comparison, outcome, plots, thesis
@@ -19,7 +17,7 @@ from acl_gym.experiments.report import write_claims, write_report
 from acl_gym.experiments.results import Results
 from acl_gym.experiments.runner import EXECUTORS, alone_in, list_jobs, run_studies
 from acl_gym.experiments.store import Job, Store
-from acl_gym.experiments.study import Experiment, Study
+from acl_gym.experiments.study import Experiment
 from acl_gym.experiments.thesis import CLAIMS, RUNS, experiments_of, trials_of
 from acl_gym.experiments.thesis.common import FEWER
 from acl_gym.utils.files import write_atomically
@@ -28,17 +26,14 @@ __all__ = ["EXECUTORS", "RUNS", "without_curves"]
 
 EXPERIMENTS = (*thesis.EXPERIMENTS, *comparison.EXPERIMENTS)
 
-PAGE, CLAIMS_TABLE, RESULTS, ROWS = (
-    "report.html",
-    "claims.md",
-    "results.json",
-    "results.parquet",
-)
+PAGE, CLAIMS_TABLE = "report.html", "claims.md"
+RESULTS, ROWS = "results.json", "results.parquet"
 _KEPT_RUNS, _FIGURES, _FINISHED = "runs", "figures", "finished.json"
 
 ANIMATION, ANIMATED = "learning.gif", "fig5.6"
 """With this experiment the animation of its policy is drawn."""
 
+_AGAINST = "Against reinforcement learning"
 _INTRO = (
     "The experiments of chapters 3 to 5 of J. M. van Ast, Ant Colony Optimization for "
     "Control (Delft, 2010), repeated with acl-gym, and what they say about its claims.",
@@ -109,15 +104,16 @@ def reproduce(
         FolderInUseError: another run works on `directory`.
     """
     experiments = chosen(names)
+    every = [each.name for each in experiments]
     studies = [study for each in experiments for study in each.everything]
     seeds = range(first_seed, first_seed + runs)
     jobs = list_jobs(studies, seeds)
-    every = [each.name for each in experiments]
-    for drawn in (every,) if figures else (every, []):
-        found = _finished(directory, jobs, drawn)
+    for drawn in (True,) if figures else (True, False):
+        found = _finished(directory, jobs, every, drawn)
         if found is not None:
             return found, True
     console = console or Console(quiet=True)
+    workers = workers or os.cpu_count() or 1
     directory.mkdir(parents=True, exist_ok=True)
     with alone_in(directory):  # to the end: the report has to be that of these runs
         results = run_studies(
@@ -126,38 +122,32 @@ def reproduce(
             executor=executor,
             console=console,
         )
-        made = _outcome(
-            experiments,
-            results,
-            runs,
-            first_seed,
-            circumstances(workers or os.cpu_count() or 1),
-        )
+        made = _outcome(experiments, results, runs, first_seed)
+        made["made"] = circumstances(workers)
         _clear(directory)
-        _write_results(directory, made, experiments, results)
+        write_atomically(directory / RESULTS, json.dumps(made).encode())
+        _write_rows(directory / ROWS, experiments, results)
         if figures:
             _draw(experiments, results, directory / _FIGURES, console)
             write_pages(directory)
-        stamp = {"stamp": _stamp(jobs, every if figures else [])}
+        stamp = {"stamp": _stamp(jobs, figures)}
         write_atomically(directory / _FINISHED, json.dumps(stamp).encode())
     return made, False
 
 
 def _outcome(
-    experiments: Sequence[Experiment],
-    results: Results,
-    runs: int,
-    first_seed: int,
-    made: dict[str, Any],
+    experiments: Sequence[Experiment], results: Results, runs: int, first_seed: int
 ) -> Outcome:
     """Each experiment summed up, and each claim judged."""
-    groups = {each.name: "Experiments" for each in thesis.EXPERIMENTS}
-    against = "Against reinforcement learning"
+    studies = [study for each in experiments for study in each.everything]
     return {
         "runs": runs,
         "first_seed": first_seed,
         "experiments": [
-            outcome.summary(each, results, groups.get(each.name, against))
+            outcome.summary(
+                *(each, results),
+                "Experiments" if each in thesis.EXPERIMENTS else _AGAINST,
+            )
             for each in experiments
         ],
         "claims": [
@@ -168,30 +158,26 @@ def _outcome(
             }
             for claim in CLAIMS
         ],
-        "made": made,
-        "runs_made": results.made(s for e in experiments for s in e.everything),
+        "runs_made": results.made(studies),
     }
 
 
-def _write_results(
-    directory: Path, made: Outcome, experiments: Sequence[Experiment], results: Results
+def _write_rows(
+    path: Path, experiments: Sequence[Experiment], results: Results
 ) -> None:
-    write_atomically(directory / RESULTS, json.dumps(made).encode())
-    shown: dict[str, Study] = {}
-    for each in experiments:
-        for label, study in {**each.studies, **each.references}.items():
-            if study not in shown.values():
-                shown[f"{each.name}: {label}"] = study
-    write_atomically(directory / ROWS, _parquet(results.frame(shown)))
-
-
-def _parquet(frame: pd.DataFrame) -> bytes:
+    """The rows of all runs as one table; those of a study stand where it comes first."""
+    shown = {
+        study.key: (f"{each.name}: {label}", study)
+        for each in reversed(experiments)
+        for label, study in {**each.studies, **each.references}.items()
+    }
+    frame = results.frame(dict(shown.values()))
     content: bytes = frame.to_parquet(index=False, compression="zstd")
-    return content
+    write_atomically(path, content)
 
 
 def _draw(
-    experiments: Iterable[Experiment], results: Results, folder: Path, console: Console
+    experiments: Sequence[Experiment], results: Results, folder: Path, console: Console
 ) -> None:
     folder.mkdir(exist_ok=True)
     with console.status("Drawing") as status:
@@ -217,14 +203,7 @@ def read_outcome(directory: Path) -> Outcome:
         )
     try:
         found = dict(json.loads(path.read_text()))
-        complete = {
-            "claims",
-            "experiments",
-            "runs",
-            "made",
-            "runs_made",
-        } <= found.keys()
-        if not (complete and all("figures" in each for each in found["experiments"])):
+        if not {"claims", "experiments", "runs", "made", "runs_made"} <= found.keys():
             raise KeyError
     except (ValueError, TypeError, KeyError) as error:
         raise ValueError(
@@ -254,6 +233,7 @@ def write_pages(directory: Path) -> Path:
     )
     names = {each["name"] for each in found["experiments"]}
     write_claims(directory / CLAIMS_TABLE, found["claims"], names, facts)
+    runs_made = {f"runs, {name}": each for name, each in found["runs_made"].items()}
     write_report(
         directory / PAGE,
         title="Ant Colony Learning put to the test",
@@ -264,28 +244,24 @@ def write_pages(directory: Path) -> Path:
         claims=found["claims"],
         animation=ANIMATION,
         command=f"acl-gym reproduce all --runs {found['runs']}",
-        made={
-            **found["made"],
-            **{f"runs, {name}": each for name, each in found["runs_made"].items()},
-        },
+        made={**found["made"], **runs_made},
     )
     return directory / PAGE
 
 
-def _stamp(jobs: Iterable[Job], drawn: Iterable[str]) -> str:
-    """A hash over all that a folder is made from: runs, figures, the package's files."""
-    digest = hashlib.sha256(json.dumps(sorted(drawn)).encode())
-    for job in jobs:
-        digest.update(job.key.encode())
+def _stamp(jobs: Sequence[Job], figures: bool) -> str:
+    """A hash over all that a folder is made from: runs, and the package's files."""
+    digest = hashlib.sha256(json.dumps([job.key for job in jobs]).encode())
+    digest.update(str(figures).encode())
     for path in sorted(ROOT.rglob("*")):
-        if path.suffix in (".py", ".j2", ".txt", ".json", ".toml", ".mplstyle"):
+        if path.is_file() and path.parent.name != "__pycache__":
             digest.update(path.relative_to(ROOT).as_posix().encode())
             digest.update(path.read_bytes())
     return digest.hexdigest()
 
 
 def _finished(
-    directory: Path, jobs: Sequence[Job], drawn: Sequence[str]
+    directory: Path, jobs: Sequence[Job], names: Sequence[str], figures: bool
 ) -> Outcome | None:
     """The outcome in a folder if all of it is there, made from this; None otherwise."""
     try:
@@ -293,9 +269,9 @@ def _finished(
         found = read_outcome(directory)
     except (OSError, ValueError, KeyError, TypeError):
         return None
-    files = [directory / RESULTS, directory / ROWS, *_figures(directory, drawn)]
-    files += [directory / PAGE, directory / CLAIMS_TABLE] if drawn else []
-    if stamp != _stamp(jobs, drawn) or not all(path.is_file() for path in files):
+    files = [directory / RESULTS, directory / ROWS]
+    files += _drawn(directory, names) if figures else []
+    if stamp != _stamp(jobs, figures) or not all(path.is_file() for path in files):
         return None
     store = Store(directory / _KEPT_RUNS)
     return found if all(store.has(job) for job in jobs) else None
@@ -306,16 +282,16 @@ def _clear(directory: Path) -> None:
 
     Runs stay, and pictures that are not of an experiment.
     """
-    old = [directory / name for name in (_FINISHED, PAGE, CLAIMS_TABLE)]
-    old += _figures(directory, [each.name for each in EXPERIMENTS])
+    old = [directory / _FINISHED, *_drawn(directory, [e.name for e in EXPERIMENTS])]
     for folder in (directory, directory / _FIGURES):
         old += folder.glob(".*.tmp")
     for path in old:
         path.unlink(missing_ok=True)
 
 
-def _figures(directory: Path, names: Sequence[str]) -> list[Path]:
-    """The files of the figures of experiments."""
+def _drawn(directory: Path, names: Sequence[str]) -> list[Path]:
+    """The report, and the figures of experiments."""
     files = [f"{name}.{kind}" for name in names for kind in ("png", "svg")]
     files += [ANIMATION] if ANIMATED in names else []
-    return [directory / _FIGURES / file for file in files]
+    pages = [directory / PAGE, directory / CLAIMS_TABLE]
+    return pages + [directory / _FIGURES / file for file in files]

@@ -49,8 +49,7 @@ def animate(path: Path, seed: int = 0, shown: tuple[int, ...] = SHOWN) -> None:
         policy = agent.policy.copy()
         cost = evaluate_policy_cost(policy, task.make_system_env(1), max_steps=300).cost
         name = f"after {trial} trials" if trial else "before learning"
-        title = f"{name}\npolicy cost {digits(cost)}"
-        drawn = Shown("", title, study, policy, 0.0, parts.LOOKS["acl"])
+        drawn = Shown(f"{name}\npolicy cost {digits(cost)}", "policy", study, policy)
         steps = round(_SECONDS / _STEP)
         swing = record_trajectory(
             policy, task.make_system_env(1), np.zeros(2), max_steps=steps
@@ -75,7 +74,6 @@ def _background(shown: Shown) -> tuple[Image.Image, float, float, float]:
     left, middle, right = figure.subplots(1, 3, width_ratios=(1, 1.18, 1))
     pendulum.draw_policy(left, shown)
     left.set_ylabel(pendulum.OMEGA)
-    left.set_title("policy")
     policy: Any = shown.policy
     strongest = policy.table.max(axis=1).reshape(shown.study.cells).T
     shades = middle.imshow(
@@ -87,7 +85,7 @@ def _background(shown: Shown) -> tuple[Image.Image, float, float, float]:
     )
     middle.grid(visible=False)
     middle.set_title("strongest pheromone")
-    parts.multiples_of_pi(middle.xaxis)
+    pendulum.multiples_of_pi(middle.xaxis)
     for ax in (left, middle):
         ax.set_xlabel(pendulum.THETA)
     figure.colorbar(shades, ax=middle, pad=0.02)
@@ -95,7 +93,7 @@ def _background(shown: Shown) -> tuple[Image.Image, float, float, float]:
     right.set_xlim(-1.2, 1.2)
     right.set_ylim(-1.2, 1.2)
     right.set_axis_off()
-    right.set_title(shown.title)
+    right.set_title(shown.label)
     figure.set_dpi(_DPI)
     canvas: Any = figure.canvas
     canvas.draw()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -46,7 +45,7 @@ def bands(experiment: Experiment, results: Results) -> Figure:
     _scale(axes[0], measure)
     parts.label_outer(axes, columns, "trial")
     figure.supylabel(NAMES[measure])
-    handles = _handles(results, studies.values(), optimum=measure == "policy_cost")
+    handles = _handles(experiment, results, optimum=measure == "policy_cost")
     parts.legend(figure, handles)
     return figure
 
@@ -65,7 +64,7 @@ def measures(experiment: Experiment, results: Results) -> Figure:
     for ax, name in zip(axes, names, strict=False):
         _scale(ax, name)
     parts.label_outer(axes, 3, "trial")
-    parts.legend(figure, _handles(results, experiment.studies.values()))
+    parts.legend(figure, _handles(experiment, results))
     return figure
 
 
@@ -79,13 +78,12 @@ def bands_and_policies(experiment: Experiment, results: Results) -> Figure:
         above.set_title(each.label.partition(" (")[0])
         above.set_xlabel("trial")
         pendulum.draw_policy(below, each)
-        below.set_title(each.title)
         below.set_xlabel(pendulum.THETA)
     _scale(axes[0, 0], "policy_cost")
     axes[0, 0].set_ylabel(NAMES["policy_cost"])
     axes[1, 0].set_ylabel(pendulum.OMEGA)
-    handles = _handles(results, experiment.studies.values(), optimum=True)
-    parts.legend(figure, [*handles, *pendulum.handles(shown[0].study)])
+    handles = pendulum.handles(shown[0].study)
+    parts.legend(figure, [*_handles(experiment, results, optimum=True), *handles])
     return figure
 
 
@@ -111,12 +109,12 @@ def _scale(ax: Axes, measure: str) -> None:
 
 
 def _handles(
-    results: Results, studies: Iterable[Study], optimum: bool = False
+    experiment: Experiment, results: Results, optimum: bool = False
 ) -> list[Any]:
-    studies = list(studies)
-    runs = len(results.runs(studies[0]))
+    studies = list(experiment.studies.values())
+    label = f"mean of {len(results.runs(studies[0]))} runs"
     handles: list[Any] = [
-        Line2D([], [], **_MEAN, label=f"mean of {runs} runs"),
+        Line2D([], [], **_MEAN, label=label),
         Patch(color="0.8", label="from the lowest to the highest"),
     ]
     if optimum and any(optimal_cost(study) for study in studies):
@@ -124,31 +122,28 @@ def _handles(
     return handles
 
 
+_AXES = {"env_steps": "interactions", "seconds": "seconds of learning"}
+_HALVES = ((0.0, 1.0), (0.25, 0.75))
+
+
 def race(experiment: Experiment, results: Results) -> Figure:
     """Policy cost over interactions and over seconds, and the last policies."""
-    known = parts.reference(experiment, results)
+    known, studies = parts.reference(experiment, results), experiment.studies.values()
     figure = parts.new_figure(3.2)
     steps, seconds, last = figure.subplots(1, 3, width_ratios=(1.0, 1.0, 0.8))
     seconds.sharey(steps)
-    for ax, x, label in (
-        (steps, "env_steps", "interactions"),
-        (seconds, "seconds", "seconds of learning"),
-    ):
-        for study in experiment.studies.values():
-            _curve(ax, results.runs(study), x, study, halves=True)
-        ax.set_xlabel(label)
+    for ax, x in ((steps, "env_steps"), (seconds, "seconds")):
+        _curves(ax, experiment, results, x, spans=_HALVES)
         ax.axhline(known.cost, **parts.BOUND)
-    looks = [(parts.look(study), study) for study in experiment.studies.values()]
-    draw_strips(last, looks, results)
+    draw_strips(last, [(parts.look(study), study) for study in studies], results)
     last.axhline(known.cost, **parts.BOUND)  # its own scale: costs are close together
     last.set_xlabel("last policies")
     parts.plain_log(last.yaxis)
-    steps.set_ylabel("policy cost $J^h$")
+    steps.set_ylabel(NAMES["policy_cost"])
     steps.set_ylim(bottom=known.cost / 1.4)  # room for the name of the line
     parts.plain_log(steps.yaxis)
     seconds.tick_params(labelleft=False)
     parts.cost_line(steps, known)
-    _legend(figure, experiment)
     return figure
 
 
@@ -156,42 +151,46 @@ def learning_curves(experiment: Experiment, results: Results) -> Figure:
     """Policy cost over interactions and seconds, at the time and best so far."""
     known = parts.reference(experiment, results)
     figure, axes = parts.small_multiples(4, 2, 2.3, sharex="col", sharey=True)
-    columns = (("env_steps", "interactions"), ("seconds", "seconds of learning"))
-    highest = 1.2 * known.cost
     for place, ax in enumerate(axes):
-        x, label = columns[place % 2]
-        for study in experiment.studies.values():
-            top = _curve(ax, results.runs(study), x, study, best_so_far=place > 1)
-            highest = max(highest, 1.1 * top)
+        x = list(_AXES)[place % 2]
+        _curves(ax, experiment, results, x, best_so_far=place > 1)
         parts.cost_line(ax, known)
-        if place > 1:
-            ax.set_xlabel(label)
-    axes[0].set_ylim(0.85 * known.cost, min(highest, _HIGHEST * known.cost))
+    for ax in axes[:2]:
+        ax.set_xlabel("")
+    highest = min(axes[0].get_ylim()[1], _HIGHEST * known.cost)
+    axes[0].set_ylim(0.85 * known.cost, max(highest, 1.2 * known.cost))
     parts.plain_log(axes[0].yaxis)
     axes[0].set_ylabel("cost of the policy at the time")
     axes[2].set_ylabel("cost of the best policy so far")
-    _legend(figure, experiment)
     return figure
 
 
-def _curve(
+def _curves(
     ax: Axes,
-    runs: list[Run],
+    experiment: Experiment,
+    results: Results,
     x: str,
-    study: Study,
     *,
     best_so_far: bool = False,
-    halves: bool = False,
-) -> float:
-    """Policy cost over `x`, from where every run has a policy; the highest cost."""
-    at, values = steps_of(runs, x, best_so_far=best_so_far)
-    line = parts.look(study).line
-    parts.draw_band(ax, at, values, line, step=True, halves=halves)
+    **options: Any,
+) -> None:
+    """Policy costs over `x` for each study, and a legend of the figure."""
+    handles = []
+    for label, study in experiment.studies.items():
+        line = parts.look(study).line
+        runs = results.runs(study)
+        at, values = steps_of(runs, x, best_so_far=best_so_far)
+        parts.draw_band(ax, at, values, line, step=True, **options)
+        handles.append(Line2D([], [], **line, label=label))
     ax.set_xscale("log")
     ax.set_yscale("log")
+    ax.set_xlabel(_AXES[x])
     if x == "seconds":
         parts.plain_numbers(ax.xaxis)
-    return float(values.max())
+    figure: Any = ax.figure
+    if not figure.legends:
+        columns = len(handles) if len(handles) <= 5 else math.ceil(len(handles) / 2)
+        parts.legend(figure, handles, ncols=columns)
 
 
 def steps_of(
@@ -199,21 +198,12 @@ def steps_of(
 ) -> tuple[FloatArray, FloatArray]:
     """Where a policy cost of some run changes, `(n,)`, and all of them, `(runs, n)`.
 
-    A policy counts from its evaluation to the next one, the last one to the end.
+    A policy counts from its evaluation to the next one, the last one to the end. The
+    curves begin where each run has a policy.
     """
     rows = [run.rows for run in runs]
     if best_so_far:
         rows = [each.assign(policy_cost=each["policy_cost"].cummin()) for each in rows]
     at = np.unique(np.concatenate([each[x] for each in rows]))
-    at = at[at >= max(each[x].iloc[0] for each in rows)]
-    at = at[at > 0]  # the axis is logarithmic
+    at = at[(at >= max(each[x].iloc[0] for each in rows)) & (at > 0)]  # for a log axis
     return at, np.stack([held(each, x, at, "policy_cost") for each in rows])
-
-
-def _legend(figure: Figure, experiment: Experiment) -> None:
-    handles = [
-        Line2D([], [], **parts.look(study).line, label=label)
-        for label, study in experiment.studies.items()
-    ]
-    columns = len(handles) if len(handles) <= 5 else math.ceil(len(handles) / 2)
-    parts.legend(figure, handles, ncols=columns)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -16,13 +15,10 @@ from acl_gym.experiments.comparison.experiments import LABELS
 from acl_gym.experiments.plots import parts
 from acl_gym.experiments.plots.parts import LOOKS, Look
 from acl_gym.experiments.results import Results
-from acl_gym.experiments.statistics import Estimate, estimate
+from acl_gym.experiments.statistics import estimate
 from acl_gym.experiments.study import Experiment, Study
 from acl_gym.experiments.tables import MARKS, summarise
 from acl_gym.utils.typing import FloatArray
-
-Entry = dict[str, Any]
-"""Of one method, see `tables.summarise`."""
 
 _NARROW = 1.05
 """An axis spans more than this factor, so that nothing looks like much."""
@@ -50,7 +46,7 @@ def draw_strips(
     for place, ((look, _), values) in enumerate(zip(studies, costs, strict=True)):
         spread = np.linspace(-0.28, 0.04, len(values)) if len(values) > 1 else [-0.12]
         _points(ax, place + np.asarray(spread), values, look)
-        _estimates(ax, [place + 0.24], [estimate(values)], look)
+        _estimates(ax, [place + 0.24], [values], look)
     low, high = np.min(np.concatenate(costs)), np.max(np.concatenate(costs))
     if high < _NARROW * low:
         ax.set_ylim(low / _NARROW, high * _NARROW)
@@ -70,8 +66,7 @@ def sweep(experiment: Experiment, results: Results) -> Figure:
         costs = [results.last(row[name]) for row in rows.values()]
         for where, values in zip(at, costs, strict=True):
             _points(ax, np.full(len(values), where), values, LOOKS[name], marker="_")
-        found = [estimate(values) for values in costs]
-        _estimates(ax, at, found, LOOKS[name], **LOOKS[name].line)
+        _estimates(ax, at, costs, LOOKS[name], **LOOKS[name].line)
     ax.set_xscale("log")
     ax.set_yscale("log")
     ax.set_xticks(x, labels=list(map(str, x)))
@@ -103,15 +98,15 @@ def order(experiment: Experiment, results: Results) -> Figure:
 
 def _points(ax: Axes, x: Any, y: FloatArray, look: Look, **options: Any) -> None:
     """Values of runs, faintly."""
-    shape = {"marker": look.marker, "markersize": 2.5, "alpha": 0.45, **options}
-    ax.plot(x, y, linestyle="", color=look.color, **shape)
+    style = {"marker": look.marker, "markersize": 2.5, "alpha": 0.45, **options}
+    ax.plot(x, y, linestyle="", color=look.color, **style)
 
 
 def _estimates(
-    ax: Axes, x: Any, found: Sequence[Estimate], look: Look, **line: Any
+    ax: Axes, x: Any, costs: list[FloatArray], look: Look, **line: Any
 ) -> None:
-    """Estimates with their intervals."""
-    value, low, high = np.array(found).T
+    """Interquartile means with their intervals."""
+    value, low, high = np.array([estimate(each) for each in costs]).T
     ends = np.nan_to_num([value - low, high - value])
     line = {"color": look.color, "linestyle": "", "linewidth": 1.2, **line}
     ax.errorbar(x, value, ends, marker=look.marker, **line)
@@ -131,23 +126,34 @@ def summary(experiment: Experiment, results: Results) -> Figure:
         parts.reference(experiment, results),
         summarise(experiment, results),
     )
-    looks = [parts.look(study) for study in experiment.studies.values()]
+    colors = [parts.look(study).color for study in experiment.studies.values()]
     figure = parts.new_figure(1.3 + 0.36 * len(entries))
     axes = figure.subplots(1, 3, sharey=True, width_ratios=(1.2, 1, 1))
-    symbol = " of J*" if known.symbol == "J*" else ""  # others would be too long
-    close = (f"within {MARKS[0]}%", f"within {MARKS[1]}%{symbol}")
-    costs, policies = ("final_policy_cost", "best_policy_cost"), ("last", "best policy")
-    panels = [("policy cost", costs, policies)]
-    for title, x in (("seconds of learning", "seconds"), ("interactions", "env_steps")):
-        panels.append((title, (f"{x}_to_{MARKS[0]}", f"{x}_to_{MARKS[1]}"), close))
-    for ax, (title, keys, names) in zip(axes, panels, strict=True):
+    axes[0].set_yticks(range(len(entries)), [entry["label"] for entry in entries])
+    axes[0].set_ylim(len(entries) - 0.5, -0.7)
+    close = [f"within {mark}%" for mark in MARKS]
+    panels = (
+        ("policy cost", "{}_policy_cost", ("final", "best"), ["last", "best policy"]),
+        ("seconds of learning", "seconds_to_{}", MARKS, close),
+        ("interactions", "env_steps_to_{}", MARKS, close),
+    )
+    for ax, (title, key, which, names) in zip(axes, panels, strict=True):
         ax.set_xscale("log")
         ax.set_title(title, pad=21)
         ax.xaxis.set_minor_formatter(NullFormatter())
-        end = _set_limits(ax, entries, keys)
-        for row, (entry, look) in enumerate(zip(entries, looks, strict=True)):
-            for shift, key in zip((-0.16, 0.16), keys, strict=True):
-                _draw_entry(ax, row + shift, entry, key, look.color, end, shift < 0)
+        rows = [
+            (row + shift, entry[key.format(each)], entry["seeds"], color, shift < 0)
+            for row, (entry, color) in enumerate(zip(entries, colors, strict=True))
+            for each, shift in zip(which, (-0.16, 0.16), strict=True)
+        ]
+        for y, found, runs, color, hollow in rows:
+            _draw_median(ax, y, found, runs, color, hollow=hollow)
+        end = ax.get_xlim()[1]
+        for y, found, _, color, _ in rows:  # of some runs there is no value
+            if found["low"] is not None and found["high"] is None:
+                ax.plot([found["low"], end], [y, y], color=color)
+                ax.plot(end, y, color=color, marker=">", clip_on=False)
+        ax.set_xlim(right=end)
         handles = [
             Line2D([], [], **_marker("0.3", hollow=hollow), label=name)
             for hollow, name in zip((True, False), names, strict=True)
@@ -160,60 +166,24 @@ def summary(experiment: Experiment, results: Results) -> Figure:
     parts.cost_line(axes[0], known, vertical=True)
     parts.plain_log(axes[0].xaxis)
     parts.plain_numbers(axes[1].xaxis)
-    axes[0].set_yticks(range(len(entries)), [entry["label"] for entry in entries])
-    axes[0].set_ylim(len(entries) - 0.5, -0.7)
     return figure
 
 
-def _set_limits(ax: Axes, entries: list[Entry], keys: tuple[str, str]) -> float:
-    """Set the x limits; beyond the value returned is where "never" is written."""
-    shown = [entry[key] for entry in entries for key in keys]
-    ends = [each[name] for each in shown for name in ("low", "median", "high")]
-    finite = [end for end in ends if end is not None] or [1.0, 10.0]
-    low, high = min(finite), max(finite)
-    if "cost" not in keys[0] and high < 10 * low:
-        # Powers of ten, so that the axis has ticks to read it by.
-        low = 10.0 ** math.floor(math.log10(low))
-        high = 10.0 ** (math.floor(math.log10(high)) + 1)
-    margin = max(high / low, 1.5) ** 0.06
-    never = any(
-        _reached(entry, key) < entry["seeds"] for entry in entries for key in keys
-    )
-    ax.set_xlim(low / margin, high * margin ** (8 if never else 1))
-    return float(high * margin)
-
-
-def _reached(entry: Entry, key: str) -> int:
-    """How many runs have a value."""
-    return int(entry[key].get("reached", entry["seeds"]))
-
-
-def _draw_entry(
-    ax: Axes, y: float, entry: Entry, key: str, color: str, end: float, hollow: bool
+def _draw_median(
+    ax: Axes, y: float, found: dict[str, Any], runs: int, color: str, *, hollow: bool
 ) -> None:
-    """A median and its interval; in words, how many runs have a value if not all."""
-    found, reached = entry[key], _reached(entry, key)
-    if found["low"] is not None:
-        unbounded = found["high"] is None
-        ax.plot(
-            [found["low"], end if unbounded else found["high"]], [y, y], color=color
-        )
-        if unbounded:
-            ax.plot(end, y, color=color, marker=">")
+    """A median and its interval; beside the panel how many runs have a value if few."""
+    if found["low"] is not None and found["high"] is not None:
+        ax.plot([found["low"], found["high"]], [y, y], color=color)
     if found["median"] is not None:
         ax.plot(found["median"], y, **_marker(color, hollow=hollow))
-    if reached < entry["seeds"]:
-        text = f"{reached} of {entry['seeds']}" if reached else "never"
-        style = {"va": "center", "ha": "right", "fontsize": "small", "color": "0.3"}
-        ax.annotate(text, (0.99, y), xycoords=("axes fraction", "data"), **style)
+    reached = found.get("reached", runs)
+    if reached < runs:
+        text = f"{reached} of {runs}" if reached else "never"
+        style = {"va": "center", "fontsize": "small", "color": "0.3"}
+        ax.text(1.02, y, text, transform=ax.get_yaxis_transform(), **style)
 
 
 def _marker(color: str, *, hollow: bool) -> dict[str, Any]:
-    return {
-        "color": color,
-        "marker": "o",
-        "linestyle": "",
-        "markersize": 5,
-        "markerfacecolor": "white" if hollow else color,
-        "markeredgewidth": 1.2,
-    }
+    style = {"marker": "o", "linestyle": "", "markersize": 5, "markeredgewidth": 1.2}
+    return {"color": color, "markerfacecolor": "white" if hollow else color, **style}

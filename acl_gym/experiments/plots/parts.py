@@ -18,13 +18,7 @@ from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from matplotlib.ticker import (
-    FuncFormatter,
-    LogLocator,
-    MaxNLocator,
-    MultipleLocator,
-    NullFormatter,
-)
+from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
 from acl_gym.evaluation import Predictor
 from acl_gym.experiments.results import Results
@@ -42,14 +36,7 @@ _MINUS = "\N{MINUS SIGN}"
 
 
 class Look(NamedTuple):
-    """How a method is drawn, in every figure alike.
-
-    Attributes:
-        color: of lines and markers.
-        dashes: of lines.
-        marker: of points.
-        short: its name where there is little room.
-    """
+    """How a method is drawn, in every figure alike; `short` is its name on an axis."""
 
     color: str
     dashes: Any = "-"
@@ -71,11 +58,9 @@ LOOKS = {
     "q-lambda": Look("#882255", "-", "^", "Q(λ)"),
     "q-lambda-crisp": Look("#CC79A7", _DASHES, "^", "Q(λ)"),
     "dqn": Look(GREEN, (0, (6, 1, 1, 1)), "D", "DQN"),
+    "planning": Look("0.55"),
 }
-"""By what `kind_of` says, or by the name that an experiment gives to a method."""
-
-REFERENCE = Look("0.55")
-"""Of a policy that dynamic programming has found."""
+"""By the name that an experiment gives to a method, or as `look` composes it."""
 
 BOUND: dict[str, Any] = {"color": "0.2", "linewidth": 0.9, "zorder": 1.2}
 """Of a line that is a limit: the optimal cost, the goal."""
@@ -83,7 +68,7 @@ BOUND: dict[str, Any] = {"color": "0.2", "linewidth": 0.9, "zorder": 1.2}
 
 def look(study: Study) -> Look:
     """How a study is drawn beside others."""
-    name = {"q-learning": "q"}.get(study.method, study.method)
+    name = "q" if study.method == "q-learning" else study.method
     if study.settings.get("trace_decay", 0) > 0:
         name = "q-lambda"
     return LOOKS.get(f"{name}-{study.kind}", LOOKS[name])
@@ -99,39 +84,29 @@ class Shown:
         study: says on which system.
         policy: for the system without perturbations.
         success_rate: of its evaluation.
-        look: of its lines.
     """
 
     label: str
     title: str
     study: Study
     policy: Predictor
-    success_rate: float
-    look: Look
+    success_rate: float = 0.0
 
 
 class Reference(NamedTuple):
-    """What policies are held against.
+    """What policies are held against: a study, its cost, and a symbol for that."""
 
-    Attributes:
-        label: of its study.
-        study: found by dynamic programming.
-        cost: of its policy.
-        symbol: J*, or what stands for it.
-    """
-
-    label: str
     study: Study
     cost: float
     symbol: str
 
 
 def reference(experiment: Experiment, results: Results) -> Reference:
-    """The first reference, which is the optimum if its label is J*, or an option says so."""
+    """The first reference, which is the optimum if it is called J* or an option says so."""
     label, study = next(iter(experiment.references.items()))
     optimum = experiment.options.get("optimum", label == "J*")
-    symbol = "J*" if optimum else "best known"
-    return Reference(label, study, reference_cost(experiment, results), symbol)
+    cost = reference_cost(experiment, results)
+    return Reference(study, cost, "J*" if optimum else "best known")
 
 
 def new_figure(height: float, width: float = WIDTH) -> Figure:
@@ -144,34 +119,22 @@ def new_figure(height: float, width: float = WIDTH) -> Figure:
 def small_multiples(
     count: int, columns: int, height: float, width: float = WIDTH, **options: Any
 ) -> tuple[Figure, list[Axes]]:
-    """So many panels, row by row.
-
-    Args:
-        count: how many, >= 1.
-        columns: how many there are side by side at most.
-        height: of one, inches.
-        width: of the figure with all columns, inches; with fewer it is narrower.
-        options: of `Figure.subplots`.
-    """
-    shown = min(columns, count)
-    rows = math.ceil(count / shown)
-    figure = new_figure(0.75 + height * rows, 0.5 + (width - 0.5) * shown / columns)
-    axes = figure.subplots(rows, shown, squeeze=False, **options).ravel()
-    for place, ax in enumerate(axes):
-        if place >= count:
-            ax.remove()
-        elif place >= count - shown:  # the lowest of its column
-            ax.tick_params(labelbottom=True)
+    """So many panels, row by row; `height` is that of one, `options` are of `subplots`."""
+    rows = math.ceil(count / columns)
+    figure = new_figure(0.75 + height * rows, width)
+    axes = figure.subplots(rows, columns, squeeze=False, **options).ravel()
+    for ax in axes[count:]:
+        ax.remove()
     return figure, list(axes[:count])
 
 
 def label_outer(axes: Sequence[Axes], columns: int, x: str, y: str = "") -> None:
-    """Name the axes of the lowest panels of each column, and of the first column."""
-    for place, ax in enumerate(axes):
-        if place >= len(axes) - columns:
-            ax.set_xlabel(x)
-        if place % columns == 0:
-            ax.set_ylabel(y)
+    """Name the axes of the lowest panel of each column, and of the first column."""
+    for ax in axes[-columns:]:
+        ax.set_xlabel(x)
+        ax.tick_params(labelbottom=True)
+    for ax in axes[::columns]:
+        ax.set_ylabel(y)
 
 
 def draw_band(
@@ -182,7 +145,7 @@ def draw_band(
     *,
     centre: Callable[..., Any] = np.median,
     step: bool = False,
-    halves: bool = False,
+    spans: Sequence[tuple[float, float]] = ((0.0, 1.0),),
     alpha: float = 0.15,
 ) -> None:
     """A line for the centre of some runs, and a band from the lowest to the highest.
@@ -191,19 +154,18 @@ def draw_band(
         ax: where.
         x: increasing, `(n,)`.
         values: of each run, `(runs, n)`.
-        line: how the line is drawn; its colour is that of the band.
+        line: how the line is drawn; bands have its colour.
         centre: of values along an axis.
-        step: whether values hold until the next one.
-        halves: whether the middle half of the runs has a band as well.
-        alpha: how dark bands are.
+        step: whether each value holds until the next one.
+        spans: from which to which quantile there are bands.
+        alpha: opacity of a band, 0..1.
     """
-    spans = [(0.0, 1.0), (0.25, 0.75)] if halves else [(0.0, 1.0)]
     for span in spans:
         low, high = np.quantile(values, span, axis=0)
-        area = {"color": line["color"], "alpha": alpha, "linewidth": 0}
-        ax.fill_between(x, low, high, step="post" if step else None, **area)
-    style = "steps-post" if step else "default"
-    ax.plot(x, centre(values, axis=0), drawstyle=style, **line)
+        style = {"color": line["color"], "alpha": alpha, "linewidth": 0}
+        ax.fill_between(x, low, high, step="post" if step else None, **style)
+    style = {"drawstyle": "steps-post" if step else "default", **line}
+    ax.plot(x, centre(values, axis=0), **style)
 
 
 def legend(parent: Axes | Figure, handles: Iterable[Any], **options: Any) -> None:
@@ -215,18 +177,11 @@ def legend(parent: Axes | Figure, handles: Iterable[Any], **options: Any) -> Non
 
 def cost_line(ax: Axes, known: Reference, *, vertical: bool = False) -> None:
     """A line at the cost of a reference, with its name."""
-    draw = ax.axvline if vertical else ax.axhline
-    draw(known.cost, **BOUND)
-    place: Any = (known.cost, 1.0) if vertical else (0.01, known.cost)
-    ax.annotate(
-        f"{known.symbol} = {digits(known.cost)}",
-        place,
-        xycoords=("data", "axes fraction") if vertical else ("axes fraction", "data"),
-        xytext=(2.5, 0) if vertical else (0, -2),
-        textcoords="offset points",
-        fontsize="small",
-        va="top",
-    )
+    (ax.axvline if vertical else ax.axhline)(known.cost, **BOUND)
+    transform = ax.get_xaxis_transform() if vertical else ax.get_yaxis_transform()
+    place = (known.cost * 1.02, 1.0) if vertical else (0.01, known.cost / 1.005)
+    text = f"{known.symbol} = {digits(known.cost)}"
+    ax.text(*place, text, transform=transform, fontsize="small", va="top")
 
 
 def plain_log(axis: Axis) -> None:
@@ -248,12 +203,6 @@ def plain_numbers(axis: Axis) -> None:
     axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
 
 
-def multiples_of_pi(axis: Axis) -> None:
-    """Ticks at multiples of pi / 2."""
-    axis.set_major_locator(MultipleLocator(math.pi / 2))
-    axis.set_major_formatter(FuncFormatter(lambda value, _: as_pi(value)))
-
-
 def as_pi(value: float) -> str:
     """A multiple of pi / 2 as a fraction."""
     halves = round(2 * value / math.pi)
@@ -264,9 +213,9 @@ def as_pi(value: float) -> str:
     return f"{sign}{number if number > 1 else ''}\N{GREEK SMALL LETTER PI}{tail}"
 
 
-def torque(value: float) -> str:
+def signed(torque: float) -> str:
     """A torque with its sign and unit."""
-    return f"{_MINUS if value < 0 else '+' if value > 0 else ''}{abs(value):g} N m"
+    return f"{torque:+g} N m".replace("-", _MINUS) if torque else "0 N m"
 
 
 _SYMBOLS = {

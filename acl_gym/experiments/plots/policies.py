@@ -10,13 +10,7 @@ from matplotlib.figure import Figure
 
 from acl_gym.experiments.methods import restore_policy
 from acl_gym.experiments.plots import grid, navigation, pendulum
-from acl_gym.experiments.plots.parts import (
-    REFERENCE,
-    Shown,
-    in_symbols,
-    look,
-    reference,
-)
+from acl_gym.experiments.plots.parts import Shown, in_symbols, reference
 from acl_gym.experiments.results import Results
 from acl_gym.experiments.statistics import digits
 from acl_gym.experiments.study import (
@@ -38,7 +32,8 @@ SYSTEMS: dict[str, ModuleType] = {
 
 def policies(experiment: Experiment, results: Results) -> Figure:
     """The last policy of each study's run with the cheapest one."""
-    return _maps(best(experiment, results), paths=True)
+    shown = best(experiment, results)
+    return _drawing("policies", shown, paths=True)
 
 
 def baseline(experiment: Experiment, results: Results) -> Figure:
@@ -46,25 +41,28 @@ def baseline(experiment: Experiment, results: Results) -> Figure:
     shown = []
     for label, study in experiment.references.items():
         discount = results.last(study, "discount")[0]
-        label = f"{label}, discount {discount:g}"
-        shown.append(_shown(label, study, results, 0))
-    return _maps(shown, paths=True)
+        shown.append(_shown(f"{label}, discount {discount:g}", study, results, 0))
+    return _drawing("policies", shown, paths=True)
 
 
 def policy_maps(experiment: Experiment, results: Results) -> Figure:
     """The reference, and the last policy of the median run of each study."""
-    return _maps(_with_reference(experiment, results))
+    return _drawing("policies", _with_reference(experiment, results))
 
 
 def swing(experiment: Experiment, results: Results) -> Figure:
     """The pendulum swung up from rest by the policies of `policies`."""
-    return pendulum.trajectories(best(experiment, results))
+    return _drawing("trajectories", best(experiment, results))
 
 
 def trajectories(experiment: Experiment, results: Results) -> Figure:
     """What the policies of `policy_maps` do."""
-    shown = _with_reference(experiment, results)
-    figure: Figure = SYSTEMS[shown[0].study.task.env_id].trajectories(shown)
+    return _drawing("trajectories", _with_reference(experiment, results))
+
+
+def _drawing(name: str, shown: list[Shown], **options: Any) -> Figure:
+    module = SYSTEMS[shown[0].study.task.env_id]
+    figure: Figure = getattr(module, name)(shown, **options)
     return figure
 
 
@@ -78,10 +76,12 @@ def best(experiment: Experiment, results: Results) -> list[Shown]:
 
 def _with_reference(experiment: Experiment, results: Results) -> list[Shown]:
     known = reference(experiment, results)
-    name = "Optimum" if known.symbol == "J*" else "Best policy known"
+    name, symbol = "Best policy known", "cost"
+    if known.symbol == "J*":
+        name, symbol = "Optimum", "J* ="
     first = _shown(name, known.study, results, 0)
     return [
-        replace(first, title=f"{name}\n{known.symbol} = {digits(known.cost)}"),
+        replace(first, title=f"{name}\n{symbol} {digits(known.cost)}"),
         *(
             _shown(label, study, results, results.median_run(study))
             for label, study in experiment.studies.items()
@@ -91,20 +91,9 @@ def _with_reference(experiment: Experiment, results: Results) -> list[Shown]:
 
 def _shown(label: str, study: Study, results: Results, run: int) -> Shown:
     found = results.runs(study)[run]
-    last: Any = found.rows.iloc[-1]
-    name = in_symbols(label)
-    planned = study.method == "planning"
-    return Shown(
-        label=name if planned else f"{name} (seed {found.seed})",
-        title=f"{name}{'' if planned else f' (seed {found.seed})'}\n"
-        f"cost {digits(last['policy_cost'])}",
-        study=study,
-        policy=restore_policy(study, found),
-        success_rate=float(last["success_rate"]),
-        look=REFERENCE if planned else look(study),
-    )
-
-
-def _maps(shown: list[Shown], **options: Any) -> Figure:
-    figure: Figure = SYSTEMS[shown[0].study.task.env_id].policies(shown, **options)
-    return figure
+    last = found.rows.iloc[-1]
+    seed = "" if study.method == "planning" else f" (seed {found.seed})"
+    label = f"{in_symbols(label)}{seed}"
+    title = f"{label}\ncost {digits(last['policy_cost'])}"
+    policy = restore_policy(study, found)
+    return Shown(label, title, study, policy, float(last["success_rate"]))

@@ -6,6 +6,7 @@ import io
 import tomllib
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import matplotlib as mpl
 from matplotlib.figure import Figure
@@ -86,15 +87,12 @@ def save(
         for kind in kinds:
             buffer = io.BytesIO()
             with mpl.rc_context(fname=_STYLE):
-                figure.savefig(buffer, format=kind, metadata=_METADATA.get(kind))
+                figure.savefig(buffer, format=kind)
             path = directory / f"{file_name(experiment, plot)}.{kind}"
             write_atomically(path, buffer.getvalue())
 
 
-_METADATA = {"svg": {"Date": None}}
-
-
-def write_animation(path: Path) -> None:
+def write_animation(path: Path, **options: Any) -> None:
     """Write the animation of a learning colony, see `animation.animate`."""
     with mpl.rc_context(fname=_STYLE):
-        animate(path)
+        animate(path, **options)

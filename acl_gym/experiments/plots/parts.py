@@ -179,8 +179,8 @@ def cost_line(ax: Axes, known: Reference, *, vertical: bool = False) -> None:
     """A line at the cost of a reference, with its name."""
     (ax.axvline if vertical else ax.axhline)(known.cost, **BOUND)
     transform = ax.get_xaxis_transform() if vertical else ax.get_yaxis_transform()
-    place = (known.cost * 1.02, 1.0) if vertical else (0.01, known.cost / 1.005)
-    text = f"{known.symbol} = {digits(known.cost)}"
+    place = (known.cost, 1.0) if vertical else (0.01, known.cost / 1.005)
+    text = f" {known.symbol} = {digits(known.cost)}"
     ax.text(*place, text, transform=transform, fontsize="small", va="top")
 
 
@@ -194,13 +194,13 @@ def plain_log(axis: Axis) -> None:
     subs = (1.0, 2.0, 5.0) if high > 4 * low else (1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0)
     narrow = high < 1.5 * low
     axis.set_major_locator(MaxNLocator(4) if narrow else LogLocator(subs=subs))
-    axis.set_minor_formatter(NullFormatter())
     plain_numbers(axis)
 
 
 def plain_numbers(axis: Axis) -> None:
     """Numbers without powers: 0.1, 1, 10."""
     axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_minor_formatter(NullFormatter())
 
 
 def as_pi(value: float) -> str:

@@ -202,7 +202,7 @@ class TestCurves:
         figure = drawn("learning_curves")
         low, high = figure.axes[0].get_ylim()
         assert low < OPTIMUM < high <= 10 * OPTIMUM
-        assert texts(figure).count("J* = 40") == 4
+        assert texts(figure).count(" J* = 40") == 4
 
     def test_one_legend_names_every_method(self) -> None:
         for name in ("learning_curves", "race"):
@@ -313,7 +313,7 @@ class TestDots:
         shown = texts(figure)
         assert shown.count("1 of 3") == 4
         assert shown.count("never") == 4
-        assert "J* = 40" in shown
+        assert " J* = 40" in shown
         medians = [
             line.get_xdata()[0]
             for line in figure.axes[0].lines

@@ -24,20 +24,21 @@ DRAWN = list(
 def test_every_figure_of_every_system_is_drawn(
     experiment: Experiment, tmp_path: Path
 ) -> None:
-    plots.save(experiment, make_results(experiment, 2), tmp_path)
-    png, svg = (tmp_path / f"{experiment.name}.{kind}" for kind in ("png", "svg"))
-    assert png.read_bytes().startswith(b"\x89PNG")
-    assert "<svg" in svg.read_text()[:1000]
+    plots.save(experiment, make_results(experiment, 2), tmp_path, ("svg",))
+    assert "<svg" in (tmp_path / f"{experiment.name}.svg").read_text()[:1000]
 
 
 @pytest.mark.parametrize(
-    "experiment", reproduce.EXPERIMENTS, ids=lambda each: each.name
+    "experiment",
+    [each for each in reproduce.EXPERIMENTS if each.table or each in DRAWN],
+    ids=lambda each: each.name,
 )
-def test_every_summary_is_json(experiment: Experiment) -> None:
+def test_every_kind_of_summary_is_json(experiment: Experiment) -> None:
     found = outcome.summary(experiment, make_results(experiment, 2))
-    assert json.loads(json.dumps(found, allow_nan=False)) == found
-    assert len(found["studies"]) == len(experiment.everything)
-    assert bool(found["table"]) == bool(experiment.table)
+    read = json.loads(json.dumps(found, allow_nan=False))
+    assert read["name"] == experiment.name
+    assert len(read["studies"]) == len(experiment.everything)
+    assert bool(read["table"]) == bool(experiment.table)
 
 
 def test_names_are_chosen_in_the_order_of_the_thesis() -> None:

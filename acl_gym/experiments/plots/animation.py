@@ -60,7 +60,9 @@ def animate(path: Path, seed: int = 0, shown: tuple[int, ...] = SHOWN) -> None:
     both.paste(frames[0], (0, 0))
     both.paste(frames[-1], (0, frames[0].height))
     palette = both.quantize(_COLOURS)
-    first, *rest = (frame.quantize(palette=palette, dither=0) for frame in frames)
+    first, *rest = (
+        frame.quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames
+    )
     buffer = io.BytesIO()
     duration = round(1000 * _STEP / _BETWEEN)
     options = {"save_all": True, "append_images": rest, "loop": 0, "optimize": True}

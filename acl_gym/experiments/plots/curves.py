@@ -25,7 +25,7 @@ NAMES = {
     "policy_variation": "policy variation",
     "sensitivity": "sensitivity",
 }
-_MEAN = {"color": parts.BLACK, "linewidth": 1.0}
+_MEAN: dict[str, Any] = {"color": parts.BLACK, "linewidth": 1.0}
 _OPTIMUM: dict[str, Any] = {"color": parts.BLUE, "linewidth": 0.9, "linestyle": "--"}
 _HIGHEST = 10
 """Times the reference: the first policies cost far more than what matters."""

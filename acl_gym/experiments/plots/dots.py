@@ -180,7 +180,7 @@ def _draw_median(
     reached = found.get("reached", runs)
     if reached < runs:
         text = f"{reached} of {runs}" if reached else "never"
-        style = {"va": "center", "fontsize": "small", "color": "0.3"}
+        style: Any = {"va": "center", "fontsize": "small", "color": "0.3"}
         ax.text(1.02, y, text, transform=ax.get_yaxis_transform(), **style)
 
 

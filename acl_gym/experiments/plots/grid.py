@@ -52,7 +52,8 @@ def policies(shown: list[Shown], paths: bool = False) -> Figure:
             ax.set_ylabel(each.title, rotation=0, ha="right", va="center")
         else:
             ax.set_title(each.title)
-    mappable, style = ScalarMappable(norm, _SHADES), {"shrink": 0.8, "pad": 0.01}
+    mappable = ScalarMappable(norm, _SHADES)
+    style: Any = {"shrink": 0.8, "pad": 0.01}
     bar = figure.colorbar(mappable, ax=axes, label="cost until the goal", **style)
     bar.ax.spines[:].set_visible(False)
     handles = [

@@ -20,8 +20,8 @@ from acl_gym.cli.common import (
 HELP = """Repeat experiments of the thesis and judge its claims.
 
 Runs the figures that are named, 30 colonies for each setting, and writes figures,
-results.json and report.html. A run that is there already, made by the same code, is not
-made again: what was killed goes on when the same command is given again.
+results.json, results.parquet and report.html. A run that is there already, made by the
+same code, is not made again: after an interruption the same command continues.
 
 \b
 Examples:
@@ -33,9 +33,9 @@ Examples:
   acl-gym reproduce all --executor ray       on a cluster (pip install acl-gym[cluster])
 """
 
-REPORT_HELP = """Write the report of a reproduction anew.
+REPORT_HELP = """Write the report of a reproduction again.
 
-It is made from results.json and the figures; no run is needed, and none is made.
+It is made from results.json and the figures; no runs are needed or made.
 
 \b
 Examples:
@@ -48,9 +48,9 @@ class ReproduceCommand(Command):
 
     def format_help(self, ctx: Any, formatter: Any) -> None:
         """Write the help."""
-        from acl_gym.reproduction.catalogue import EXPERIMENTS
+        from acl_gym.experiments.reproduce import EXPERIMENTS
 
-        names = "\n".join(f"  {each.name:17} {each.title}" for each in EXPERIMENTS)
+        names = "\n".join(f"  {each.name:20} {each.title}" for each in EXPERIMENTS)
         self.epilog = f"\b\nExperiments:\n{names}"
         super().format_help(ctx, formatter)
 
@@ -101,55 +101,45 @@ def reproduce(
     debug: DebugOption = False,
 ) -> None:
     """Reproduce; see `HELP`."""
-    from acl_gym.experiments.runner import alone_in
-    from acl_gym.reproduction import reproduce as reproduction
-    from acl_gym.reproduction import resume
-    from acl_gym.reproduction.catalogue import RUNS
-    from acl_gym.reproduction.page import PAGE
+    from acl_gym.experiments import reproduce as engine
 
     wanted = names or ["all"]
     try:
-        experiments = reproduction.chosen(wanted)
+        experiments = engine.chosen(wanted)
     except ValueError as error:
         raise BadArgumentError(str(error)) from error
-    if executor not in reproduction.EXECUTORS:
+    if executor not in engine.EXECUTORS:
         raise BadArgumentError(
-            f"--executor must be one of {', '.join(reproduction.EXECUTORS)}, got "
+            f"--executor must be one of {', '.join(engine.EXECUTORS)}, got "
             f"{executor!r}."
         )
     if only_list:
         _list(experiments, as_json)
         return
     screen = console(stderr=as_json)
-    runs = runs or RUNS
-    outcome, made_from = reproduction.already(wanted, runs, out, seed, figures)
-    if outcome is not None:
-        screen.print(f"Nothing to do: all of it is in {out}, made by the same code.")
-        _tell(outcome, as_json, screen, out / PAGE if figures else None)
-        return
     try:
-        out.mkdir(parents=True, exist_ok=True)
-        with alone_in(out):  # to the end: the page has to be that of these runs
-            outcome, evidence = reproduction.reproduce(
-                wanted,
-                runs,
-                out,
-                first_seed=seed,
-                workers=workers,
-                executor=executor,
-                console=screen,
-            )
-            if figures:
-                reproduction.draw(experiments, evidence, out, screen)
-                reproduction.write_report(out)
-            resume.finish(out, made_from)
+        outcome, was_there = engine.reproduce(
+            *(wanted, runs or engine.RUNS, out),
+            first_seed=seed,
+            workers=workers,
+            executor=executor,
+            figures=figures,
+            console=screen,
+        )
     except KeyboardInterrupt as error:
         raise InterruptedRunError(
             "interrupted; finished runs are kept, give the same command to go on."
         ) from error
     except OSError as error:
         raise _cannot_write(out, error) from error
-    _tell(outcome, as_json, screen, out / PAGE if figures else None)
+    if was_there:
+        screen.print(f"Nothing to do: all of it is in {out}, made by the same code.")
+    if as_json:
+        typer.echo(json.dumps(engine.without_curves(outcome), indent=1))
+        return
+    _show_verdicts(outcome, screen)
+    if figures:
+        screen.print(f"Report: {out / engine.PAGE}")
 
 
 def report(
@@ -159,27 +149,24 @@ def report(
     seed: Annotated[
         int,
         typer.Option(
-            min=0, metavar="N", help="Not used: a report has no chance in it."
+            min=0, metavar="N", help="Not used: nothing in a report is random."
         ),
     ] = 0,
     as_json: JsonOption = False,
     debug: DebugOption = False,
 ) -> None:
-    """Write the page; see `REPORT_HELP`."""
-    from acl_gym.reproduction import page
+    """Write the report; see `REPORT_HELP`."""
+    from acl_gym.experiments import reproduce as engine
 
     try:
-        page.write_claims(directory)
-        path = page.write_page(directory)
+        path = engine.write_pages(directory)
     except (FileNotFoundError, ValueError) as error:
         raise BadArgumentError(str(error)) from error
     except OSError as error:
         raise _cannot_write(directory, error) from error
     if as_json:
-        verdicts = {
-            claim["claim"]: claim["verdict"]
-            for claim in page.read_outcome(directory)["claims"]
-        }
+        claims = engine.read_outcome(directory)["claims"]
+        verdicts = {claim["claim"]: claim["verdict"] for claim in claims}
         typer.echo(json.dumps({"report": str(path), "claims": verdicts}, indent=1))
         return
     typer.echo(f"Report: {path}")
@@ -194,7 +181,7 @@ def _list(experiments: Any, as_json: bool) -> None:
                 "section": each.section,
                 "claims": list(each.claims),
                 "explains": list(each.explains),
-                "settings": [study.label for study in each.studies],
+                "settings": [*each.studies, *each.references],
             }
             for each in experiments
         ]
@@ -203,32 +190,20 @@ def _list(experiments: Any, as_json: bool) -> None:
     for each in experiments:
         words = [", ".join(each.claims)] if each.claims else []
         words += [f"to understand {', '.join(each.explains)}"] if each.explains else []
-        told = f" ({'; '.join(words)})" if words else ""
-        typer.echo(f"{each.name:17} {each.title}{told}")
+        claims = f" ({'; '.join(words)})" if words else ""
+        typer.echo(f"{each.name:20} {each.title}{claims}")
 
 
 def _cannot_write(directory: Path, error: OSError) -> RuntimeError:
-    """For instance of a disk that is full."""
+    """What to report, for instance where a disk is full."""
     return RuntimeError(
         f"results, figures or report cannot be written to {directory}: "
-        f"{error.strerror or error}; runs that are finished are kept, mend it and give "
-        "the same command again."
+        f"{error.strerror or error}; runs that are finished are kept, give the same "
+        "command again when that is mended."
     )
 
 
-def _tell(outcome: Any, as_json: bool, screen: Any, page: Path | None) -> None:
-    """What came of it."""
-    if as_json:
-        from acl_gym.reproduction.outcome import figures_only
-
-        typer.echo(json.dumps(figures_only(outcome), indent=1))
-        return
-    _show(outcome, screen)
-    if page is not None:
-        screen.print(f"Report: {page}")
-
-
-def _show(outcome: Any, screen: Any) -> None:
+def _show_verdicts(outcome: Any, screen: Any) -> None:
     """The verdicts as a table."""
     from rich.table import Table
 

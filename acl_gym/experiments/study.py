@@ -197,10 +197,12 @@ class Study:
 
     def __str__(self) -> str:
         """All of it in one line."""
-        budget = (
-            f"{self.trials} trials" if self.steps is None else f"{self.steps:,} steps"
-        )
-        parts = [self.method, f"{self.slots} slots", budget, self.kind]
+        parts = [self.method, f"{self.slots} slots"]
+        if self.steps is not None:
+            parts.append(f"{self.steps:,} steps")
+        elif self.trials is not None:
+            parts.append(f"{self.trials} trials")
+        parts.append(self.kind)
         if isinstance(self.cells, str):
             parts.append(self.cells)
         elif self.cells is not None and np.ndim(self.cells[0]) == 0:

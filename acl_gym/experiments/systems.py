@@ -8,6 +8,8 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
+
 from acl_gym.experiments.study import (
     GRID_1D,
     GRID_2D,
@@ -17,6 +19,7 @@ from acl_gym.experiments.study import (
     Study,
     Task,
 )
+from acl_gym.planning.value_iteration import value_iteration
 
 # Chapter 3 names no alpha, epsilon, tau_0, T, K.
 _GRID = {
@@ -148,3 +151,18 @@ def planned(study: Study) -> Study:
         trials=None,
         most_runs=1,
     )
+
+
+PENDULUM_OPTIMUM = 38.5
+"""J* of the pendulum, by value iteration on fine cells (docs/comparison.md)."""
+
+
+def optimal_cost(study: Study) -> float | None:
+    """J* on the evaluation states of a study's system; None where it is not known."""
+    task = study.task
+    if task.env_id == PENDULUM:  # known for omega_max = 9 rad/s
+        return None if "omega_max" in task.env else PENDULUM_OPTIMUM
+    if task.env_id not in (GRID_1D, GRID_2D):
+        return None
+    states = task.evaluation_states()[:, 0].astype(np.int64)
+    return float(-value_iteration(task.make_system_env(1)).values[states].mean())

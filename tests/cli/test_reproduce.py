@@ -19,15 +19,15 @@ def test_a_figure_and_its_report(tmp_path: Path) -> None:
     assert experiment["name"] == "fig3.9"
     assert [s["label"] for s in experiment["studies"]] == ["M = 1", "M = 5", "M = 9"]
     verdicts = {claim["claim"]: claim["verdict"] for claim in found["claims"]}
-    # Two runs decide nothing, but their figures are told.
+    # Two runs decide nothing, but their figures are reported.
     assert verdicts["C5"] == verdicts["C13"] == "undecided"
     parts = {claim["claim"]: claim["parts"] for claim in found["claims"]}
     assert parts["C5"]
     assert not parts["C13"]
     folder = tmp_path / "r"
-    for name in ("report.html", "results.json", "figures/fig3.9.png"):
+    for name in ("report.html", "results.json", "results.parquet", "figures/fig3.9.png"):
         assert (folder / name).is_file()
-    files = sorted((folder / "tasks").glob("*.parquet"))
+    files = sorted((folder / "runs").glob("*.parquet"))
     assert len(files) == 6
     before = [path.stat().st_mtime_ns for path in files]
 
@@ -52,9 +52,9 @@ def test_a_figure_and_its_report(tmp_path: Path) -> None:
     assert (folder / "figures" / "fig3.9.png").is_file()
 
     (folder / "report.html").unlink()
-    told = figures("report", str(folder))
-    assert told["report"] == str(folder / "report.html")
-    assert told["claims"] == verdicts
+    written = figures("report", str(folder))
+    assert written["report"] == str(folder / "report.html")
+    assert written["claims"] == verdicts
     assert (folder / "report.html").is_file()
 
 

@@ -1,0 +1,98 @@
+"""The figures of experiments, all in one style."""
+
+from __future__ import annotations
+
+import io
+import tomllib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+from matplotlib.figure import Figure
+
+from acl_gym.experiments.plots import curves, dots, policies, theory
+from acl_gym.experiments.plots.animation import animate
+from acl_gym.experiments.plots.parts import in_symbols
+from acl_gym.experiments.results import Results
+from acl_gym.experiments.study import Experiment
+from acl_gym.utils.files import write_atomically
+
+__all__ = ["CAPTIONS", "PLOTS", "draw", "file_name", "save", "write_animation"]
+
+_STYLE = Path(__file__).with_name("acl_gym.mplstyle")
+
+PLOTS: dict[str, Callable[[Experiment, Results], Figure]] = {
+    "bands": curves.bands,
+    "measures": curves.measures,
+    "policies": policies.policies,
+    "baseline": policies.baseline,
+    "bands_and_policies": curves.bands_and_policies,
+    "swing": policies.swing,
+    "level_band": theory.level_band,
+    "policy_gap": theory.policy_gap,
+    "race": curves.race,
+    "strips": dots.strips,
+    "sweep": dots.sweep,
+    "order": dots.order,
+    "summary": dots.summary,
+    "learning_curves": curves.learning_curves,
+    "policy_maps": policies.policy_maps,
+    "trajectories": policies.trajectories,
+}
+"""What draws the figure of each name."""
+
+
+CAPTIONS: dict[str, dict[str, str]] = tomllib.loads(
+    Path(__file__).with_name("captions.toml").read_text()
+)
+"""For the figure of each name the `text` below it, and `alt`, what it shows."""
+
+
+def draw(plot: str, experiment: Experiment, results: Results) -> Figure:
+    """Draw a figure.
+
+    Args:
+        plot: a key of `PLOTS`.
+        experiment: what is shown.
+        results: its runs.
+    """
+    with mpl.rc_context(fname=_STYLE):
+        figure = PLOTS[plot](experiment, results)
+        figure.suptitle(in_symbols(experiment.title), x=0.01, ha="left")
+    return figure
+
+
+def file_name(experiment: Experiment, plot: str) -> str:
+    """The name of a figure's files: that of the experiment, or of one figure of many."""
+    return experiment.name if len(experiment.plots) == 1 else plot
+
+
+def save(
+    experiment: Experiment,
+    results: Results,
+    directory: Path,
+    kinds: tuple[str, ...] = ("png", "svg"),
+) -> None:
+    """Draw all figures of an experiment and write them, see `file_name`.
+
+    Args:
+        experiment: which.
+        results: its runs.
+        directory: where; each file appears complete or not at all.
+        kinds: endings of files.
+    """
+    for plot in experiment.plots:
+        figure = draw(plot, experiment, results)
+        for kind in kinds:
+            buffer = io.BytesIO()
+            with mpl.rc_context(fname=_STYLE):
+                figure.savefig(buffer, format=kind)
+            path = directory / f"{file_name(experiment, plot)}.{kind}"
+            write_atomically(path, buffer.getvalue())
+
+
+def write_animation(path: Path, **options: Any) -> None:
+    """Write the animation of a learning colony, see `animation.animate`."""
+    with mpl.rc_context(fname=_STYLE):
+        animate(path, **options)

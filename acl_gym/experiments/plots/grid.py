@@ -1,0 +1,100 @@
+"""Grids: the move of a policy in each cell, over what it costs until the goal."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import LinearSegmentedColormap, Normalize
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch, Rectangle
+
+from acl_gym.evaluation import actions_in
+from acl_gym.experiments.plots import parts
+from acl_gym.experiments.plots.parts import Shown
+from acl_gym.planning.value_iteration import policy_value, value_iteration
+from acl_gym.utils.typing import FloatArray
+
+_BEST, _OTHER = "0.1", parts.ORANGE
+_SHADES = LinearSegmentedColormap.from_list("cost", ["#FFFFFF", "#9CC3DE"])
+_WALL: dict[str, Any] = {"color": "0.25"}
+_NEVER: dict[str, Any] = {
+    **{"facecolor": "#F6D8C6", "edgecolor": "#DDA98B"},
+    **{"hatch": "////", "linewidth": 0},
+}
+_GOAL: dict[str, Any] = {
+    **{"color": parts.GREEN, "linestyle": ""},
+    **{"marker": "o", "markersize": 5},
+}
+
+
+def policies(shown: list[Shown], paths: bool = False) -> Figure:
+    """An arrow for the move in each cell, a panel for each policy."""
+    system: Any = shown[0].study.task.make_system_env(1).system
+    exact = [
+        value_iteration(each.study.task.make_system_env(1)).action_values
+        for each in shown
+    ]
+    highest = max(-values.max(axis=1).min() for values in exact)
+    norm = Normalize(0.0, highest, clip=True)
+    rows, width = len(system.rows), len(system.rows[0])
+    strip, count = rows == 1, len(shown)  # strips lie below each other
+    columns = 1 if strip else 2 if count == 4 else min(count, 3)
+    total = parts.WIDTH if columns in (1, 3) else 2.4 * columns + 0.8
+    height = 0.5 if strip else 2.2 * rows / width + 0.5
+    figure, axes = parts.small_multiples(count, columns, height, total)
+    for ax, each, values in zip(axes, shown, exact, strict=True):
+        _draw(ax, each, values, norm)
+        if strip:
+            ax.set_ylabel(each.title, rotation=0, ha="right", va="center")
+        else:
+            ax.set_title(each.title)
+    mappable = ScalarMappable(norm, _SHADES)
+    style: Any = {"shrink": 0.8, "pad": 0.01}
+    bar = figure.colorbar(mappable, ax=axes, label="cost until the goal", **style)
+    bar.ax.spines[:].set_visible(False)
+    handles = [
+        *(
+            Line2D([], [], color=color, marker=r"$\rightarrow$", markersize=8,
+                   linestyle="", label=label)
+            for color, label in ((_BEST, "a best move"), (_OTHER, "another move"))
+        ),
+        Patch(**_NEVER, label="from here never to the goal"),
+        Line2D([], [], **_GOAL, label="goal"),
+    ]  # fmt: skip
+    parts.legend(figure, handles)
+    return figure
+
+
+def _draw(ax: Axes, shown: Shown, exact: FloatArray, norm: Normalize) -> None:
+    """Draw a policy; `exact` are the values of an optimal one, `(states, actions)`."""
+    env = shown.study.task.make_system_env(len(exact))
+    system: Any = env.system
+    states = np.arange(len(exact))
+    actions = actions_in(shown.policy, env, states[:, None].astype(np.float64))
+    best = exact[states, actions] >= exact.max(axis=1) - 1e-6
+    letters = np.array([list(row) for row in system.rows])
+    cells, costs = np.array(system.cells), np.full(letters.shape, np.nan)
+    costs[tuple(cells.T)] = -policy_value(env.with_slots(1), actions)
+    never = np.isinf(costs)
+    ax.imshow(np.where(never, np.nan, costs), cmap=_SHADES, norm=norm, aspect="equal")
+    for places, style in ((never, _NEVER), (letters == "#", _WALL)):
+        for row, column in np.argwhere(places):
+            ax.add_patch(Rectangle((column - 0.5, row - 0.5), 1, 1, **style))
+    ax.set_xticks(np.arange(letters.shape[1] - 1) + 0.5, labels=[])
+    ax.set_yticks(np.arange(letters.shape[0] - 1) + 0.5, labels=[])
+    ax.tick_params(length=0)
+    ax.plot(*cells[system.goal_states].T[::-1], **_GOAL)
+    starts = np.setdiff1d(states, system.goal_states)
+    steps = np.array(system.directions)[actions[starts]]
+    ax.quiver(
+        *cells[starts].T[::-1],
+        *steps.T[::-1],
+        color=np.where(best[starts], _BEST, _OTHER),
+        angles="xy", scale_units="xy", scale=1.5, pivot="mid", units="xy", width=0.1,
+        headwidth=3.6, headlength=3.6, headaxislength=3.2, zorder=3,
+    )  # fmt: skip
+    ax.spines[:].set(visible=True, color="0.4")

@@ -1,0 +1,297 @@
+"""From names of experiments to results, verdicts, figures and a report."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from collections.abc import Sequence
+from pathlib import Path
+
+from rich.console import Console
+
+from acl_gym.experiments import comparison, outcome, plots, thesis
+from acl_gym.experiments.outcome import Outcome, without_curves
+from acl_gym.experiments.provenance import ROOT, circumstances
+from acl_gym.experiments.report import write_claims, write_report
+from acl_gym.experiments.results import Results
+from acl_gym.experiments.runner import EXECUTORS, alone_in, list_jobs, run_studies
+from acl_gym.experiments.store import Job, Store
+from acl_gym.experiments.study import Experiment
+from acl_gym.experiments.thesis import CLAIMS, RUNS, experiments_of, trials_of
+from acl_gym.experiments.thesis.common import FEWER
+from acl_gym.utils.files import write_atomically
+
+__all__ = ["EXECUTORS", "RUNS", "without_curves"]
+
+EXPERIMENTS = (*thesis.EXPERIMENTS, *comparison.EXPERIMENTS)
+
+PAGE, CLAIMS_TABLE = "report.html", "claims.md"
+RESULTS, ROWS = "results.json", "results.parquet"
+_KEPT_RUNS, _FIGURES, _FINISHED = "runs", "figures", "finished.json"
+
+ANIMATION, ANIMATED = "learning.gif", "fig5.6"
+"""With this experiment the animation of its policy is drawn."""
+
+_AGAINST = "Against reinforcement learning"
+_INTRO = (
+    "The experiments of chapters 3 to 5 of J. M. van Ast, Ant Colony Optimization for "
+    "Control (Delft, 2010), repeated with acl-gym, and what they say about its claims.",
+    "A claim is taken apart into statements, each with a threshold that was written "
+    "down before the runs were looked at: if all hold, it holds; if some do, it holds in "
+    "part. Two were changed after a first look: C8 counts the trials until the cost "
+    "first comes near its end, not until it stays there, and C22 looks at the runs that "
+    "keep the optimal action as well as at all.",
+)
+
+
+def chosen(names: Sequence[str]) -> list[Experiment]:
+    """The experiments of these names, in the order of the thesis.
+
+    Args:
+        names: of experiments; "all" are all of them, "claims" those that decide a
+            claim or were tried to understand one.
+
+    Raises:
+        ValueError: there is no experiment of a name.
+    """
+    known = [experiment.name for experiment in EXPERIMENTS]
+    unknown = [name for name in names if name not in (*known, "all", "claims")]
+    if unknown:
+        raise ValueError(
+            f"experiments must be among all, claims, {', '.join(known)}, got "
+            f"{unknown[0]!r}."
+        )
+    return [
+        each
+        for each in EXPERIMENTS
+        if "all" in names
+        or each.name in names
+        or ("claims" in names and (each.claims or each.explains))
+    ]
+
+
+def reproduce(
+    names: Sequence[str],
+    runs: int = RUNS,
+    directory: Path = Path("results/reproduce"),
+    *,
+    first_seed: int = 0,
+    workers: int | None = None,
+    executor: str = "local",
+    figures: bool = True,
+    console: Console | None = None,
+) -> tuple[Outcome, bool]:
+    """Run experiments, or read what is there, judge the claims, and write the report.
+
+    Args:
+        names: see `chosen`.
+        runs: of each study, >= 1; the thesis has 30.
+        directory: receives results.json, results.parquet, report.html, claims.md, in
+            figures/ the figures, and in runs/ a file for each run.
+        first_seed: the seeds are this one and those that follow it.
+        workers: processes, >= 1; None takes one for each core.
+        executor: see `runner.run_studies`.
+        figures: whether figures and reports are made.
+        console: where progress is shown; None shows nothing.
+
+    Returns:
+        What was found, and whether all of it was there already.
+
+    Raises:
+        ValueError: there is no experiment of a name.
+        RunFailedError: a run failed; the others are kept.
+        FolderInUseError: another run works on `directory`.
+    """
+    experiments = chosen(names)
+    every = [each.name for each in experiments]
+    studies = [study for each in experiments for study in each.everything]
+    seeds = range(first_seed, first_seed + runs)
+    jobs = list_jobs(studies, seeds)
+    for drawn in (True,) if figures else (True, False):
+        found = _finished(directory, jobs, every, drawn)
+        if found is not None:
+            return found, True
+    console = console or Console(quiet=True)
+    workers = workers or os.cpu_count() or 1
+    directory.mkdir(parents=True, exist_ok=True)
+    with alone_in(directory):  # to the end: the report has to be that of these runs
+        results = run_studies(
+            *(studies, seeds, directory / _KEPT_RUNS),
+            workers=workers,
+            executor=executor,
+            console=console,
+        )
+        made = _outcome(experiments, results, runs, first_seed)
+        made["made"] = circumstances(workers)
+        _clear(directory)
+        write_atomically(directory / RESULTS, json.dumps(made).encode())
+        _write_rows(directory / ROWS, experiments, results)
+        if figures:
+            _draw(experiments, results, directory / _FIGURES, console)
+            write_pages(directory)
+        stamp = {"stamp": _stamp(jobs, figures)}
+        write_atomically(directory / _FINISHED, json.dumps(stamp).encode())
+    return made, False
+
+
+def _outcome(
+    experiments: Sequence[Experiment], results: Results, runs: int, first_seed: int
+) -> Outcome:
+    """Each experiment summed up, and each claim judged."""
+    studies = [study for each in experiments for study in each.everything]
+    return {
+        "runs": runs,
+        "first_seed": first_seed,
+        "experiments": [
+            outcome.summary(
+                *(each, results),
+                "Experiments" if each in thesis.EXPERIMENTS else _AGAINST,
+            )
+            for each in experiments
+        ],
+        "claims": [
+            {
+                **claim.judge(results, runs),
+                "experiments": experiments_of(claim.name),
+                "trials": trials_of(claim.name),
+            }
+            for claim in CLAIMS
+        ],
+        "runs_made": results.made(studies),
+    }
+
+
+def _write_rows(
+    path: Path, experiments: Sequence[Experiment], results: Results
+) -> None:
+    """The rows of all runs as one table; those of a study stand where it comes first."""
+    shown = {
+        study.key: (f"{each.name}: {label}", study)
+        for each in reversed(experiments)
+        for label, study in {**each.studies, **each.references}.items()
+    }
+    frame = results.frame(dict(shown.values()))
+    content: bytes = frame.to_parquet(index=False, compression="zstd")
+    write_atomically(path, content)
+
+
+def _draw(
+    experiments: Sequence[Experiment], results: Results, folder: Path, console: Console
+) -> None:
+    folder.mkdir(exist_ok=True)
+    with console.status("Drawing") as status:
+        for experiment in experiments:
+            status.update(f"Drawing {experiment.name}")
+            plots.save(experiment, results, folder)
+            if experiment.name == ANIMATED:
+                plots.write_animation(folder / ANIMATION)
+
+
+def read_outcome(directory: Path) -> Outcome:
+    """What `reproduce` has written.
+
+    Raises:
+        FileNotFoundError: there is nothing of it in `directory`.
+        ValueError: the file is not what `reproduce` writes.
+    """
+    path = directory / RESULTS
+    if not path.is_file():
+        raise FileNotFoundError(
+            f"there is no {RESULTS} in {directory}; `acl-gym reproduce --out "
+            f"{directory}` makes one."
+        )
+    try:
+        found = dict(json.loads(path.read_text()))
+        if not {"claims", "experiments", "runs", "made", "runs_made"} <= found.keys():
+            raise KeyError
+    except (ValueError, TypeError, KeyError) as error:
+        raise ValueError(
+            f"{path} is not the result of a reproduction by this version; make it again "
+            "with `acl-gym reproduce`, which takes the runs that are there."
+        ) from error
+    return found
+
+
+def write_pages(directory: Path) -> Path:
+    """Write report.html and claims.md from the results and figures of a folder.
+
+    Returns:
+        The path of the report.
+
+    Raises:
+        FileNotFoundError: there are no results.
+        ValueError: the results cannot be read.
+    """
+    found = read_outcome(directory)
+    facts = (
+        f"{found['runs']} run{'s' * (found['runs'] != 1)} of each setting ({FEWER} at "
+        "most of what was tried beside the thesis's experiments and takes long), seeds "
+        f"from {found['first_seed']}. In brackets: 95% bootstrap intervals of the "
+        "interquartile mean over the runs; in a ratio the runs of each setting are drawn "
+        "separately."
+    )
+    names = {each["name"] for each in found["experiments"]}
+    write_claims(directory / CLAIMS_TABLE, found["claims"], names, facts)
+    runs_made = {f"runs, {name}": each for name, each in found["runs_made"].items()}
+    write_report(
+        directory / PAGE,
+        title="Ant Colony Learning put to the test",
+        intro=_INTRO,
+        facts=facts,
+        experiments=found["experiments"],
+        figures=directory / _FIGURES,
+        claims=found["claims"],
+        animation=ANIMATION,
+        command=f"acl-gym reproduce all --runs {found['runs']}",
+        made={**found["made"], **runs_made},
+    )
+    return directory / PAGE
+
+
+def _stamp(jobs: Sequence[Job], figures: bool) -> str:
+    """A hash over all that a folder is made from: runs, and the package's files."""
+    digest = hashlib.sha256(json.dumps([job.key for job in jobs]).encode())
+    digest.update(str(figures).encode())
+    for path in sorted(ROOT.rglob("*")):
+        if path.is_file() and path.parent.name != "__pycache__":
+            digest.update(path.relative_to(ROOT).as_posix().encode())
+            digest.update(path.read_bytes())
+    return digest.hexdigest()
+
+
+def _finished(
+    directory: Path, jobs: Sequence[Job], names: Sequence[str], figures: bool
+) -> Outcome | None:
+    """The outcome in a folder if all of it is there, made from this; None otherwise."""
+    try:
+        stamp = json.loads((directory / _FINISHED).read_text())["stamp"]
+        found = read_outcome(directory)
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
+    files = [directory / RESULTS, directory / ROWS]
+    files += _drawn(directory, names) if figures else []
+    if stamp != _stamp(jobs, figures) or not all(path.is_file() for path in files):
+        return None
+    store = Store(directory / _KEPT_RUNS)
+    return found if all(store.has(job) for job in jobs) else None
+
+
+def _clear(directory: Path) -> None:
+    """Remove figures and reports, so that they do not stand beside other results.
+
+    Runs stay, and pictures that are not of an experiment.
+    """
+    old = [directory / _FINISHED, *_drawn(directory, [e.name for e in EXPERIMENTS])]
+    for folder in (directory, directory / _FIGURES):
+        old += folder.glob(".*.tmp")
+    for path in old:
+        path.unlink(missing_ok=True)
+
+
+def _drawn(directory: Path, names: Sequence[str]) -> list[Path]:
+    """The report, and the figures of experiments."""
+    files = [f"{name}.{kind}" for name in names for kind in ("png", "svg")]
+    files += [ANIMATION] if ANIMATED in names else []
+    pages = [directory / PAGE, directory / CLAIMS_TABLE]
+    return pages + [directory / _FIGURES / file for file in files]

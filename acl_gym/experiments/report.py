@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -13,10 +12,11 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from acl_gym.experiments.claims import HOLDS, IN_PART, NOT, UNDECIDED
 from acl_gym.experiments.outcome import Outcome
-from acl_gym.experiments.statistics import Estimate, digits
+from acl_gym.experiments.statistics import digits
 from acl_gym.utils.files import write_atomically
 
 _CLASSES = {HOLDS: "yes", IN_PART: "part", NOT: "no", UNDECIDED: "open"}
+_CURVES = ("label", "every", "positions", "curves")
 
 
 def write_report(
@@ -41,8 +41,7 @@ def write_report(
         experiments: what each found, see `outcome.summary`.
         figures: the folder of their PNG files; those that are not there are left out.
         command: repeats all of it.
-        made: where, when and with what; a value, or a list of
-            them, by name.
+        made: where, when and with what; a value, or a list of them, by name.
         intro: paragraphs.
         facts: how much was run.
         notes: paragraphs on how it was done.
@@ -50,21 +49,11 @@ def write_report(
             that decide them and of the `trials` beside these.
         animation: the file name of a GIF among the figures.
     """
-    environment = Environment(
-        loader=PackageLoader("acl_gym.experiments"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    environment.filters |= {"setting": _setting, "comparison": _comparison}
+    files = {figure["file"] for each in experiments for figure in each["figures"]}
     counts = Counter(claim["verdict"] for claim in claims)
-    images = {
-        figure["file"]: _encoded(figures / f"{figure['file']}.png")
-        for each in experiments
-        for figure in each["figures"]
-    }
-    text = environment.get_template("report.html.j2").render(
+    _render(
+        path,
+        "report.html.j2",
         title=title,
         intro=intro,
         facts=facts,
@@ -74,85 +63,15 @@ def write_report(
         classes=_CLASSES,
         experiments=experiments,
         names={each["name"] for each in experiments},
-        images=images,
+        images={file: _encoded(figures / f"{file}.png") for file in files},
         animation=_encoded(figures / animation) if animation else "",
-        curves=_explorable(experiments),
+        curves={
+            each["name"]: [{n: study[n] for n in _CURVES} for study in each["studies"]]
+            for each in experiments
+        },
         command=command,
-        made={
-            name: ", ".join(map(str, value)) if isinstance(value, list) else value
-            for name, value in made.items()
-        },
-        settings_headings=_SETTINGS,
+        made=made,
     )
-    write_atomically(path, text.encode())
-
-
-_SETTINGS = (
-    "Setting",
-    "Runs",
-    "Cost of the last policy",
-    "Lowest to highest",
-    "Reach the goal",
-    "Learning, s",
-    "Parameters",
-)
-
-
-def _setting(study: Outcome) -> list[str]:
-    """A row under `_SETTINGS`."""
-    cost = study["policy_cost"]
-    return [
-        study["label"],
-        str(study["runs"]),
-        _with_interval(cost, "interquartile_mean"),
-        f"{digits(cost['min'])} to {digits(cost['max'])}",
-        f"{study['success_rate']:.0%}",
-        f"{study['seconds']:.2g}",
-        study["parameters"],
-    ]
-
-
-def _comparison(found: Outcome) -> list[str]:
-    """A row: where, measure, method, rival, verdict, ratio."""
-    names = ("where", "measure", "method", "rival", "verdict")
-    return [*(found.get(name, "") for name in names), _with_interval(found, "ratio")]
-
-
-def _with_interval(found: Outcome, name: str) -> str:
-    """An estimate with its interval, where None stands for infinity.
-
-    No lower end of a finite value means that there is no interval.
-    """
-    value, low, high = (
-        math.inf if found[key] is None else found[key] for key in (name, "low", "high")
-    )
-    low = math.nan if math.isinf(low) and math.isfinite(value) else low
-    return str(Estimate(value, low, high)).replace("inf", "\N{INFINITY}")
-
-
-def _encoded(path: Path) -> str:
-    """A picture in base64; "" if there is none."""
-    return base64.b64encode(path.read_bytes()).decode() if path.is_file() else ""
-
-
-def _explorable(experiments: Sequence[Outcome]) -> Outcome:
-    """The curves of a page, each once, and which of them experiments have."""
-    names = ("label", "key")
-    return {
-        "experiments": {
-            each["name"]: [{n: study[n] for n in names} for study in each["studies"]]
-            for each in experiments
-        },
-        "curves": {
-            study["key"]: {
-                "every": study["every"],
-                "positions": study["positions"],
-                **study["curves"],
-            }
-            for each in experiments
-            for study in each["studies"]
-        },
-    }
 
 
 def write_claims(
@@ -166,19 +85,26 @@ def write_claims(
         names: of the experiments that were run.
         facts: how much was run.
     """
-    rows = [("claim", "verdict", "statement", "measured", ""), ("---",) * 5]
-    for claim in claims:
-        shown = [n for n in (*claim["experiments"], *claim["trials"]) if n in names]
-        source = "; ".join(filter(None, [claim["section"], ", ".join(shown)]))
-        text = f"**{claim['text']}** {source}"
-        rows.append((claim["claim"], claim["verdict"], text, "", ""))
-        for part in claim["parts"]:
-            mark = "yes" if part["holds"] else "no"
-            rows.append(("", "", part["statement"], part["measured"], mark))
-        for each in claim["tried"]:
-            rows.append(("", "", f"tried: {each['what']}", each["found"], ""))
-        if claim["understanding"]:
-            rows.append(("", "", claim["understanding"], "", ""))
-    table = "\n".join(f"| {' | '.join(row)} |" for row in rows)
-    text = f"# The claims of the thesis\n\n{facts}\n\n{table}\n"
-    write_atomically(path, text.encode())
+    _render(path, "claims.md.j2", claims=claims, names=names, facts=facts)
+
+
+def _render(path: Path, template: str, **values: Any) -> None:
+    environment = Environment(
+        loader=PackageLoader("acl_gym.experiments"),
+        autoescape=lambda name: name is not None and ".html" in name,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )
+    environment.filters["digits"] = _digits
+    write_atomically(path, environment.get_template(template).render(values).encode())
+
+
+def _digits(value: float | None) -> str:
+    return "\N{INFINITY}" if value is None else digits(value)
+
+
+def _encoded(path: Path) -> str:
+    """A picture in base64; "" if there is none."""
+    return base64.b64encode(path.read_bytes()).decode() if path.is_file() else ""

@@ -34,15 +34,6 @@ ANIMATION, ANIMATED = "learning.gif", "fig5.6"
 """With this experiment the animation of its policy is drawn."""
 
 _AGAINST = "Against reinforcement learning"
-_INTRO = (
-    "The experiments of chapters 3 to 5 of J. M. van Ast, Ant Colony Optimization for "
-    "Control (Delft, 2010), repeated with acl-gym, and what they say about its claims.",
-    "A claim is taken apart into statements, each with a threshold that was written "
-    "down before the runs were looked at: if all hold, it holds; if some do, it holds in "
-    "part. Two were changed after a first look: C8 counts the trials until the cost "
-    "first comes near its end, not until it stays there, and C22 looks at the runs that "
-    "keep the optimal action as well as at all.",
-)
 
 
 def chosen(names: Sequence[str]) -> list[Experiment]:
@@ -128,7 +119,13 @@ def reproduce(
         write_atomically(directory / RESULTS, json.dumps(made).encode())
         _write_rows(directory / ROWS, experiments, results)
         if figures:
-            _draw(experiments, results, directory / _FIGURES, console)
+            (directory / _FIGURES).mkdir(exist_ok=True)
+            for each in experiments:
+                with console.status(f"Drawing {each.name}"):
+                    plots.save(each, results, directory / _FIGURES)
+            if ANIMATED in every:
+                with console.status("Drawing the animation"):
+                    plots.write_animation(directory / _FIGURES / ANIMATION)
             write_pages(directory)
         stamp = {"stamp": _stamp(jobs, figures)}
         write_atomically(directory / _FINISHED, json.dumps(stamp).encode())
@@ -174,18 +171,6 @@ def _write_rows(
     frame = results.frame(dict(shown.values()))
     content: bytes = frame.to_parquet(index=False, compression="zstd")
     write_atomically(path, content)
-
-
-def _draw(
-    experiments: Sequence[Experiment], results: Results, folder: Path, console: Console
-) -> None:
-    folder.mkdir(exist_ok=True)
-    with console.status("Drawing") as status:
-        for experiment in experiments:
-            status.update(f"Drawing {experiment.name}")
-            plots.save(experiment, results, folder)
-            if experiment.name == ANIMATED:
-                plots.write_animation(folder / ANIMATION)
 
 
 def read_outcome(directory: Path) -> Outcome:
@@ -237,7 +222,6 @@ def write_pages(directory: Path) -> Path:
     write_report(
         directory / PAGE,
         title="Ant Colony Learning put to the test",
-        intro=_INTRO,
         facts=facts,
         experiments=found["experiments"],
         figures=directory / _FIGURES,
@@ -269,12 +253,14 @@ def _finished(
         found = read_outcome(directory)
     except (OSError, ValueError, KeyError, TypeError):
         return None
-    files = [directory / RESULTS, directory / ROWS]
-    files += _drawn(directory, names) if figures else []
-    if stamp != _stamp(jobs, figures) or not all(path.is_file() for path in files):
-        return None
+    files = [directory / ROWS, *(_drawn(directory, names) if figures else [])]
     store = Store(directory / _KEPT_RUNS)
-    return found if all(store.has(job) for job in jobs) else None
+    complete = (
+        stamp == _stamp(jobs, figures)
+        and all(path.is_file() for path in files)
+        and all(store.has(job) for job in jobs)
+    )
+    return found if complete else None
 
 
 def _clear(directory: Path) -> None:

@@ -9,8 +9,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
+from acl_gym.colony.greedy import greedy_actions
 from acl_gym.colony.pheromone import Pheromone
-from acl_gym.colony.selection import choose_actions, greedy_actions
+from acl_gym.colony.selection import choose_actions
 from acl_gym.partitions import Partition
 from acl_gym.utils import validation
 from acl_gym.utils.typing import BoolArray, CellArray, FloatArray, IntArray, RankArray

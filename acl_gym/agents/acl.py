@@ -27,6 +27,12 @@ from acl_gym.colony.pheromone import Pheromone
 from acl_gym.colony.schedules import Scheduled, Setting, schedule_from_settings
 from acl_gym.colony.selection import RULES, choose_actions
 from acl_gym.colony.solutions import Solutions
+from acl_gym.colony.update_rule import TrialResult, UpdateRule
+from acl_gym.colony.update_rules import (
+    as_update,
+    update_from_settings,
+    update_to_settings,
+)
 from acl_gym.envs.control.environments import ControlVectorEnv
 from acl_gym.evaluation.rollout import Rollout
 from acl_gym.partitions import Partition
@@ -111,6 +117,7 @@ class ACL(TabularAgent):
         selection: str = "max_boltzmann",
         cost: Cost | Callable[[Episode], float] | None = None,
         deposit: str | Deposit | Callable[[FloatArray], FloatArray] = "inverse_cost",
+        update: str | UpdateRule = "each_visit",
         tabu: bool = False,
         max_steps: int | None = None,
         seed: int | None = None,
@@ -124,6 +131,7 @@ class ACL(TabularAgent):
         self._selection = validation.one_of("selection", selection, RULES)
         self.cost = cost
         self.deposit = deposit
+        self.update = update
         super().__init__(
             env, partition, max_steps=max_steps, seed=seed, n_actions=n_actions
         )
@@ -174,27 +182,40 @@ class ACL(TabularAgent):
             while training.next_trial():  # 2, 22: repeat until k = K
                 # 3-6: every ant begins in a random state with an empty solution
                 rollout, solutions = self.rollout, self._empty_solutions()
+                rule, record = self.update, self._needs_episodes()
                 pheromone.alpha, epsilon = self._now("alpha"), self._now("epsilon")
-                whole = self.cost is not None  # the cost looks at whole solutions
-                observation = rollout.start(seed=self._next_seed(), record=whole)
+                observation = rollout.start(seed=self._next_seed(), record=record)
+                rule.start_trial(pheromone, self.trials)
                 while rollout.ants.size:  # 7, 17: repeat until t = T or C is empty
                     ants = rollout.ants
                     # 8: fuzzify the states
                     index, degree = self._locate(observation, ants)
-                    # 9: select actions, all on the same pheromone
+                    # 9: select actions, by default all on the same pheromone
                     allowed = self._allowed(rollout, solutions, index)
-                    actions = self._choose(index, degree, epsilon, self.rng, allowed)
+                    actions = rule.choose(
+                        self.selection,
+                        pheromone,
+                        index,
+                        degree,
+                        epsilon,
+                        self.rng,
+                        allowed,
+                        self.local_decay,
+                    )
                     # 10: add the pairs to the partial solutions
                     solutions.append(ants, observation, index, actions)
                     # 11, 13-16: apply the actions; who is at the goal leaves C
                     observation = rollout.step(actions).observation
-                    # 12: local pheromone update (4.12)
-                    pheromone.local_update(index, degree, actions, self.local_decay)
-                # 18-20: global pheromone update with all solutions (4.15)
-                costs = self._costs(rollout)
-                deposits = self._deposit(costs, self.tau0)
-                pheromone.global_update(solutions, deposits, self.global_decay)
-                training.end_trial(costs)  # 21: k <- k + 1
+                    # 12: local pheromone update, by default (4.12)
+                    rule.local_update(
+                        pheromone, index, degree, actions, self.local_decay
+                    )
+                # 18-20: global pheromone update with all solutions, in general (4.15)
+                result = self._result(rollout, solutions)
+                rule.global_update(
+                    pheromone, result, self.local_decay, self.global_decay
+                )
+                training.end_trial(result.costs)  # 21: k <- k + 1
         return self
 
     @property
@@ -221,6 +242,15 @@ class ACL(TabularAgent):
         self, value: str | Deposit | Callable[[FloatArray], FloatArray]
     ) -> None:
         self._deposit = as_deposit(value)
+
+    @property
+    def update(self) -> UpdateRule:
+        """The local and the global update; the colony's own copy of what was set."""
+        return self._update
+
+    @update.setter
+    def update(self, value: str | UpdateRule) -> None:
+        self._update = as_update(value)
 
     @property
     def selection(self) -> str:
@@ -303,6 +333,7 @@ class ACL(TabularAgent):
             "selection": self.selection,
             "cost": to_settings(self.cost),
             "deposit": to_settings(self.deposit),
+            "update": update_to_settings(self.update),
             "tabu": self.tabu,
             "max_steps": self.max_steps,
             "seed": self.seed,
@@ -310,13 +341,16 @@ class ACL(TabularAgent):
 
     @classmethod
     def _restored_parameters(cls, saved: dict[str, Any]) -> dict[str, Any]:
-        return {
+        restored = {
             **saved,
             "alpha": schedule_from_settings("alpha", saved["alpha"]),
             "epsilon": schedule_from_settings("epsilon", saved["epsilon"]),
             "cost": cost_from_settings(saved["cost"]),
             "deposit": deposit_from_settings(saved["deposit"]),
         }
+        if "update" in saved:  # older files have none and mean the default
+            restored["update"] = update_from_settings(saved["update"])
+        return restored
 
     def measures(self, policy: IntArray) -> Row:
         """The sensitivity of the policy (3.48), averaged over the cells, in [0, 1]."""
@@ -331,11 +365,18 @@ class ACL(TabularAgent):
         setting: Scheduled = getattr(type(self), name)
         return setting.at(self, self.trials)
 
-    def _costs(self, rollout: Rollout) -> FloatArray:
-        """J of each ant."""
-        if self.cost is None:
-            return rollout.cost
-        return solution_costs(self.cost, rollout.episodes())
+    def _needs_episodes(self) -> bool:
+        """Whether the cost or the update rule looks at every step of a solution."""
+        return self.cost is not None or self.update.needs_episodes
+
+    def _result(self, rollout: Rollout, solutions: Solutions) -> TrialResult:
+        """The solutions of a trial, what they cost, and what is deposited for them."""
+        episodes = rollout.episodes() if self._needs_episodes() else None
+        costs = rollout.cost
+        if self.cost is not None and episodes is not None:
+            costs = solution_costs(self.cost, episodes)
+        deposits = self._deposit(costs, self.tau0)
+        return TrialResult(solutions, costs, deposits, rollout.success, episodes)
 
     def _allowed(
         self, rollout: Rollout, solutions: Solutions, index: CellArray
@@ -352,18 +393,15 @@ class ACL(TabularAgent):
         self, index: CellArray, degree: FloatArray, allowed: BoolArray | None
     ) -> IntArray:
         self.pheromone.alpha, epsilon = self._now("alpha"), self._now("epsilon")
-        return self._choose(index, degree, epsilon, self._predict_rng, allowed)
-
-    def _choose(
-        self,
-        index: CellArray,
-        degree: FloatArray,
-        epsilon: float,
-        rng: np.random.Generator,
-        allowed: BoolArray | None,
-    ) -> IntArray:
+        # Never by the update rule, which may change the pheromone.
         return choose_actions(
-            self.selection, self.pheromone, index, degree, epsilon, rng, allowed
+            self.selection,
+            self.pheromone,
+            index,
+            degree,
+            epsilon,
+            self._predict_rng,
+            allowed,
         )
 
     def _empty_solutions(self) -> Solutions:

@@ -11,7 +11,7 @@ from gymnasium.vector import VectorEnv
 from numpy.typing import ArrayLike, NDArray
 
 from acl_gym.callbacks.base import Callbacks
-from acl_gym.colony.selection import greedy_actions
+from acl_gym.colony.greedy import greedy_actions
 from acl_gym.evaluation.rollout import Rollout, require_vector_env
 from acl_gym.partitions import Partition, check_cells, partition_from_settings
 from acl_gym.partitions.automatic import automatic_partition

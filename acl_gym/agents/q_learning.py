@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from acl_gym.agents.base import TabularAgent
 from acl_gym.agents.training import Training
 from acl_gym.callbacks.base import Callbacks
-from acl_gym.colony.selection import (
+from acl_gym.colony.greedy import (
     ALL,
     best_value,
     epsilon_greedy_actions,

@@ -129,6 +129,10 @@ class TabularAgent(PartitionPolicy):
     def parameters(self) -> dict[str, Any]:
         """The keyword arguments of the constructor, as saved in a file."""
 
+    def _arrays(self) -> dict[str, NDArray[Any]]:
+        """More arrays to save, which `_restore` takes over again."""
+        return {}
+
     def measures(self, policy: IntArray) -> Row:
         """More columns for the row of a trial, given the policy `(n_cells,)`."""
         return {}
@@ -293,6 +297,7 @@ class TabularAgent(PartitionPolicy):
             ],
         }
         arrays: dict[str, NDArray[Any]] = {"table": self._table, "ranks": self._ranks}
+        arrays |= self._arrays()
         return files.save(path, header, arrays)
 
     @classmethod

@@ -21,6 +21,7 @@ from acl_gym.colony.greedy import (
 from acl_gym.evaluation.rollout import Rollout, Step
 from acl_gym.partitions import Partition
 from acl_gym.utils import validation
+from acl_gym.utils.parameters import Parameter
 from acl_gym.utils.typing import BoolArray, CellArray, FloatArray, IntArray
 
 TRACES = ("replacing", "accumulating")
@@ -70,10 +71,24 @@ class QLearning(TabularAgent):
         ValueError: a parameter is out of range.
     """
 
-    learning_rate = validation.Number(above=0, at_most=1)
-    discount = validation.Number(at_least=0, at_most=1)
-    epsilon = validation.Number(at_least=0, at_most=1)
-    trace_decay = validation.Number(at_least=0, at_most=1)
+    learning_rate = Parameter(
+        "Share of the error by which a value is corrected",
+        "alpha_rl",
+        above=0,
+        at_most=1,
+    )
+    discount = Parameter(
+        "Weight of the next state's value", "gamma_rl", at_least=0, at_most=1
+    )
+    epsilon = Parameter(
+        "Probability of a random action", "epsilon", at_least=0, at_most=1
+    )
+    trace_decay = Parameter(
+        "Fading of traces beside the discount; 0 is plain Q-learning",
+        "lambda",
+        at_least=0,
+        at_most=1,
+    )
 
     def __init__(
         self,

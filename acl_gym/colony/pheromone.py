@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 
 from acl_gym.partitions.kernels import written_out
-from acl_gym.utils.typing import BoolArray, CellArray, FloatArray
+from acl_gym.utils.typing import BoolArray, CellArray, FloatArray, IntArray
 
 
 class Pheromone:
@@ -77,6 +77,12 @@ class Pheromone:
     def heuristic(self) -> FloatArray | None:
         """The heuristic eta, `(n_cells, n_actions)`; None: 1 everywhere."""
         return self._heuristic
+
+    @heuristic.setter
+    def heuristic(self, value: FloatArray | None) -> None:
+        self._heuristic = value
+        self._weights = self._roots = None
+        self.stale[:] = True
 
     @property
     def weights(self) -> FloatArray | None:
@@ -170,3 +176,24 @@ def _repair(
                 total += weight
             for u in range(n_actions):
                 probabilities[cell, u] /= total
+
+
+@njit(cache=True)
+def mean_sensitivity(levels: FloatArray, policy: IntArray, alpha: float) -> float:
+    """How near the second-best action comes to the policy's (3.48), mean over cells.
+
+    A function of the pheromone alone, whatever heuristic the ants weigh it with.
+
+    Args:
+        levels: `(n_cells, n_actions)`.
+        policy: the action of each cell, `(n_cells,)`.
+        alpha: exponent of the levels, > 0.
+    """
+    total = 0.0
+    for cell in range(levels.shape[0]):
+        second = 0.0
+        for u in range(levels.shape[1]):
+            if u != policy[cell]:
+                second = max(second, levels[cell, u])
+        total += (second / levels[cell, policy[cell]]) ** alpha
+    return float(total / levels.shape[0])

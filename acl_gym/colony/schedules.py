@@ -121,43 +121,6 @@ Setting = float | Callable[[int], float]
 _KINDS = (Linear, Exponential, Harmonic)
 
 
-class Scheduled:
-    """An attribute that is a number in a range or a schedule of such numbers.
-
-    Args:
-        bounds: the range, keywords of `validation.number`.
-    """
-
-    def __init__(self, **bounds: float) -> None:
-        self._bounds = bounds
-
-    def __set_name__(self, owner: type, name: str) -> None:
-        self._name = name
-
-    def __get__(self, instance: Any, owner: type | None = None) -> Any:
-        if instance is None:
-            return self
-        return instance.__dict__[self._name]
-
-    def __set__(self, instance: Any, value: Any) -> None:
-        if isinstance(value, type) or not callable(value):
-            value = validation.number(self._name, value, **self._bounds)
-        instance.__dict__[self._name] = value
-
-    def at(self, instance: Any, trial: int) -> float:
-        """The number in trial k.
-
-        Raises:
-            ValueError: the schedule gives one out of range.
-        """
-        setting = self.__get__(instance)
-        if not callable(setting):
-            return float(setting)
-        return validation.number(
-            f"{self._name} in trial {trial}", setting(trial), **self._bounds
-        )
-
-
 def schedule_from_settings(name: str, settings: Any) -> Any:
     """A number or schedule from what a file holds of it.
 

@@ -22,6 +22,9 @@ from acl_gym.utils.typing import BoolArray, CellArray, FloatArray, IntArray
 
 RULES = ("boltzmann", "epsilon_greedy", "max_boltzmann")
 
+NUMBERS_PER_ACTION = 2
+"""How many random numbers the choice of an action takes: a coin and a choice."""
+
 
 def choose_actions(
     rule: str,
@@ -61,7 +64,7 @@ def choose_actions(
         return epsilon_greedy_actions(
             pheromone.levels, index, degree, epsilon, rng, allowed, pheromone.roots
         )
-    draws = rng.random((2, index.shape[0]))
+    draws = rng.random((NUMBERS_PER_ACTION, index.shape[0]))
     actions = np.empty(index.shape[0], dtype=np.int64)
     columns, corners = written_out(pheromone.n_actions), written_out(index.shape[1])
     if rule != "max_boltzmann":

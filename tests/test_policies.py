@@ -104,7 +104,12 @@ def test_stable_baselines3_evaluates_a_soft_policy_repeatably() -> None:
     evaluation = pytest.importorskip("stable_baselines3.common.evaluation")
     _, policy = soft_pendulum()
     env = VectorEnvAdapter(
-        gym.make_vec("acl_gym/Pendulum-v0", num_envs=5, autoreset_mode="Disabled")
+        gym.make_vec(
+            "acl_gym/Pendulum-v0",
+            num_envs=5,
+            autoreset_mode="Disabled",
+            max_episode_steps=40,
+        )
     )
     found = []
     for _ in range(2):

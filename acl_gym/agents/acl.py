@@ -57,11 +57,11 @@ class ACL(TabularAgent):
         tau0: initial pheromone level tau_0, > 0. Levels never fall below it if it is
             at most 1 / J_max (the proof of Proposition 4.3; its text asks for
             rho / J_max, which Table 5.2 exceeds). Where J_max is known and tau0 is
-            more, a `PheromoneBoundWarning` says so (a decision).
+            larger, a `PheromoneBoundWarning` is given (a decision).
         local_decay: gamma, in [0, 1), the decay of each visited pair (4.12).
         global_decay: rho, in [0, 1], weight of the deposits of a trial (4.15). The
-            thesis requires rho > 0; 0, where nothing is learned, is among its
-            experiments.
+            thesis requires rho > 0, but its experiments include 0, where nothing is
+            learned.
         alpha: exponent of the levels in the selection rule (4.11), > 0; a number, or
             a schedule such as `Linear(1, 3, trials=50)` that gives one for each trial.
         heuristic: eta, what is known of each action beforehand, weighed as
@@ -89,9 +89,9 @@ class ACL(TabularAgent):
             takes a copy.
         tabu: forbid an ant to choose an action twice in the same cell in one trial
             (§3.4.2). For partitions with one cell per state.
-        max_steps: T, the longest an ant may walk, >= 1. None takes the limit that the
-            environment is registered with, and 300 where it has none.
-        seed: a run is a function of it; None draws one from the system.
+        max_steps: T, the most steps an ant may make, >= 1. None takes the time limit of
+            the environment, or 300 if it has none.
+        seed: the same seed gives the same run; None draws one from the system.
         n_actions: only needed without an environment.
 
     Raises:
@@ -253,7 +253,7 @@ class ACL(TabularAgent):
 
     @property
     def cost(self) -> Cost | None:
-        """What a solution costs; None: the sum of its stage costs."""
+        """The cost of a solution; None: the sum of its stage costs."""
         return self._cost
 
     @cost.setter
@@ -262,7 +262,7 @@ class ACL(TabularAgent):
 
     @property
     def deposit(self) -> Deposit:
-        """What an ant lays for a solution of a given cost."""
+        """What an ant deposits for a solution of a given cost."""
         return self._deposit
 
     @deposit.setter
@@ -440,7 +440,7 @@ class ACL(TabularAgent):
         )
 
     def _empty_solutions(self) -> Solutions:
-        """Memory for a trial, the same for one after the other."""
+        """Memory for a trial, reused from trial to trial."""
         kept, shape = self._solutions, (self.num_envs, self.max_steps)
         if kept is None or (kept.n_ants, kept.max_steps) != shape:
             kept = Solutions(*shape, self.n_actions, self.partition)

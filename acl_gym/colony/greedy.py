@@ -44,11 +44,12 @@ def greedy_actions(
 
     Args:
         table: `(n_cells, n_actions)`, pheromone levels or action values.
-        ranks: `(n_cells, n_actions)`, an order of the actions for each cell. Tied
-            actions go by their rank in the state's foremost cell.
+        ranks: `(n_cells, n_actions)`, an order of the actions for each cell. Of
+            tied actions the one with the lowest rank in the state's cell of largest
+            degree is taken.
         index: `(n, k)`.
         degree: `(n, k)`.
-        allowed: the actions to choose from, `(n, n_actions)`, one or more a state;
+        allowed: the actions to choose from, `(n, n_actions)`, at least one per state;
             None: all.
 
     Returns:
@@ -72,7 +73,7 @@ def best_value(
         index: `(n, k)`.
         degree: `(n, k)`.
         j: which of the n states.
-        allowed: U_q, `(n, n_actions)`; an empty array where every action is.
+        allowed: U_q, `(n, n_actions)`; an empty array if every action is allowed.
     """
     best = -np.inf
     for u in range(table.shape[1]):
@@ -94,10 +95,9 @@ def mark_greedy(
     allowed: BoolArray,
     greedy: BoolArray,
 ) -> None:
-    """Write to `greedy` `(m,)` whether each action is a best one; tied ones are.
+    """Write to `greedy`, `(m,)`, whether each action is a best one, ties included.
 
-    Exact where `table` is the one that the actions were chosen on: the sums are those
-    of the selection.
+    Exact if the actions were chosen on this `table`: the sums are those of selection.
     """
     for j in range(actions.size):
         value = _value(table, index[j], degree[j], actions[j])

@@ -134,7 +134,7 @@ class UpdateRule(Savable, ABC):
 
 @dataclass
 class MissingRule(UpdateRule):
-    """Stands where a saved agent had an update rule of the user's own.
+    """Stands in for a user's own update rule in an agent read from a file.
 
     Attributes:
         name: of the rule's class.
@@ -143,14 +143,14 @@ class MissingRule(UpdateRule):
     name: str
 
     def start_trial(self, pheromone: Pheromone, trial: int) -> None:
-        """Say what is missing.
+        """Report which rule is missing.
 
         Raises:
             ValueError: always.
         """
         raise ValueError(
             f"update was the rule {self.name!r}, which a file cannot hold; set "
-            "agent.update to it before learning on."
+            "agent.update to it before learning continues."
         )
 
     def local_update(self, *arguments: Any) -> None:

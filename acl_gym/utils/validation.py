@@ -1,4 +1,4 @@
-"""Checks of arguments: each failure is one error with expected, actual and remedy."""
+"""Checks of arguments, whose errors state what was expected and what was given."""
 
 from __future__ import annotations
 
@@ -107,7 +107,7 @@ def real_array(
 ) -> NDArray[np.float64]:
     """Return `values` as a new float64 array that is not empty.
 
-    Strings, complex numbers and ragged lists are refused, not converted.
+    Strings, complex numbers and ragged lists are rejected, not converted.
 
     Args:
         name: what the array is called in the error message.

@@ -6,10 +6,10 @@ import logging
 import platform
 from typing import Any
 
+from acl_gym.experiments.executors import Finished, RunFailedError, keep
 from acl_gym.experiments.methods import run as run_study
 from acl_gym.experiments.provenance import circumstances
 from acl_gym.experiments.results import Run
-from acl_gym.experiments.executors import Finished, RunFailedError, keep
 from acl_gym.experiments.store import Job, Store
 
 

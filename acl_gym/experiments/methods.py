@@ -130,13 +130,7 @@ def make_agent(study: Study, seed: int) -> TabularAgent:
     with warnings.catch_warnings():
         # Table 4.1 has a tau_0 above 1 / J_max: the thesis wants it so.
         warnings.simplefilter("ignore", PheromoneBoundWarning)
-        if "update" in settings:  # provisional
-            from acl_gym.experiments import orders
-
-            names = {"in_turn": "one phase", "once_per_ant": "once an ant", "once_per_trial": "once a trial", "each_visit": "two phases"}
-            agent = orders.colony(names[settings.pop("update")], env, study.make_partition(), seed=seed, **settings)
-        else:
-            agent = kind(env, study.make_partition(), seed=seed, **settings)
+        agent = kind(env, study.make_partition(), seed=seed, **settings)
     if study.reversed_slots:
         agent.rng = ReversedLuck(agent.rng)  # type: ignore[assignment]
     return agent

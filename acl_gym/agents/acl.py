@@ -220,16 +220,7 @@ class ACL(TabularAgent):
                     index, degree = self._locate(observation, ants)
                     # 9: select actions, by default all on the same pheromone
                     allowed = self._allowed(rollout, solutions, index)
-                    actions = rule.choose(
-                        self.selection,
-                        pheromone,
-                        index,
-                        degree,
-                        epsilon,
-                        self.rng,
-                        allowed,
-                        self.local_decay,
-                    )
+                    actions = self._choose(index, degree, epsilon, allowed)
                     # 10: add the pairs to the partial solutions
                     solutions.append(ants, observation, index, actions)
                     # 11, 13-16: apply the actions; who is at the goal leaves C
@@ -423,6 +414,25 @@ class ACL(TabularAgent):
         if allowed is None:
             allowed = np.ones((rollout.ants.size, self.n_actions), dtype=np.bool_)
         return solutions.untried(rollout.ants, index, allowed)
+
+    def _choose(
+        self,
+        index: CellArray,
+        degree: FloatArray,
+        epsilon: float,
+        allowed: BoolArray | None,
+    ) -> IntArray:
+        """Choose the actions of the walking ants, as the update rule says."""
+        return self.update.choose(
+            self.selection,
+            self.pheromone,
+            index,
+            degree,
+            epsilon,
+            self.rng,
+            allowed,
+            self.local_decay,
+        )
 
     def _explore(
         self, index: CellArray, degree: FloatArray, allowed: BoolArray | None

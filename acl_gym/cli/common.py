@@ -7,7 +7,7 @@ import os
 import sys
 import traceback
 import warnings
-from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import fields, is_dataclass
 from importlib import import_module
@@ -150,14 +150,14 @@ def bad_arguments() -> Iterator[None]:
 
 
 def parse_settings(
-    option: str, texts: Iterable[str], allowed: Collection[str] | None = None
+    option: str, texts: Iterable[str], allowed: Mapping[str, str] | None = None
 ) -> dict[str, Any]:
     """Parse `name=value` pairs into a dict; values that are JSON are read as JSON.
 
     Args:
         option: the option, for messages.
         texts: the pairs, each `name=value`.
-        allowed: the valid names; None allows all.
+        allowed: the valid names, each with its range or ""; None allows all.
 
     Raises:
         BadArgumentError: a text has no `=`, or a name is unknown or repeated.
@@ -168,8 +168,12 @@ def parse_settings(
         if not equals or not name.isidentifier():
             raise BadArgumentError(f"{option} must be name=value, got {text!r}.")
         if allowed is not None and name not in allowed:
+            names = (
+                f"{each} ({allowed[each]})".removesuffix(" ()")
+                for each in sorted(allowed)
+            )
             raise BadArgumentError(
-                f"{option} has no {name!r}; choose from {', '.join(sorted(allowed))}."
+                f"{option} has no {name!r}; choose from {', '.join(names)}."
             )
         if name in settings:
             raise BadArgumentError(f"{option} sets {name!r} twice.")

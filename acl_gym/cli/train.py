@@ -14,7 +14,6 @@ from acl_gym.cli.common import (
     FOREIGN_EPISODES,
     AgentName,
     BadArgumentError,
-    Command,
     DebugOption,
     JsonOption,
     bad_arguments,
@@ -53,34 +52,6 @@ RANDOM_STEPS = 10_000
 """Random steps from which missing bounds of observations are estimated."""
 
 _OWN_OPTIONS = ("env", "partition", "max_steps", "seed", "n_actions", "heuristic")
-
-
-class TrainCommand(Command):
-    """Its help lists the parameters of the agents, which are looked up only then."""
-
-    def format_help(self, ctx: Any, formatter: Any) -> None:
-        """Write the help."""
-        self.epilog = "\n\n".join(
-            f"\b\nParameters of {name}:\n" + "\n".join(_parameter_lines(name))
-            for name in AGENTS
-        )
-        super().format_help(ctx, formatter)
-
-
-def _parameter_lines(agent: str) -> list[str]:
-    from acl_gym.utils.parameters import default_of, parameters_of
-
-    kind = agent_class(agent)
-    declared = parameters_of(kind)
-    lines = []
-    for name in parameter_names(kind):
-        default = default_of(kind, name)
-        line = f"  {name:14} [default: {default}]"
-        if name in declared:
-            line = f"  {name:14} {declared[name].range.in_words()} [default: {default}]"
-            line += f"\n{'':17}{declared[name].meaning}"
-        lines.append(line)
-    return lines
 
 
 def train(
@@ -134,7 +105,7 @@ def train(
         typer.Option(
             metavar="NAME=VALUE",
             help="A parameter of the agent, such as epsilon=0.2; repeat the option for "
-            "more. All parameters are listed below.",
+            "more. An unknown name prints the list of parameters.",
             show_default=False,
         ),
     ] = None,
@@ -201,7 +172,7 @@ def train(
             _free_name(env_id) if out is None else files.with_suffix(out)
         )
         kind = agent_class(agent)
-        settings = parse_settings("--param", param or (), parameter_names(kind))
+        settings = parse_settings("--param", param or (), _parameters(kind))
         env_args = parse_settings("--env-arg", env_arg or ())
         env = make_env(env_id, ants, env_args)
         steps = max_steps or default_steps(env)
@@ -241,6 +212,17 @@ def parameter_names(kind: type) -> list[str]:
     """Names for `--param`: constructor keywords that have no option of their own."""
     parameters = inspect.signature(kind).parameters
     return [name for name in parameters if name not in _OWN_OPTIONS]
+
+
+def _parameters(kind: type) -> dict[str, str]:
+    """What `--param` may set, and the range of each number, as in "> 0"."""
+    from acl_gym.utils.parameters import parameters_of
+
+    declared = parameters_of(kind)
+    return {
+        name: declared[name].range.in_words() if name in declared else ""
+        for name in parameter_names(kind)
+    }
 
 
 def _cells(text: str | None) -> list[int] | None:

@@ -113,21 +113,6 @@ def _value(table: FloatArray, cells: CellArray, degrees: FloatArray, u: int) -> 
     return total
 
 
-@njit(cache=True, inline="always")
-def _weighed(
-    table: FloatArray,
-    heuristic: FloatArray,
-    cells: CellArray,
-    degrees: FloatArray,
-    u: int,
-) -> float:
-    """The sum over a state's cells of degree times table entry times heuristic."""
-    total = 0.0
-    for c in range(cells.size):
-        total += degrees[c] * table[cells[c], u] * heuristic[cells[c], u]
-    return total
-
-
 @njit(cache=True)
 def _values(
     table: FloatArray,
@@ -137,23 +122,21 @@ def _values(
     allowed: BoolArray,
     j: int,
     values: FloatArray,
-) -> float:
-    """Write the value of each action of ant j, -inf where it is not allowed.
-
-    Returns:
-        The largest value; -inf where no value is a number.
-    """
-    best = -np.inf
+) -> None:
+    """Write the value of each action of ant j, -inf where it is not allowed."""
     for u in range(values.size):
-        values[u] = -np.inf
-        if allowed.size == 0 or allowed[j, u]:
-            if heuristic is None:
-                values[u] = _value(table, cells, degrees, u)
-            else:
-                values[u] = _weighed(table, heuristic, cells, degrees, u)
-        if values[u] > best:
-            best = values[u]
-    return best
+        values[u] = 0.0 if allowed.size == 0 or allowed[j, u] else -np.inf
+    if heuristic is None:
+        for u in range(values.size):
+            values[u] += _value(table, cells, degrees, u)
+    else:
+        for c in range(cells.size):
+            cell, counts = cells[c], False
+            for u in range(values.size):
+                counts |= values[u] > -np.inf and heuristic[cell, u] > 0.0
+            for u in range(values.size):
+                weight = heuristic[cell, u] if counts else 1.0
+                values[u] += degrees[c] * table[cell, u] * weight
 
 
 @njit(cache=True)
@@ -171,7 +154,7 @@ def best_action(
     Args:
         table: `(n_cells, n_actions)`.
         heuristic: what the table is multiplied by, `(n_cells, n_actions)`; None: 1.
-            Where it is 0 for all that is allowed, it is left out.
+            Left out in a cell where it is 0 for all that is allowed.
         index: `(m, k)`.
         degree: `(m, k)`.
         choice: in [0, 1), draws one of the actions that tie.
@@ -180,10 +163,12 @@ def best_action(
     """
     values = np.empty(table.shape[1])
     cells, degrees = index[j], degree[j]
-    best = _values(table, heuristic, cells, degrees, allowed, j, values)
-    if heuristic is not None and best == 0.0:
-        best = _values(table, None, cells, degrees, allowed, j, values)
-    if best == -np.inf:
+    _values(table, heuristic, cells, degrees, allowed, j, values)
+    best = -np.inf
+    for u in range(values.size):
+        if values[u] > best:
+            best = values[u]
+    if best == -np.inf:  # no value is a number
         return any_action(choice, j, values.size, allowed)
     tied = 0
     for u in range(values.size):

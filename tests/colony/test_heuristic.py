@@ -64,11 +64,11 @@ def test_choices_weigh_the_heuristic(
     if restricted:
         allowed = rng.random(allowed.shape) < 0.5
         allowed[~allowed.any(axis=1), 0] = True
-    pheromone = Pheromone(n_cells, n_actions, 1e-4, plain.alpha, eta, beta)
+    pheromone = Pheromone(n_cells, n_actions, 1e-300, plain.alpha, eta, beta)
     pheromone.set_levels(plain.levels)
     mask = allowed if restricted else None
     state = rng.bit_generator.state
-    if in_turn:  # without decay, so that the table stays
+    if in_turn:  # without decay; levels far above tau0 stay exactly
         actions = InTurn().choose(rule, pheromone, index, degree, 0.2, rng, mask, 0.0)
     else:
         actions = choose_actions(rule, pheromone, index, degree, 0.2, rng, mask)

@@ -1,4 +1,4 @@
-"""A policy as a table over a partition: what every method here ends with."""
+"""Policies over a partition: the result of every method of this package."""
 
 from __future__ import annotations
 
@@ -9,8 +9,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
+from acl_gym.colony.greedy import greedy_actions
 from acl_gym.colony.pheromone import Pheromone
-from acl_gym.colony.selection import choose_actions, greedy_actions
+from acl_gym.colony.selection import NUMBERS_PER_ACTION, choose_actions
 from acl_gym.partitions import Partition
 from acl_gym.utils import validation
 from acl_gym.utils.typing import BoolArray, CellArray, FloatArray, IntArray, RankArray
@@ -19,15 +20,15 @@ from acl_gym.utils.typing import BoolArray, CellArray, FloatArray, IntArray, Ran
 def random_ranks(n_cells: int, n_actions: int, rng: np.random.Generator) -> RankArray:
     """A random order of the actions for each cell, `(n_cells, n_actions)`.
 
-    Ties are to be broken at random (4.16). Drawn once, the order makes the policy a
-    function (a decision).
+    Ties are broken at random (4.16). Drawing the order once makes the policy a function
+    (a decision).
     """
     ranks = np.tile(np.arange(n_actions, dtype=np.int32), (n_cells, 1))
     return np.asarray(rng.permuted(ranks, axis=1), dtype=np.int32)
 
 
 class PartitionPolicy(ABC):
-    """What chooses actions through a partition, with Stable-Baselines3's `predict`.
+    """A policy that sees cells and degrees, with Stable-Baselines3's `predict`.
 
     Attributes:
         partition: turns observations into cells and degrees.
@@ -53,6 +54,12 @@ class PartitionPolicy(ABC):
     ) -> IntArray:
         """Choose columns of the table, `(n,)`, for cells and degrees `(n, k)`."""
 
+    def _act_in_state(
+        self, state: Any, episode_start: Any, *situation: Any
+    ) -> tuple[IntArray, Any]:
+        """Choose by `_act(*situation)`; return the next state with the columns."""
+        return self._act(*situation), state
+
     def predict(
         self,
         observation: ArrayLike,
@@ -65,10 +72,10 @@ class PartitionPolicy(ABC):
 
         Args:
             observation: one observation or a batch of them.
-            state: passed through; a table has no memory.
-            episode_start: not used.
-            deterministic: True follows the policy, False explores as in learning,
-                where there is a difference.
+            state: returned as it is, except by a `SoftPolicy`; a table has no memory.
+            episode_start: only used by a `SoftPolicy`.
+            deterministic: True follows the policy; False explores as in learning, if
+                the policy is that of an agent.
             action_masks: which actions may be chosen, `(n_actions,)` or
                 `(n, n_actions)`, such as `info["action_mask"]`; None: all.
 
@@ -83,7 +90,10 @@ class PartitionPolicy(ABC):
         single = batch.ndim == self.partition.state_ndim
         index, degree = self.partition(batch[None] if single else batch)
         allowed = self._checked_masks(action_masks, len(index))
-        actions = self._act(index, degree, deterministic, allowed) + self.first_action
+        columns, state = self._act_in_state(
+            state, episode_start, index, degree, deterministic, allowed
+        )
+        actions = columns + self.first_action
         return (actions[0] if single else actions), state
 
     def _checked_masks(self, masks: ArrayLike | None, count: int) -> BoolArray | None:
@@ -107,8 +117,8 @@ class TablePolicy(PartitionPolicy):
     Args:
         partition: turns observations into cells and degrees.
         table: `(n_cells, n_actions)`, pheromone levels or action values.
-        ranks: `(n_cells, n_actions)`, by which tied actions are told apart; None
-            draws them from a fixed seed.
+        ranks: `(n_cells, n_actions)`, the order in which tied actions are preferred;
+            None draws it from a fixed seed.
         first_action: the action that column 0 stands for, `Discrete.start`.
 
     Raises:
@@ -129,7 +139,7 @@ class TablePolicy(PartitionPolicy):
             )
         if len(table) != partition.n_cells:
             raise ValueError(
-                f"table must have {partition.n_cells} rows, one a cell, got "
+                f"table must have {partition.n_cells} rows, one per cell, got "
                 f"{len(table)}."
             )
         n_cells, n_actions = table.shape
@@ -177,6 +187,13 @@ class SoftPolicy(PartitionPolicy):
     never leaves (docs/hovering.md). Drawing in proportion to tau^exponent follows
     the same pheromone, and leaves every cycle sooner or later.
 
+    An evaluation is a function of the seed. Called with `episode_start`, as
+    Stable-Baselines3's `evaluate_policy` and `evaluate_policy_cost` do, `predict`
+    changes nothing: the state that it takes, None at first, and returns holds how many
+    numbers the evaluation has drawn. Called without `episode_start`, for instance in
+    a loop of your own, it continues the random numbers of its own generator.
+    `deterministic` makes no difference.
+
     Args:
         partition: turns observations into cells and degrees.
         levels: pheromone, `(n_cells, n_actions)`; copied.
@@ -205,7 +222,8 @@ class SoftPolicy(PartitionPolicy):
         n_cells, n_actions = levels.shape
         self._pheromone = Pheromone(n_cells, n_actions, 1.0, exponent)
         self._pheromone.set_levels(levels)
-        self._rng = np.random.default_rng(seed)
+        self._seeds = np.random.SeedSequence(seed)
+        self._by_hand = self._stream(0)
 
     @property
     def n_actions(self) -> int:
@@ -219,9 +237,32 @@ class SoftPolicy(PartitionPolicy):
         deterministic: bool,
         allowed: BoolArray | None,
     ) -> IntArray:
+        return self._draw(self._by_hand, index, degree, allowed)
+
+    def _act_in_state(
+        self, state: Any, episode_start: Any, *situation: Any
+    ) -> tuple[IntArray, Any]:
+        if episode_start is None:
+            return super()._act_in_state(state, episode_start, *situation)
+        index, degree, _, allowed = situation
+        drawn = 0 if state is None else int(state[0])
+        columns = self._draw(self._stream(drawn), index, degree, allowed)
+        return columns, (np.array(drawn + NUMBERS_PER_ACTION * len(columns)),)
+
+    def _draw(
+        self,
+        rng: np.random.Generator,
+        index: CellArray,
+        degree: FloatArray,
+        allowed: BoolArray | None,
+    ) -> IntArray:
         return choose_actions(
-            "boltzmann", self._pheromone, index, degree, 0.0, self._rng, allowed
+            "boltzmann", self._pheromone, index, degree, 0.0, rng, allowed
         )
+
+    def _stream(self, drawn: int) -> np.random.Generator:
+        """The generator of the seed after so many numbers have been drawn."""
+        return np.random.Generator(np.random.PCG64(self._seeds).advance(drawn))
 
 
 @njit(cache=True)

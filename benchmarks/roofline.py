@@ -25,9 +25,10 @@ from numba import njit
 from rich.console import Console
 from rich.table import Table
 
-from acl_gym.colony import selection
+from acl_gym.colony import greedy, selection
 from acl_gym.colony.pheromone import Pheromone
 from acl_gym.colony.solutions import Solutions
+from acl_gym.colony.update_rules import EachVisit, Reinforcement
 from acl_gym.envs import navigation, pendulum
 from acl_gym.partitions import Fuzzy
 from acl_gym.partitions.kernels import written_out
@@ -135,12 +136,13 @@ class Ants:
         selection._boltzmann(
             self.table.levels,
             3.0,
+            None,
             self.table.probabilities,
             self.index,
             self.degree,
             self.draws,
             0.1,
-            selection.ALL,
+            greedy.ALL,
             self.columns,
             self.corners,
             self.actions,
@@ -151,7 +153,9 @@ class Ants:
         self.draw()
 
     def decay(self) -> None:
-        self.table.local_update(self.index, self.degree, self.actions, 0.01)
+        EachVisit().local_update(
+            self.table, self.index, self.degree, self.actions, 0.01
+        )
 
 
 class Trial:
@@ -179,10 +183,11 @@ class Trial:
             self.solutions.append(everyone, states, grid(states)[0], actions)
         self.table = Pheromone(grid.n_cells, 3, 1e-4, 3.0)
         self.deposits = np.full(ants, 1e-3)
+        self.reinforcement = Reinforcement(self.table.levels.size)
         self.n_steps = ants * steps
 
     def deposit(self) -> None:
-        self.table.global_update(self.solutions, self.deposits, 0.1)
+        self.reinforcement(self.table, self.solutions, self.deposits, 0.1)
 
 
 def kernels() -> list[Kernel]:

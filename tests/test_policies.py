@@ -6,7 +6,13 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from acl_gym import ACL, Fuzzy, PolicyEvaluation
+from acl_gym import (
+    ACL,
+    Fuzzy,
+    PolicyEvaluation,
+    VectorEnvAdapter,
+    evaluate_policy_cost,
+)
 from acl_gym.policies import SoftPolicy, TablePolicy, random_ranks
 
 GRID = Fuzzy([[0.0, 1.0, 2.0]])
@@ -59,6 +65,72 @@ def test_soft_policy_is_seeded_and_keeps_its_own_levels() -> None:
     drawn = first.predict(states)[0]
     assert set(drawn.tolist()) == {0, 1}
     np.testing.assert_array_equal(drawn, second.predict(states)[0])
+
+
+def soft_pendulum() -> tuple[ACL, SoftPolicy]:
+    env = gym.make_vec("acl_gym/Pendulum-v0", num_envs=20)
+    grid = Fuzzy.from_box(env.single_observation_space, (8, 9), circular=[0])
+    colony = ACL(env, grid, tau0=1e-6, seed=4).learn(trials=3)
+    return colony, colony.soft_policy(exponent=2.0, seed=7)
+
+
+def test_evaluations_of_a_soft_policy_are_a_function_of_its_seed() -> None:
+    colony, policy = soft_pendulum()
+    states = colony.partition.cell_states()
+    found = []
+    for other in (policy, policy, colony.soft_policy(exponent=2.0, seed=7)):
+        found.append(evaluate_policy_cost(other, colony.env, max_steps=30).costs)
+        other.predict(states)  # whatever is predicted in between
+        other.predict(states, None, np.ones(len(states)))
+    np.testing.assert_array_equal(found[0], found[1])
+    np.testing.assert_array_equal(found[0], found[2])
+    differs = colony.soft_policy(exponent=2.0, seed=8)
+    result = evaluate_policy_cost(differs, colony.env, max_steps=30)
+    assert (result.costs != found[0]).any()
+
+
+def test_an_evaluation_draws_what_a_new_policy_draws_by_hand() -> None:
+    """Batches may shrink on the way, as ants arrive."""
+    colony, policy = soft_pendulum()
+    by_hand = colony.soft_policy(exponent=2.0, seed=7)
+    states, memory = colony.partition.cell_states(), None
+    for step, size in enumerate((70, 70, 31, 1)):
+        start = np.full(size, step == 0)
+        drawn, memory = policy.predict(states[:size], memory, start)
+        np.testing.assert_array_equal(drawn, by_hand.predict(states[:size])[0])
+
+
+def test_stable_baselines3_evaluates_a_soft_policy_repeatably() -> None:
+    evaluation = pytest.importorskip("stable_baselines3.common.evaluation")
+    _, policy = soft_pendulum()
+    env = VectorEnvAdapter(
+        gym.make_vec(
+            "acl_gym/Pendulum-v0",
+            num_envs=5,
+            autoreset_mode="Disabled",
+            max_episode_steps=40,
+        )
+    )
+    found = []
+    for _ in range(2):
+        env.seed(3)
+        rewards, _ = evaluation.evaluate_policy(
+            policy, env, 5, return_episode_rewards=True, warn=False
+        )
+        found.append(rewards)
+    assert found[0] == found[1]
+
+
+def test_a_soft_policy_leaves_a_cycle() -> None:
+    """Asked again and again in one state it does not always answer the same."""
+    policy = SoftPolicy(GRID, np.ones((3, 2)), seed=0)
+    by_hand = {int(policy.predict([0.3])[0]) for _ in range(40)}
+    assert by_hand == {0, 1}
+    evaluated, memory = set(), None
+    for step in range(40):
+        actions, memory = policy.predict([[0.3]], memory, np.array([step == 0]))
+        evaluated.add(int(actions[0]))
+    assert evaluated == {0, 1}
 
 
 @pytest.mark.parametrize("exponent", [0.0, -1.0, float("nan"), float("inf")])

@@ -1,4 +1,4 @@
-"""What the colony and Q-learning share: a table over a partition, and its policy."""
+"""The base of the agents: a table over a partition, its policy, saving and loading."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from gymnasium.vector import VectorEnv
 from numpy.typing import ArrayLike, NDArray
 
 from acl_gym.callbacks.base import Callbacks
-from acl_gym.colony.selection import greedy_actions
+from acl_gym.colony.greedy import greedy_actions
 from acl_gym.evaluation.rollout import Rollout, require_vector_env
 from acl_gym.partitions import Partition, check_cells, partition_from_settings
 from acl_gym.partitions.automatic import automatic_partition
@@ -27,7 +27,7 @@ from acl_gym.utils.typing import (
 )
 
 DEFAULT_MAX_STEPS = 300
-"""T of Table 5.2, where neither agent nor environment sets a limit."""
+"""T of Table 5.2, used if neither agent nor environment sets a limit."""
 
 
 class TabularAgent(PartitionPolicy):
@@ -37,22 +37,22 @@ class TabularAgent(PartitionPolicy):
         env: a vector environment with `Discrete` actions; each slot is one ant.
         partition: turns observations into cells and degrees; None takes
             `automatic_partition(env)`.
-        max_steps: T, the longest an episode may last, >= 1. None takes the limit that
-            the environment is registered with, and 300 where it has none.
-        seed: a run is a function of it; None draws one from the system.
+        max_steps: T, the longest an episode may last, >= 1. None takes the time limit of
+            the environment, or 300 if it has none.
+        seed: the same seed gives the same run; None draws one from the system.
 
     Attributes:
         num_timesteps: steps that all slots have taken together.
         trials: trials finished, k.
         seconds: wall-clock time spent learning, without callbacks.
-        history: one row a trial: `trial`, `env_steps`, `seconds` (all three
+        history: one row per trial: `trial`, `env_steps`, `seconds` (all three
             cumulated), `ants_cost` (mean J of the ants), `ants_success_rate`,
             `policy_variation` (§3.6.1), what the agent adds in `measures`, and,
             where a `PolicyEvaluation` ran, `policy_cost` (3.47) and `success_rate`.
-        in_trial: whether a trial is under way, or was when an exception ended it: the
-            table is then that of no whole trial.
-        metadata: your own notes, JSON values under string keys, empty at first; they
-            are saved with the agent and loaded with it.
+        in_trial: whether a trial is under way, or was interrupted by an exception; the
+            table is then not that after a complete trial.
+        metadata: your own notes, JSON values under string keys, empty at first; saved
+            and loaded with the agent.
     """
 
     def __init__(
@@ -129,6 +129,10 @@ class TabularAgent(PartitionPolicy):
     def parameters(self) -> dict[str, Any]:
         """The keyword arguments of the constructor, as saved in a file."""
 
+    def _arrays(self) -> dict[str, NDArray[Any]]:
+        """More arrays to save, which `_restore` takes over again."""
+        return {}
+
     def measures(self, policy: IntArray) -> Row:
         """More columns for the row of a trial, given the policy `(n_cells,)`."""
         return {}
@@ -143,7 +147,7 @@ class TabularAgent(PartitionPolicy):
     def table(self) -> FloatArray:
         """The table as it is now, `(n_cells, n_actions)`.
 
-        It follows learning, and cannot be written to: see `set_table`.
+        It follows learning and is read-only; change it with `set_table`.
         """
         view = self._table.view()
         view.flags.writeable = False
@@ -174,7 +178,7 @@ class TabularAgent(PartitionPolicy):
         return int(self.rollout.env.num_envs)
 
     def set_env(self, env: VectorEnv[Any, Any, Any]) -> None:
-        """Learn on another environment from now on, also with other slots.
+        """Learn on another environment from now on; its number of slots may differ.
 
         Raises:
             TypeError: `env` is not a vector environment.
@@ -205,11 +209,11 @@ class TabularAgent(PartitionPolicy):
         self._degree: FloatArray = np.zeros((env.num_envs, k))
 
     def set_random_seed(self, seed: int | None) -> None:
-        """Begin the agent's random numbers anew.
+        """Restart the agent's random numbers.
 
-        Three independent streams: learning, exploring predictions, and the ranks by
-        which ties of the policy are broken, so that asking the agent for an action
-        never changes what it learns.
+        There are three independent streams, for learning, for exploring predictions and
+        for the order in which ties of the policy are broken, so predictions never
+        change what is learned.
 
         Args:
             seed: >= 0; None draws one from the system.
@@ -267,7 +271,7 @@ class TabularAgent(PartitionPolicy):
         return values
 
     def save(self, path: str | Path) -> Path:
-        """Write the agent to one `.npz` file, without pickle, in one piece.
+        """Write the agent to one `.npz` file, atomically and without pickle.
 
         Returns:
             The path written, with `.npz` added where it was missing.
@@ -293,13 +297,14 @@ class TabularAgent(PartitionPolicy):
             ],
         }
         arrays: dict[str, NDArray[Any]] = {"table": self._table, "ranks": self._ranks}
+        arrays |= self._arrays()
         return files.save(path, header, arrays)
 
     @classmethod
     def load(
         cls, path: str | Path, env: VectorEnv[Any, Any, Any] | None = None
     ) -> Self:
-        """Read an agent that `save` wrote; learning goes on where it stopped.
+        """Read an agent that `save` wrote; learning continues where it stopped.
 
         Args:
             path: the file, with or without `.npz`.
@@ -336,7 +341,7 @@ class TabularAgent(PartitionPolicy):
         return dict(saved)
 
     def _restore(self, header: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> None:
-        """Take over what a file holds beside the constructor's arguments."""
+        """Restore what a file holds in addition to the constructor's arguments."""
         self.set_table(arrays["table"])
         ranks = arrays["ranks"]
         if (np.sort(ranks, axis=1) != np.arange(self.n_actions)).any():
@@ -358,7 +363,7 @@ class TabularAgent(PartitionPolicy):
         ):
             raise TypeError("history must be a list of rows of numbers")
         self.history = history
-        metadata = header.get("metadata", {})  # files of before it have none
+        metadata = header.get("metadata", {})  # older files have none
         if not isinstance(metadata, dict):
             raise TypeError(f"metadata must be a dict, got {metadata!r}")
         self.metadata = metadata
@@ -368,7 +373,7 @@ class TabularAgent(PartitionPolicy):
 
 
 def time_limit(env: Any) -> int | None:
-    """The time limit that an environment was made or registered with; None: none."""
+    """The time limit that an environment was made or registered with, or None."""
     base = getattr(env, "unwrapped", None)
     limit = getattr(base, "max_episode_steps", None)
     # A vector of single environments may know its limit by those only.

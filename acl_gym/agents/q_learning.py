@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from acl_gym.agents.base import TabularAgent
 from acl_gym.agents.training import Training
 from acl_gym.callbacks.base import Callbacks
-from acl_gym.colony.selection import (
+from acl_gym.colony.greedy import (
     ALL,
     best_value,
     epsilon_greedy_actions,
@@ -21,6 +21,7 @@ from acl_gym.colony.selection import (
 from acl_gym.evaluation.rollout import Rollout, Step
 from acl_gym.partitions import Partition
 from acl_gym.utils import validation
+from acl_gym.utils.parameters import Parameter
 from acl_gym.utils.typing import BoolArray, CellArray, FloatArray, IntArray
 
 TRACES = ("replacing", "accumulating")
@@ -35,16 +36,16 @@ class QLearning(TabularAgent):
     Through a `Crisp` partition it is tabular Q-learning; through a `Fuzzy` one the
     action value is linear in the degrees, Q(x, u) = sum of beta_i Q_iu, and each cell
     learns in proportion to its degree. Values start at 0, which is optimistic where
-    rewards are negative costs, and so makes the slots explore. Where the environment
-    tells what a state offers (`infos["action_mask"]`), those actions are its U_q.
+    rewards are negative costs, so the slots explore. If the environment gives
+    `infos["action_mask"]`, those are the actions U_q of each state.
 
     With `trace_decay` > 0 it is Watkins's Q(lambda), as in
-    `QLearning(env, grid, trace_decay=0.7)`. Each slot has traces of its own, which
-    begin empty with each episode. In each step they fade by gamma_rl lambda, the cells
+    `QLearning(env, grid, trace_decay=0.7)`. Each slot has its own traces, which are
+    empty at the start of each episode. In each step they fade by gamma_rl lambda, the cells
     of the state and the action taken are added, and every pair learns from the error
-    (3.46) in proportion to its trace. An action that is not greedy on the values it
-    was chosen on cuts the slot's traces first; a tied one is greedy. Traces below
-    1e-4 are dropped.
+    (3.46) in proportion to its trace. An action that is not greedy on the values
+    it was chosen on first clears the slot's traces; tied actions are greedy. Traces
+    below 1e-4 are dropped.
 
     Args:
         env: a vector environment with `Discrete` actions.
@@ -54,15 +55,14 @@ class QLearning(TabularAgent):
         discount: gamma_rl, in [0, 1].
         epsilon: probability of a random action, in [0, 1].
         trace_decay: lambda, in [0, 1]; 0 is plain Q-learning.
-        traces: what a visit does to a trace e that has faded already, for a cell of
-            degree beta. `"replacing"` makes it max(e, beta): at most 1, so that no
+        traces: what a visit with degree beta makes of a trace e, after its fading. `"replacing"` makes it max(e, beta): at most 1, so that no
             error is corrected by more than the learning rate. `"accumulating"` makes
             it e + beta: a slot that stands still against a wall comes to
             1 / (1 - gamma_rl lambda), which times the learning rate can exceed 1, and
             then the value moves further than the error.
-        max_steps: the longest an episode may last, >= 1. None takes the limit that the
-            environment is registered with, and 300 where it has none.
-        seed: a run is a function of it; None draws one from the system.
+        max_steps: the longest an episode may last, >= 1. None takes the time limit of
+            the environment, or 300 if it has none.
+        seed: the same seed gives the same run; None draws one from the system.
         n_actions: only needed without an environment.
 
     Raises:
@@ -70,10 +70,24 @@ class QLearning(TabularAgent):
         ValueError: a parameter is out of range.
     """
 
-    learning_rate = validation.Number(above=0, at_most=1)
-    discount = validation.Number(at_least=0, at_most=1)
-    epsilon = validation.Number(at_least=0, at_most=1)
-    trace_decay = validation.Number(at_least=0, at_most=1)
+    learning_rate = Parameter(
+        "Share of the error by which a value is corrected",
+        "alpha_rl",
+        above=0,
+        at_most=1,
+    )
+    discount = Parameter(
+        "Weight of the next state's value", "gamma_rl", at_least=0, at_most=1
+    )
+    epsilon = Parameter(
+        "Probability of a random action", "epsilon", at_least=0, at_most=1
+    )
+    trace_decay = Parameter(
+        "Fading of traces beside the discount; 0 is plain Q-learning",
+        "lambda",
+        at_least=0,
+        at_most=1,
+    )
 
     def __init__(
         self,
@@ -111,7 +125,7 @@ class QLearning(TabularAgent):
         """Learn; a trial is one episode in every slot. Arguments as in `ACL.learn`.
 
         Raises:
-            ValueError: the action values have grown beyond all numbers.
+            ValueError: the action values have overflowed.
         """
         budget = (total_timesteps, trials, callback, log_interval, progress_bar)
         with Training(self, *budget) as training:
@@ -211,7 +225,7 @@ class QLearning(TabularAgent):
         )
 
     def _empty_traces(self) -> _Traces | None:
-        """Memory for a trial, the same for one after the other; None without traces."""
+        """Memory for a trial, reused from trial to trial; None without traces."""
         if self.trace_decay == 0:
             return None
         kept = self._traces
@@ -224,9 +238,9 @@ class QLearning(TabularAgent):
 
 
 class _Traces:
-    """The eligibility traces e of all slots, only those that are not 0.
+    """The eligibility traces e of all slots, those that are not 0.
 
-    Memory is reserved for the longest episode but touched only as far as traces grow.
+    Memory is reserved for the longest episode, but only what traces need is touched.
 
     Args:
         slots: how many slots there are.
@@ -277,8 +291,8 @@ def _update(
 ) -> None:
     """(3.44) for one slot after the other, each on the values as they then are.
 
-    Summing the slots' corrections instead would overshoot where many slots share a
-    cell: ten of them at a rate of 0.3 would move it three times the way.
+    Adding up the slots' corrections instead would overshoot where many slots share a
+    cell: with ten slots at a rate of 0.3 it would move by three times the error.
     """
     for j in range(actions.size):
         u = actions[j]
@@ -317,9 +331,9 @@ def _update_traced(
 ) -> None:
     """(3.45) for one slot after the other, each on the values as they then are.
 
-    The degrees of the state are laid out in `mark`, so that one pass over the slot's
-    traces lets them fade, merges the state into them, drops what has faded away, and
-    corrects the values.
+    The degrees of the state are written to `mark`, so that one pass over the slot's
+    traces can fade them, merge the state into them, drop the smallest and correct the
+    values.
 
     Args:
         values: `(n_cells, n_actions)`, corrected in place.

@@ -20,17 +20,17 @@ DEFAULT_TRIALS = 100
 
 
 class Training:
-    """Runs from `learn` being called to its return; use it as a context manager.
+    """The frame of one call of `learn`; use it as a context manager.
 
     Args:
-        agent: who learns.
+        agent: the agent that learns.
         total_timesteps: stop after the trial that reaches so many steps of all slots
             together; None sets no such limit.
         trials: K, stop after so many trials; None sets no such limit. With neither
             limit, 100 trials.
         callback: see `acl_gym.callbacks`.
         log_interval: print a line every so many trials; None prints nothing.
-        progress_bar: show a bar.
+        progress_bar: show a progress bar.
     """
 
     def __init__(
@@ -97,7 +97,7 @@ class Training:
         return self._agent.in_trial
 
     def end_trial(self, costs: NDArray[np.float64] | None = None) -> None:
-        """Count the trial, measure it (§3.6.1) and tell the callbacks.
+        """Count the trial, measure it (§3.6.1) and call the callbacks.
 
         Args:
             costs: J of each ant; None takes the sums of the stage costs.

@@ -17,7 +17,7 @@ from acl_gym.cli.evaluate import evaluate
 from acl_gym.cli.reproduce import HELP as REPRODUCE_HELP
 from acl_gym.cli.reproduce import REPORT_HELP, ReproduceCommand, report, reproduce
 from acl_gym.cli.train import HELP as TRAIN_HELP
-from acl_gym.cli.train import train
+from acl_gym.cli.train import TrainCommand, train
 
 HELP = """Ant Colony Learning: colonies of ants that learn control policies.
 
@@ -59,7 +59,7 @@ def _main(
         raise typer.Exit(2)
 
 
-app.command(help=TRAIN_HELP)(train)
+app.command(cls=TrainCommand, help=TRAIN_HELP)(train)
 app.command(help=EVALUATE_HELP)(evaluate)
 app.command(help=ENVS_HELP)(envs)
 app.command(help=COMPARE_HELP, cls=CompareCommand)(compare)

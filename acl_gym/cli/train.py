@@ -14,6 +14,7 @@ from acl_gym.cli.common import (
     FOREIGN_EPISODES,
     AgentName,
     BadArgumentError,
+    Command,
     DebugOption,
     JsonOption,
     bad_arguments,
@@ -51,7 +52,35 @@ Examples:
 RANDOM_STEPS = 10_000
 """Random steps from which missing bounds of observations are estimated."""
 
-_OWN_OPTIONS = ("env", "partition", "max_steps", "seed", "n_actions")
+_OWN_OPTIONS = ("env", "partition", "max_steps", "seed", "n_actions", "heuristic")
+
+
+class TrainCommand(Command):
+    """Its help lists the parameters of the agents, which are looked up only then."""
+
+    def format_help(self, ctx: Any, formatter: Any) -> None:
+        """Write the help."""
+        self.epilog = "\n\n".join(
+            f"\b\nParameters of {name}:\n" + "\n".join(_parameter_lines(name))
+            for name in AGENTS
+        )
+        super().format_help(ctx, formatter)
+
+
+def _parameter_lines(agent: str) -> list[str]:
+    from acl_gym.utils.parameters import default_of, parameters_of
+
+    kind = agent_class(agent)
+    declared = parameters_of(kind)
+    lines = []
+    for name in parameter_names(kind):
+        default = default_of(kind, name)
+        line = f"  {name:14} [default: {default}]"
+        if name in declared:
+            line = f"  {name:14} {declared[name].range.in_words()} [default: {default}]"
+            line += f"\n{'':17}{declared[name].meaning}"
+        lines.append(line)
+    return lines
 
 
 def train(
@@ -105,7 +134,7 @@ def train(
         typer.Option(
             metavar="NAME=VALUE",
             help="A parameter of the agent, such as epsilon=0.2; repeat the option for "
-            "more. An unknown name prints the list of parameters.",
+            "more. All parameters are listed below.",
             show_default=False,
         ),
     ] = None,

@@ -1,7 +1,7 @@
-"""What a solution costs: any function of the whole of it.
+"""What a solution costs: any function of the complete solution.
 
 By default an ant's cost J is the sum of the stage costs that the environment charges
-(3.2). A `Cost` looks at the whole solution instead, so that it can ask for what no
+(3.2). A `Cost` is computed from the complete solution instead, so it can express what no
 reward per step expresses, such as a short rise time or little overshoot (§3.5.3,
 §7.3). Costs add up: `SettlingTime(0, 3.14, 0.1) + 2.0 * Overshoot(0, 3.14) + 0.1`.
 """
@@ -22,7 +22,7 @@ from acl_gym.utils.typing import FloatArray
 
 
 class Cost(Savable, ABC):
-    """A cost of whole solutions; lower is better."""
+    """A cost of complete solutions; lower is better."""
 
     @abstractmethod
     def __call__(self, episodes: Episodes) -> FloatArray:
@@ -185,7 +185,7 @@ class SettlingTime(_Response):
     """The time after which the variable stays within a band around the target.
 
     A solution that ends outside the band costs its whole duration, as does one that
-    comes into it with its last step.
+    enters it with its last step.
 
     Attributes:
         tolerance: half-width of the band, > 0, in units of the variable.
@@ -359,25 +359,15 @@ def solution_costs(cost: Cost, episodes: Episodes) -> FloatArray:
 
 
 def cost_from_settings(settings: Any) -> Cost | None:
-    """A cost from what a file holds of it.
+    """A cost from the settings in a file.
 
     Raises:
-        ValueError: it is none.
+        ValueError: they are not those of a cost.
     """
-    cost = from_settings("cost", _with_current_names(settings), _KINDS)
+    cost = from_settings("cost", settings, _KINDS)
     if cost is not None and not isinstance(cost, Cost):
         raise ValueError(f"cost must be a Cost, got {settings!r:.200}.")
     return cost
-
-
-def _with_current_names(settings: Any) -> Any:
-    """Settings in which costs have the names that their classes have now."""
-    if not isinstance(settings, dict):
-        return settings
-    current = {name: _with_current_names(value) for name, value in settings.items()}
-    if current.get("type") == "OwnCost":
-        current["type"] = FunctionCost.__name__
-    return current
 
 
 def _first_crossing(progress: FloatArray, level: float) -> FloatArray:

@@ -1,8 +1,8 @@
-"""How much pheromone an ant lays for a solution of a given cost.
+"""How much pheromone an ant deposits for a solution of a given cost.
 
-The thesis deposits 1 / J, which needs costs above 0. Most environments that were made
-for reinforcement learning reward, so J = -(return) is negative or mixed there; the
-other deposits are for those, and are this package's own.
+The thesis deposits 1 / J, which needs costs above 0. In most environments made for
+reinforcement learning J = -(return) is negative or of either sign. The other deposits
+are for those; they are not from the thesis.
 """
 
 from __future__ import annotations
@@ -30,10 +30,10 @@ class Deposit(Savable, ABC):
 
         Args:
             costs: J of each ant, `(n_ants,)`, finite.
-            tau0: the initial pheromone level, below which no deposit should be.
+            tau0: the initial pheromone level; no deposit should be below it.
 
         Raises:
-            ValueError: a cost is not one that this deposit is defined for.
+            ValueError: the deposit is not defined for one of the costs.
         """
 
 
@@ -44,7 +44,7 @@ class InverseCost(Deposit):
     §3.2.1 notes that a constant may be added to any cost.
 
     Attributes:
-        offset: added to every cost, such that all are above 0.
+        offset: added to every cost, so that all are above 0.
     """
 
     offset: float = 0.0
@@ -65,7 +65,7 @@ class InverseCost(Deposit):
                 f"1 / cost; got {shifted[ant]:g} for ant {ant}. Where returns are never negative pass "
                 'deposit="return", elsewhere deposit="rank" or '
                 "deposit=InverseCost(offset=...) with an offset above the highest "
-                "return; or add a constant to a cost of your own."
+                "return; or add a constant to your own cost."
             )
         return deposits
 
@@ -74,8 +74,7 @@ class InverseCost(Deposit):
 class Return(Deposit):
     """tau0 + the return, for environments whose returns are never negative.
 
-    Twice the return lays twice the pheromone; a solution without any return lays
-    tau0, so that levels stay at or above it.
+    A solution without any return deposits tau0, so that levels stay at or above it.
     """
 
     def __call__(self, costs: FloatArray, tau0: float) -> FloatArray:
@@ -92,15 +91,15 @@ class Return(Deposit):
 
 @dataclass(frozen=True)
 class Rank(Deposit):
-    """tau0 + the share of the other ants that an ant outdoes; ties count half.
+    """tau0 + the share of the other ants with a higher cost; ties count half.
 
-    Only the order of the returns of a trial matters: any reward will do. A colony of
-    one ant learns nothing from it, and ants that began in hard states are held
-    against those that began in easy ones.
+    Only the order of the costs in a trial matters, so rewards of any kind will do. A
+    colony of one ant learns nothing from it, and ants that started in hard states are
+    compared with those that started in easy ones.
 
     Attributes:
-        exponent: > 0; the share is raised to it, so that large ones leave the
-            deposits to the few best ants.
+        exponent: > 0; the share is raised to this power. The larger it is, the fewer
+            ants deposit much.
     """
 
     exponent: float = 1.0
@@ -127,7 +126,7 @@ NAMED: dict[str, Deposit] = {
 
 
 @dataclass(frozen=True)
-class OwnDeposit(Deposit):
+class FunctionDeposit(Deposit):
     """A user's function of the costs of a trial.
 
     Attributes:
@@ -151,7 +150,7 @@ class OwnDeposit(Deposit):
 
 
 def as_deposit(deposit: str | Deposit | Function) -> Deposit:
-    """Bring every accepted form of `deposit` into an object.
+    """Turn every accepted form of `deposit` into a `Deposit`.
 
     Raises:
         ValueError: there is no deposit of that name.
@@ -162,7 +161,7 @@ def as_deposit(deposit: str | Deposit | Function) -> Deposit:
     if isinstance(deposit, Deposit):
         return deposit
     if callable(deposit) and not isinstance(deposit, type):
-        return OwnDeposit(deposit)
+        return FunctionDeposit(deposit)
     raise TypeError(
         f"deposit must be one of {', '.join(map(repr, NAMED))}, a Deposit such as "
         f"InverseCost(offset=20), or a function of the costs, got {deposit!r}."
@@ -170,12 +169,12 @@ def as_deposit(deposit: str | Deposit | Function) -> Deposit:
 
 
 def deposit_from_settings(settings: Any) -> Deposit:
-    """A deposit from what a file holds of it.
+    """A deposit from the settings in a file.
 
     Raises:
-        ValueError: it is none.
+        ValueError: they are not those of a deposit.
     """
-    kinds = (InverseCost, Return, Rank, OwnDeposit)
+    kinds = (InverseCost, Return, Rank, FunctionDeposit)
     deposit = from_settings("deposit", settings, kinds)
     if not isinstance(deposit, Deposit):
         raise ValueError(f"deposit must be a Deposit, got {settings!r:.200}.")

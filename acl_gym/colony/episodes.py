@@ -1,4 +1,4 @@
-"""What ants did in a trial, step by step: what a cost of whole solutions looks at."""
+"""What ants did in a trial, step by step, for costs of complete solutions."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class Episode:
     Attributes:
         observations: from the first to the last, `(L + 1, ...)`.
         actions: indices, `(L,)`.
-        stage_costs: what the environment charged, -(reward), `(L,)`.
+        stage_costs: -(reward) of each step, `(L,)`.
         success: whether it ended in a terminal state.
     """
 
@@ -32,8 +32,7 @@ class Episode:
 class Episodes:
     """The episodes of all n ants of a trial, time first.
 
-    An ant that has finished after L steps stands still in `observations` or walks
-    as a dummy: rows beyond its length mean nothing.
+    Rows of an ant beyond its length L have no meaning.
 
     Attributes:
         observations: `(longest + 1, n, ...)`.
@@ -69,7 +68,7 @@ class Episodes:
         return np.asarray(steps < self.lengths)
 
     def variable(self, index: int, period: float | None = None) -> FloatArray:
-        """One state variable over time, `(longest + 1, n)`, its last value kept on.
+        """One state variable over time, `(longest + 1, n)`; it keeps its last value.
 
         Args:
             index: of the variable.

@@ -1,7 +1,7 @@
 """Parameters that change from trial to trial: epsilon and alpha of the colony.
 
-Exploration may be annealed "with the progress of the algorithm" (§4.2.2) or let
-vanish as the analysis asks for (§3.4.7). A schedule is a function of the trial number
+Exploration may be annealed "with the progress of the algorithm" (§4.2.2), or vanish
+as the analysis requires (§3.4.7). A schedule is a function of the trial number
 k = 0, 1, ..., so that learning in two parts is the same as learning in one.
 """
 
@@ -55,12 +55,12 @@ class Linear(Schedule):
 
 @dataclass(frozen=True)
 class Exponential(Schedule):
-    """`start` times `factor` in each trial, but not beyond `end`.
+    """`start` * `factor`^k in trial k, but not beyond `end`.
 
     Attributes:
         start: value in trial 0, > 0.
         factor: > 0; below 1 the value falls, above 1 it rises.
-        end: where it stops; None: never.
+        end: where it stops; None: nowhere.
 
     Example:
         >>> [Exponential(0.5, 0.5, end=0.2)(trial) for trial in range(3)]
@@ -92,11 +92,12 @@ class Exponential(Schedule):
 class Harmonic(Schedule):
     """`start` / (1 + k / `trials`): halved after `trials` trials, summing to infinity.
 
-    An exploration that vanishes so slowly still tries every action without end.
+    With an exploration that vanishes this slowly every action is still tried infinitely
+    often.
 
     Attributes:
         start: value in trial 0, >= 0.
-        trials: after how many it has halved, >= 1.
+        trials: after how many the value has halved, >= 1.
 
     Example:
         >>> [Harmonic(0.6, 10)(trial) for trial in (0, 10, 20)]
@@ -121,47 +122,10 @@ Setting = float | Callable[[int], float]
 _KINDS = (Linear, Exponential, Harmonic)
 
 
-class Scheduled:
-    """An attribute that is a number in a range or a schedule of such numbers.
-
-    Args:
-        bounds: the range, keywords of `validation.number`.
-    """
-
-    def __init__(self, **bounds: float) -> None:
-        self._bounds = bounds
-
-    def __set_name__(self, owner: type, name: str) -> None:
-        self._name = name
-
-    def __get__(self, instance: Any, owner: type | None = None) -> Any:
-        if instance is None:
-            return self
-        return instance.__dict__[self._name]
-
-    def __set__(self, instance: Any, value: Any) -> None:
-        if isinstance(value, type) or not callable(value):
-            value = validation.number(self._name, value, **self._bounds)
-        instance.__dict__[self._name] = value
-
-    def at(self, instance: Any, trial: int) -> float:
-        """The number in trial k.
-
-        Raises:
-            ValueError: the schedule gives one out of range.
-        """
-        setting = self.__get__(instance)
-        if not callable(setting):
-            return float(setting)
-        return validation.number(
-            f"{self._name} in trial {trial}", setting(trial), **self._bounds
-        )
-
-
 def schedule_from_settings(name: str, settings: Any) -> Any:
-    """A number or schedule from what a file holds of it.
+    """A number or schedule from the settings in a file.
 
     Raises:
-        ValueError: it is neither.
+        ValueError: they are those of neither.
     """
     return from_settings(name, settings, _KINDS)

@@ -1,4 +1,4 @@
-"""What the ants of a trial did: S_trial of Algorithm 4.2, in little memory."""
+"""The solutions of all ants in a trial, S_trial of Algorithm 4.2, kept compactly."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ ROWS_PER_BLOCK = 4_096
 """State-action pairs that `Solutions.blocks` takes at a time, about 200 kilobytes."""
 
 RUN = 5
-"""Steps of an ant that lie side by side, then come as many of the next ant: a step of all
-ants is written at once, but the deposit goes through ant by ant."""
+"""How many steps of one ant lie side by side in memory, followed by as many of the next
+ant: a step is written for all ants at once, but deposits are read ant by ant."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,7 +27,7 @@ class Block:
     """The solutions of some ants, one after the other, `r` pairs in all."""
 
     ants: slice
-    """Whose they are."""
+    """The ants they belong to."""
     index: CellArray
     """Cells of the states, `(r, k)`."""
     degree: FloatArray
@@ -40,7 +40,7 @@ class Block:
 
 @dataclass(frozen=True, slots=True)
 class _Room:
-    """Scratch for a block; `all` is 0, 1, 2, ..., as many as there are rows."""
+    """Scratch memory for a block; `all` holds 0, 1, 2, ... for all rows."""
 
     seen: NDArray[Any]
     all: IntArray
@@ -53,12 +53,12 @@ class _Room:
 class Solutions:
     """The multiset S_trial: what every ant did in one trial.
 
-    Where a state has one cell, its cell is kept, 4 bytes. Where it has more, cells
-    and degrees would take 12 bytes for each of the 2^d; the observation is kept
-    instead, and located once more when it is asked for, which gives the same bits. An
-    action takes one byte, if there are at most 256.
+    Where a state has one cell, the cell is kept, in 4 bytes. Where it has more, cells
+    and degrees would take 12 bytes for each of the 2^d cells, so the observation is kept
+    instead and located again when it is needed, with the same bits. An action takes one
+    byte if there are at most 256.
 
-    Memory is reserved for `max_steps` steps but touched only as far as ants walk.
+    Memory is reserved for `max_steps` steps, but only the steps made are touched.
 
     Args:
         n_ants: M.
@@ -75,7 +75,7 @@ class Solutions:
     ) -> None:
         self.n_ants, self.max_steps = n_ants, max_steps
         self.partition = partition
-        # Where step t of an ant lies, `_place` says.
+        # `_place` computes where step t of an ant lies.
         self._size = (max_steps + RUN - 1) // RUN * RUN * n_ants
         self._action: ActionArray = np.empty(
             self._size, dtype=np.min_scalar_type(n_actions - 1)
@@ -108,10 +108,10 @@ class Solutions:
         """Add one state-action pair to the solution of each of `ants`.
 
         Args:
-            ants: who has chosen, `(m,)`.
-            observation: what all slots saw, `(n_ants, ...)`.
-            index: the cells of what `ants` saw, `(m, k)`.
-            actions: what they chose, `(m,)`.
+            ants: the ants that have chosen, `(m,)`.
+            observation: observations of all slots, `(n_ants, ...)`.
+            index: the cells of the observations of `ants`, `(m, k)`.
+            actions: the actions they chose, `(m,)`.
         """
         seen = index
         if not self._one_cell:
@@ -125,9 +125,9 @@ class Solutions:
         _append(ants, seen, by_slot, actions, rows, self._action, self.length)
 
     def _rows_for(self, seen: NDArray[Any]) -> NDArray[Any]:
-        """Memory for what is seen, when it is not of the kind seen before.
+        """Memory for observations of another type or size than before.
 
-        Within a trial, what is there is kept, in a type that holds both.
+        Within a trial, earlier rows are kept, in a type that holds both.
 
         Raises:
             ValueError: within a trial, the number of variables changes.
@@ -151,18 +151,18 @@ class Solutions:
     ) -> BoolArray:
         """The tabu list of §3.4.2: no action twice from the same state in a trial.
 
-        Each ant's own partial solution is its list, so that none has to be kept. An
-        ant that has tried all that is allowed may choose from all of it again (a
-        decision; the thesis is silent).
+        Each ant's partial solution serves as its list. An ant that has tried all
+        allowed actions may choose from all of them again (a decision; the thesis does
+        not say).
 
         Args:
-            ants: who chooses, `(m,)`.
+            ants: the ants that choose, `(m,)`.
             index: their cells, `(m, 1)`.
             allowed: the actions they may take, `(m, n_actions)`.
 
         Returns:
-            Those of `allowed` that the ant has not taken from its cell, `(m,
-            n_actions)`.
+            The allowed actions that each ant has not yet taken in its cell,
+            `(m, n_actions)`.
         """
         left = allowed.copy()
         if self._rows is not None:
@@ -172,9 +172,9 @@ class Solutions:
         return left
 
     def blocks(self) -> Iterator[Block]:
-        """All solutions, ant by ant, in parts that stay in the processor's cache.
+        """All solutions, ant by ant, in parts that fit into the processor's cache.
 
-        The arrays of a block are valid until the next one is asked for.
+        The arrays of a block are valid until the next block is requested.
         """
         rows = self._rows
         if rows is None:
@@ -222,7 +222,7 @@ class Solutions:
 def _place(t: int, ant: int, n_ants: int) -> np.uint64:
     """Where step t of an ant lies, see `RUN`.
 
-    Unsigned, which spares the check for indices from the end.
+    Unsigned, which avoids the check for negative indices.
     """
     run, step = np.uint64(t) // np.uint64(RUN), np.uint64(t) % np.uint64(RUN)
     return (run * np.uint64(n_ants) + np.uint64(ant)) * np.uint64(RUN) + step
@@ -288,6 +288,6 @@ def _strike_tried(
                 left[j, u] = False
                 count -= 1
                 if count == 0:
-                    # Begin the list of this cell anew: what follows counts again.
+                    # Restart the list of this cell: later steps count again.
                     left[j] = allowed[j]
                     count = allowed[j].sum()

@@ -115,8 +115,10 @@ def evaluate_policy_cost(
     observation = rollout.start(
         seed=seed, states=states, record=episode_cost is not None
     )
+    memory = None
     while rollout.ants.size:
-        actions = _chosen(model, observation[rollout.ants], rollout)
+        seen = observation[rollout.ants]
+        actions, memory = _chosen(model, seen, rollout, memory)
         observation = rollout.step(actions).observation
     costs = rollout.cost
     if episode_cost is not None:
@@ -149,14 +151,19 @@ def with_slots_for(
     return env if env.num_envs == len(states) else base.with_slots(len(states))
 
 
-def _chosen(model: Predictor, observation: Any, rollout: Rollout) -> NDArray[np.int64]:
-    """Indices of the actions that `model` takes in the active slots."""
+def _chosen(
+    model: Predictor, observation: Any, rollout: Rollout, memory: Any
+) -> tuple[NDArray[np.int64], Any]:
+    """Indices of the actions that `model` takes in the active slots, and its state."""
     allowed = rollout.allowed()
-    if allowed is not None and isinstance(model, PartitionPolicy):
-        actions, _ = model.predict(observation, action_masks=allowed)
+    if isinstance(model, PartitionPolicy):
+        starts = np.full(len(observation), rollout.steps == 0)
+        actions, memory = model.predict(
+            observation, memory, starts, action_masks=allowed
+        )
     else:
         actions, _ = model.predict(observation, deterministic=True)
-    return np.asarray(actions) - rollout.first_action
+    return np.asarray(actions) - rollout.first_action, memory
 
 
 def record_trajectory(
@@ -187,8 +194,9 @@ def record_trajectory(
     )
     observation = rollout.start(states=np.asarray(state)[None])
     states, actions, costs = [base.states[0]], [], []
+    memory = None
     while rollout.ants.size:
-        action = _chosen(model, observation, rollout)
+        action, memory = _chosen(model, observation, rollout, memory)
         step = rollout.step(action)
         observation = step.observation
         states.append(base.states[0])
@@ -215,6 +223,8 @@ def actions_in(
     require_predictor(model)
     control_env(env)
     observation, _ = env.reset(options={"state": states})
+    if isinstance(model, PartitionPolicy):
+        return model.predict(observation, None, np.ones(len(observation), np.bool_))[0]
     return np.asarray(model.predict(observation, deterministic=True)[0], dtype=np.int64)
 
 

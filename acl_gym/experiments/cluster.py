@@ -6,10 +6,10 @@ import logging
 import platform
 from typing import Any
 
+from acl_gym.experiments.executors import Finished, RunFailedError, keep
 from acl_gym.experiments.methods import run as run_study
 from acl_gym.experiments.provenance import circumstances
 from acl_gym.experiments.results import Run
-from acl_gym.experiments.executors import Finished, RunFailedError, keep
 from acl_gym.experiments.store import Job, Store
 
 
@@ -38,7 +38,8 @@ def in_ray(jobs: list[Job], store: Store) -> Finished:
         ) from error
     run: Any = ray.remote(num_cpus=1, max_retries=0)(_run)
     under_way = {run.remote(job, job.key): job for job in jobs}
-    made = circumstances(int(ray.cluster_resources().get("CPU", 1)))
+    resources = ray.cluster_resources()  # type: ignore[no-untyped-call]
+    made = circumstances(int(resources.get("CPU", 1)))
     try:
         while under_way:
             done, _ = ray.wait(list(under_way), num_returns=1)

@@ -15,7 +15,7 @@ from gymnasium.wrappers.vector import TransformReward
 from acl_gym.agents.acl import ACL, PheromoneBoundWarning
 from acl_gym.agents.base import TabularAgent
 from acl_gym.agents.q_learning import QLearning
-from acl_gym.callbacks.base import Callback, Row
+from acl_gym.callbacks.base import Callback
 from acl_gym.envs.wrappers.perturbations import ReversedLuck, ReversedSlots
 from acl_gym.evaluation import Predictor, evaluate_policy_cost
 from acl_gym.experiments.episode_costs import EPISODE_COSTS
@@ -24,6 +24,7 @@ from acl_gym.experiments.study import Study
 from acl_gym.planning.q_iteration import fuzzy_q_iteration
 from acl_gym.planning.value_iteration import value_iteration
 from acl_gym.policies import TablePolicy
+from acl_gym.utils.typing import Row
 
 
 class Method(NamedTuple):
@@ -125,17 +126,11 @@ def make_agent(study: Study, seed: int) -> TabularAgent:
         env = TransformReward(env, lambda reward: np.full_like(reward, -1.0))
     if study.method == "acl" and task.cost is not None:
         settings["cost"] = EPISODE_COSTS[task.cost].cost
-    kind = ACL if study.method == "acl" else QLearning
+    kind: type[ACL | QLearning] = ACL if study.method == "acl" else QLearning
     with warnings.catch_warnings():
         # Table 4.1 has a tau_0 above 1 / J_max: the thesis wants it so.
         warnings.simplefilter("ignore", PheromoneBoundWarning)
-        if "update" in settings:  # provisional
-            from acl_gym.experiments import orders
-
-            names = {"in_turn": "one phase", "once_per_ant": "once an ant", "once_per_trial": "once a trial", "each_visit": "two phases"}
-            agent = orders.colony(names[settings.pop("update")], env, study.make_partition(), seed=seed, **settings)
-        else:
-            agent = kind(env, study.make_partition(), seed=seed, **settings)
+        agent = kind(env, study.make_partition(), seed=seed, **settings)
     if study.reversed_slots:
         agent.rng = ReversedLuck(agent.rng)  # type: ignore[assignment]
     return agent
@@ -210,7 +205,8 @@ def _restore_dqn(study: Study, run: Run) -> Predictor:
     torch.nn.utils.vector_to_parameters(weights, model.q_net.parameters())
     env = study.task.make_system_env(1)
     if isinstance(env.single_observation_space, FINITE_SPACES):
-        return model
+        found: Predictor = model
+        return found
     return ScaledPolicy(model, env.single_observation_space, env.system.circular)
 
 

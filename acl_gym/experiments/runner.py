@@ -78,7 +78,9 @@ def run_studies(
             )
         if missing:
             _compile_kernels(missing, console)
-            execute = in_ray if executor == "ray" else partial(in_processes, workers=workers)
+            execute = (
+                in_ray if executor == "ray" else partial(in_processes, workers=workers)
+            )
             _make(missing, store, execute, console, len(jobs))
             runs |= {job.name: store.read(job) for job in missing}
     found: dict[str, list[Run]] = {}

@@ -56,7 +56,7 @@ def iqm(values: ArrayLike, axis: int = -1) -> Any:
 
 def median(values: ArrayLike, axis: int = -1) -> Any:
     """The median."""
-    return np.median(values, axis=axis)
+    return np.median(np.asarray(values), axis=axis)
 
 
 def estimate(values: ArrayLike, statistic: Statistic = iqm) -> Estimate:

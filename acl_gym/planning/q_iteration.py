@@ -14,7 +14,7 @@ from gymnasium.vector import VectorEnv
 from numba import njit
 from tqdm.auto import tqdm
 
-from acl_gym.colony.selection import ALL, best_value
+from acl_gym.colony.greedy import ALL, best_value
 from acl_gym.envs.control.environments import ControlVectorEnv
 from acl_gym.partitions import Partition
 from acl_gym.policies import TablePolicy

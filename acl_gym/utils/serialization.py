@@ -1,7 +1,7 @@
-"""Objects that a file keeps by name and settings: costs, deposits and schedules.
+"""Costs, deposits, schedules and update rules as settings that a file can hold.
 
-A file runs no code when it is read, so it holds the settings of the classes of this
-package and only the names of a user's own functions.
+Reading a file runs no code. So a file holds the settings of this package's classes,
+and only the names of a user's own functions.
 """
 
 from __future__ import annotations
@@ -10,17 +10,20 @@ from collections.abc import Callable, Iterable
 from dataclasses import fields
 from typing import Any
 
+_FORMER_NAMES = {"OwnCost": "FunctionCost", "OwnDeposit": "FunctionDeposit"}
+"""What classes were called in older files."""
+
 
 class Savable:
-    """Base of frozen dataclasses that `to_settings` and `from_settings` understand."""
+    """Base of the dataclasses that `to_settings` and `from_settings` understand."""
 
 
 class Unsaved:
-    """Stands where a saved agent had a function of the user's own.
+    """Stands in for a user's own function in an agent read from a file.
 
     Args:
         parameter: what the function was for, such as "cost".
-        name: how it was called.
+        name: of the function.
     """
 
     def __init__(self, parameter: str, name: str) -> None:
@@ -28,14 +31,14 @@ class Unsaved:
         self.__qualname__ = name
 
     def __call__(self, *arguments: Any, **keywords: Any) -> Any:
-        """Say what is missing.
+        """Report which function is missing.
 
         Raises:
             ValueError: always.
         """
         raise ValueError(
             f"{self._parameter} was the function {self.__qualname__!r}, which a file "
-            f"cannot hold; set agent.{self._parameter} to it before learning on."
+            f"cannot hold; set agent.{self._parameter} to it before learning continues."
         )
 
 
@@ -79,6 +82,7 @@ def from_settings(parameter: str, value: Any, kinds: Iterable[type[Savable]]) ->
         if name != "type"
     }
     kind = value.get("type")
+    kind = _FORMER_NAMES.get(str(kind), kind)
     if kind == "function":
         return Unsaved(parameter, str(value.get("name")))
     if not isinstance(kind, str) or kind not in known:

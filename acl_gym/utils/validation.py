@@ -1,9 +1,10 @@
-"""Checks of arguments: each failure is one error with expected, actual and remedy."""
+"""Checks of arguments, whose errors state what was expected and what was given."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Collection
+from dataclasses import dataclass
 from numbers import Integral, Real
 from typing import Any
 
@@ -11,24 +12,60 @@ import numpy as np
 from numpy.typing import NDArray
 
 
+@dataclass(frozen=True)
+class Range:
+    """An interval of finite real numbers; None leaves an end open.
+
+    Attributes:
+        above: exclusive lower bound.
+        at_least: inclusive lower bound.
+        at_most: inclusive upper bound.
+        below: exclusive upper bound.
+    """
+
+    above: float | None = None
+    at_least: float | None = None
+    at_most: float | None = None
+    below: float | None = None
+
+    def __contains__(self, value: float) -> bool:
+        return (
+            math.isfinite(value)
+            and (self.above is None or value > self.above)
+            and (self.at_least is None or value >= self.at_least)
+            and (self.at_most is None or value <= self.at_most)
+            and (self.below is None or value < self.below)
+        )
+
+    def __str__(self) -> str:
+        left = f"({self.above:g}" if self.above is not None else "(-inf"
+        if self.at_least is not None:
+            left = f"[{self.at_least:g}"
+        right = f"{self.below:g})" if self.below is not None else "inf)"
+        if self.at_most is not None:
+            right = f"{self.at_most:g}]"
+        return f"{left}, {right}"
+
+    def in_words(self) -> str:
+        """As docstrings say it: "in [0, 1)", "> 0", ">= 0"."""
+        if self.at_most is None and self.below is None:
+            if self.at_least is not None:
+                return f">= {self.at_least:g}"
+            if self.above is not None:
+                return f"> {self.above:g}"
+        return f"in {self}"
+
+
 def number(
-    name: str,
-    value: Any,
-    *,
-    above: float | None = None,
-    at_least: float | None = None,
-    at_most: float | None = None,
-    below: float | None = None,
+    name: str, value: Any, within: Range | None = None, **bounds: float | None
 ) -> float:
     """Return `value` as a finite float inside the given range.
 
     Args:
         name: what the number is called in the error message.
         value: the candidate.
-        above: exclusive lower bound.
-        at_least: inclusive lower bound.
-        at_most: inclusive upper bound.
-        below: exclusive upper bound.
+        within: the range; None takes it from `bounds`.
+        **bounds: attributes of `Range`.
 
     Raises:
         TypeError: `value` is not a real number.
@@ -43,44 +80,10 @@ def number(
         result = float(value)
     except OverflowError:  # an int beyond all floats
         result = math.inf
-    inside = (
-        math.isfinite(result)
-        and (above is None or result > above)
-        and (at_least is None or result >= at_least)
-        and (at_most is None or result <= at_most)
-        and (below is None or result < below)
-    )
-    if not inside:
-        left = f"({above:g}" if above is not None else "(-inf"
-        if at_least is not None:
-            left = f"[{at_least:g}"
-        right = f"{below:g})" if below is not None else "inf)"
-        if at_most is not None:
-            right = f"{at_most:g}]"
-        raise ValueError(f"{name} must lie in {left}, {right}, got {value!r}.")
+    interval = Range(**bounds) if within is None else within
+    if result not in interval:
+        raise ValueError(f"{name} must lie in {interval}, got {value!r}.")
     return result
-
-
-class Number:
-    """An attribute that is a number in a range, checked whenever it is set.
-
-    Args:
-        bounds: the range, keywords of `number`.
-    """
-
-    def __init__(self, **bounds: float) -> None:
-        self._bounds = bounds
-
-    def __set_name__(self, owner: type, name: str) -> None:
-        self._name = name
-
-    def __get__(self, instance: Any, owner: type | None = None) -> float:
-        if instance is None:
-            raise AttributeError(f"{self._name} is set on instances only.")
-        return float(instance.__dict__[self._name])
-
-    def __set__(self, instance: Any, value: Any) -> None:
-        instance.__dict__[self._name] = number(self._name, value, **self._bounds)
 
 
 def integer(name: str, value: Any, *, at_least: int) -> int:
@@ -104,7 +107,7 @@ def real_array(
 ) -> NDArray[np.float64]:
     """Return `values` as a new float64 array that is not empty.
 
-    Strings, complex numbers and ragged lists are refused, not converted.
+    Strings, complex numbers and ragged lists are rejected, not converted.
 
     Args:
         name: what the array is called in the error message.

@@ -197,7 +197,7 @@ def test_with_a_tabu_list_no_pair_is_chosen_twice_before_all_were() -> None:
 
 
 def test_a_tabu_list_needs_one_cell_a_state() -> None:
-    with pytest.raises(ValueError, match=r"tabu needs .* one cell a state"):
+    with pytest.raises(ValueError, match=r"tabu needs .* one cell per state"):
         ACL(chains(2), Fuzzy([np.arange(6.0)]), tabu=True)
 
 

@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 
 from acl_gym import Crisp, Fuzzy, QLearning
 from acl_gym.agents import q_learning
-from acl_gym.colony import selection
-from acl_gym.colony.selection import ALL
+from acl_gym.colony import greedy
+from acl_gym.colony.greedy import ALL
 from acl_gym.planning.value_iteration import value_iteration
 from tests.agents import reference_colony as reference
 from tests.agents.reference_colony import chains
@@ -136,12 +136,12 @@ def follow(
 @given(walks())
 @settings(max_examples=60)
 def test_updates_are_those_of_full_tables(case: dict[str, Any]) -> None:
-    update, greedy = q_learning._update_traced, selection.mark_greedy
+    update, mark = q_learning._update_traced, greedy.mark_greedy
     state = case["rng"].bit_generator.state
-    values, expected = follow(update, greedy, case)
+    values, expected = follow(update, mark, case)
     np.testing.assert_allclose(values, expected, rtol=1e-9, atol=1e-9)
     case["rng"].bit_generator.state = state
-    plain, _ = follow(update.py_func, greedy.py_func, case)
+    plain, _ = follow(update.py_func, mark.py_func, case)
     np.testing.assert_allclose(values, plain, rtol=1e-12, atol=1e-12)
 
 

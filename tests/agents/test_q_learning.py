@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from acl_gym import Crisp, Fuzzy, QLearning
 from acl_gym.agents import q_learning
-from acl_gym.colony.selection import ALL
+from acl_gym.colony.greedy import ALL
 from tests.agents import reference_colony as reference
 from tests.agents.reference_colony import Chain, chains
 from tests.colony.test_pheromone import degrees

@@ -25,7 +25,12 @@ def test_a_figure_and_its_report(tmp_path: Path) -> None:
     assert parts["C5"]
     assert not parts["C13"]
     folder = tmp_path / "r"
-    for name in ("report.html", "results.json", "results.parquet", "figures/fig3.9.png"):
+    for name in (
+        "report.html",
+        "results.json",
+        "results.parquet",
+        "figures/fig3.9.png",
+    ):
         assert (folder / name).is_file()
     files = sorted((folder / "runs").glob("*.parquet"))
     assert len(files) == 6

@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from acl_gym.colony.deposits import (
+    FunctionDeposit,
     InverseCost,
-    OwnDeposit,
     Rank,
     Return,
     as_deposit,
@@ -86,7 +86,7 @@ def test_a_function_of_the_costs_is_a_deposit() -> None:
 )
 def test_a_function_that_gives_no_deposits_is_refused(result: object) -> None:
     with pytest.raises(ValueError, match="a finite number > 0 for each of the 2 ants"):
-        OwnDeposit(lambda _: result)(np.array([1.0, 2.0]), 1e-4)  # type: ignore[arg-type,return-value]
+        FunctionDeposit(lambda _: result)(np.array([1.0, 2.0]), 1e-4)  # type: ignore[arg-type,return-value]
 
 
 def test_other_things_are_no_deposits() -> None:

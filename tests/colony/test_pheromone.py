@@ -12,9 +12,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from acl_gym.colony import pheromone as module
+from acl_gym.colony import update_kernels
 from acl_gym.colony.pheromone import Pheromone
 from acl_gym.colony.solutions import Solutions, _strike_tried
+from acl_gym.colony.update_rules import EachVisit, Reinforcement
 from acl_gym.partitions.kernels import written_out
 from tests.agents import reference_colony as reference
 from tests.colony.listed import recorded
@@ -66,13 +67,17 @@ class Trial:
     def deposit(self, order: Array | None = None) -> None:
         order = np.arange(len(self.length)) if order is None else order
         deposits = 1.0 / self.costs[order]
-        self.pheromone.global_update(self.packed(order), deposits, self.rho)
+        reinforce(self.pheromone, self.packed(order), deposits, self.rho)
 
     def decay(self, t: int, order: Array | None = None) -> None:
         order = np.arange(len(self.length)) if order is None else order
         rows = order[self.length[order] > t]
-        self.pheromone.local_update(
-            self.index[rows, t], self.degree[rows, t], self.action[rows, t], self.gamma
+        EachVisit().local_update(
+            self.pheromone,
+            self.index[rows, t],
+            self.degree[rows, t],
+            self.action[rows, t],
+            self.gamma,
         )
 
 
@@ -81,6 +86,12 @@ def degrees(rng: np.random.Generator, *shape: int) -> Array:
     weights = rng.exponential(size=shape) * (rng.random(shape) < 0.7)
     weights[..., 0] += weights.sum(axis=-1) == 0
     return weights / weights.sum(axis=-1, keepdims=True)
+
+
+def reinforce(
+    pheromone: Pheromone, solutions: Solutions, deposits: Array, rho: float
+) -> None:
+    Reinforcement(pheromone.levels.size)(pheromone, solutions, deposits, rho)
 
 
 @st.composite
@@ -222,7 +233,7 @@ def test_levels_fall_below_a_tau0_that_exceeds_every_deposit() -> None:
     pheromone = Pheromone(1, 1, tau0=2 / 10.0, alpha=1.0)
     one = np.zeros((1, 1, 1), dtype=np.int32)
     solutions = recorded(one, np.ones((1, 1, 1)), np.array([[0]]))
-    pheromone.global_update(solutions, np.array([0.1]), 0.5)
+    reinforce(pheromone, solutions, np.array([0.1]), 0.5)
     assert pheromone.levels[0, 0] == pytest.approx(0.5 * 2 / 10 + 0.5 / 10)
     assert pheromone.levels[0, 0] < pheromone.tau0
 
@@ -231,7 +242,9 @@ def test_a_level_at_tau0_stays_exactly_there() -> None:
     pheromone = Pheromone(2, 2, tau0=0.1, alpha=3.0)
     index = np.array([[0, 1]], dtype=np.int32)
     for _ in range(1000):
-        pheromone.local_update(index, np.array([[0.3, 0.7]]), np.array([1]), 0.013)
+        EachVisit().local_update(
+            pheromone, index, np.array([[0.3, 0.7]]), np.array([1]), 0.013
+        )
     assert (pheromone.levels == 0.1).all()
 
 
@@ -241,7 +254,7 @@ def test_a_pair_counts_once_with_its_largest_degree() -> None:
     index = np.array([[[0, 1]] * 3])
     degree = np.array([[[d, 1 - d] for d in (0.2, 0.9, 0.5)]])
     solutions = recorded(index, degree, np.ones((1, 3), dtype=np.int64))
-    pheromone.global_update(solutions, np.array([0.25]), 0.1)
+    reinforce(pheromone, solutions, np.array([0.25]), 0.1)
     expected = np.ones((2, 2))
     expected[:, 1] = [(1 - 0.1 * d) + 0.1 * d / 4 for d in (0.9, 0.8)]
     np.testing.assert_allclose(pheromone.levels, expected, rtol=1e-15)
@@ -253,7 +266,7 @@ def test_the_decay_of_a_deposit_weighs_with_the_largest_degree_of_all_ants() -> 
     index = np.array([[[0, 1]], [[1, 0]]])
     degree = np.array([[[0.25, 0.75]], [[0.5, 0.5]]])
     solutions = recorded(index, degree, np.zeros((2, 1), dtype=np.int64))
-    pheromone.global_update(solutions, np.array([0.5, 0.2]), 0.2)
+    reinforce(pheromone, solutions, np.array([0.5, 0.2]), 0.2)
     expected = [
         (1 - 0.2 * 0.5) + 0.2 * (0.25 / 2 + 0.5 / 5),
         (1 - 0.2 * 0.75) + 0.2 * (0.75 / 2 + 0.5 / 5),
@@ -270,11 +283,11 @@ def test_scratch_and_solutions_leave_nothing_behind(trial: Trial) -> None:
     results = []
     for _ in range(2):
         trial.pheromone.set_levels(start)
-        trial.pheromone.global_update(solutions, 1.0 / trial.costs, trial.rho)
+        reinforce(trial.pheromone, solutions, 1.0 / trial.costs, trial.rho)
         results.append(trial.tau.copy())
     np.testing.assert_array_equal(results[0], results[1])
     solutions.clear()
-    trial.pheromone.global_update(solutions, 1.0 / trial.costs, 1.0)
+    reinforce(trial.pheromone, solutions, 1.0 / trial.costs, 1.0)
     np.testing.assert_array_equal(trial.tau, results[1])
 
 
@@ -284,7 +297,7 @@ def test_a_deposit_that_is_none_is_refused(deposit: float) -> None:
     ones = np.ones((3, 1, 1))
     solutions = recorded(0 * ones, ones, np.zeros((3, 1), dtype=np.int64))
     with pytest.raises(ValueError, match=r"> 0 and their sum finite.*ant 1") as error:
-        pheromone.global_update(solutions, np.array([1.0, deposit, 2.0]), 0.1)
+        reinforce(pheromone, solutions, np.array([1.0, deposit, 2.0]), 0.1)
     assert f"got {deposit} " in str(error.value)
     assert (pheromone.levels == 0.5).all()
 
@@ -337,8 +350,8 @@ def test_kernels_agree_with_themselves_as_plain_python(trial: Trial) -> None:
     stale, stale_again = np.zeros((2, len(levels)), dtype=bool)
     corners = written_out(index.shape[1])
     rows = index, degree, corners, action, trial.gamma, trial.pheromone.tau0
-    module._decay(*rows, levels, stale)
-    module._decay.py_func(*rows, again, stale_again)
+    update_kernels.decay(*rows, levels, stale)
+    update_kernels.decay.py_func(*rows, again, stale_again)
     np.testing.assert_allclose(levels, again, rtol=1e-15)
     np.testing.assert_array_equal(stale, stale_again)
 
@@ -351,7 +364,7 @@ def test_kernels_agree_with_themselves_as_plain_python(trial: Trial) -> None:
         laid = np.zeros((table.size, 4))
         touched = np.empty(table.size + 1, dtype=np.int64)
         n_touched.append(
-            getattr(module._lay, name)(
+            getattr(update_kernels.lay, name)(
                 block.index,
                 block.degree,
                 corners,
@@ -365,8 +378,8 @@ def test_kernels_agree_with_themselves_as_plain_python(trial: Trial) -> None:
                 table.shape[1],
             )
         )
-        reinforce = getattr(module._reinforce, name)
-        reinforce(touched[: n_touched[-1]], laid, trial.rho, table, flags)
+        kernel = getattr(update_kernels.reinforce, name)
+        kernel(touched[: n_touched[-1]], laid, trial.rho, table, flags)
         assert not laid[:, 1:].any()
     assert n_touched[0] == n_touched[1]
     np.testing.assert_allclose(levels, again, rtol=1e-14)
@@ -378,13 +391,17 @@ def test_every_changed_cell_becomes_stale_and_no_other() -> None:
     assert pheromone.stale.all()
     pheromone.stale[:] = False
     index = np.array([[1, 3]], dtype=np.int32)
-    pheromone.local_update(index, np.array([[1.0, 0.0]]), np.array([0]), 0.0)
+    EachVisit().local_update(
+        pheromone, index, np.array([[1.0, 0.0]]), np.array([0]), 0.0
+    )
     assert not pheromone.stale.any()
-    pheromone.local_update(index, np.array([[1.0, 0.0]]), np.array([0]), 0.1)
+    EachVisit().local_update(
+        pheromone, index, np.array([[1.0, 0.0]]), np.array([0]), 0.1
+    )
     assert pheromone.stale.tolist() == [False, True, False, False]
     pheromone.stale[:] = False
     solutions = recorded(index[None], np.array([[[0.0, 1.0]]]), np.array([[1]]))
-    pheromone.global_update(solutions, np.array([1.0]), 0.5)
+    reinforce(pheromone, solutions, np.array([1.0]), 0.5)
     assert pheromone.stale.tolist() == [False, False, False, True]
     pheromone.stale[:] = False
     pheromone.alpha = 2.0
@@ -401,7 +418,7 @@ def test_deposits_whose_sum_overflows_are_refused() -> None:
     ones = np.ones((50, 1, 1))
     solutions = recorded(0 * ones, ones, np.zeros((50, 1), dtype=np.int64))
     with pytest.raises(ValueError, match="their sum finite"):
-        pheromone.global_update(solutions, np.full(50, 1e307), 0.5)
+        reinforce(pheromone, solutions, np.full(50, 1e307), 0.5)
     assert (pheromone.levels == 1.0).all()
 
 
@@ -422,13 +439,14 @@ def test_an_update_that_was_interrupted_leaves_no_trace(
 
     clean, struck = trial.pheromone.levels.copy(), trial.pheromone
     deposits = 1.0 / trial.costs
+    reinforcement = Reinforcement(clean.size)
     solutions.blocks = cut_short  # type: ignore[method-assign]
     with pytest.raises(Cut):
-        struck.global_update(solutions, deposits, trial.rho)
+        reinforcement(struck, solutions, deposits, trial.rho)
     np.testing.assert_array_equal(struck.levels, clean)
     solutions.blocks = whole  # type: ignore[method-assign]
-    struck.global_update(solutions, deposits, trial.rho)
+    reinforcement(struck, solutions, deposits, trial.rho)
     fresh = Pheromone(*clean.shape, struck.tau0, struck.alpha)
     fresh.set_levels(clean)
-    fresh.global_update(trial.packed(), deposits, trial.rho)
+    reinforce(fresh, trial.packed(), deposits, trial.rho)
     np.testing.assert_array_equal(struck.levels, fresh.levels)

@@ -11,14 +11,14 @@ from acl_gym.colony.schedules import (
     Harmonic,
     Linear,
     Schedule,
-    Scheduled,
     schedule_from_settings,
 )
+from acl_gym.utils.parameters import Parameter
 from acl_gym.utils.serialization import Unsaved, to_settings
 
 
 class Holder:
-    rate = Scheduled(at_least=0, at_most=1)
+    rate = Parameter("A rate", scheduled=True, at_least=0, at_most=1)
 
 
 @given(st.floats(0, 1), st.floats(0, 1), st.integers(1, 50))

@@ -9,10 +9,12 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from acl_gym import policies
+from acl_gym.colony import greedy, selection
 from acl_gym.colony import pheromone as pheromone_module
-from acl_gym.colony import selection
+from acl_gym.colony.greedy import greedy_actions
 from acl_gym.colony.pheromone import Pheromone
-from acl_gym.colony.selection import RULES, choose_actions, greedy_actions
+from acl_gym.colony.selection import RULES, choose_actions
+from acl_gym.colony.update_rules import EachVisit, Reinforcement
 from acl_gym.partitions.kernels import written_out
 from tests.agents import reference_colony as reference
 from tests.colony.listed import recorded
@@ -142,18 +144,19 @@ def test_the_ends_of_the_unit_interval_choose_the_first_and_last(
         selection._boltzmann(
             levels,
             3.0,
+            None,
             np.full(levels.shape, 1 / n_actions),
             index,
             degree,
             draws,
             0.5,
-            selection.ALL,
+            greedy.ALL,
             written_out(n_actions),
             written_out(1),
             actions[0],
         )
-        selection._epsilon_greedy(
-            levels, index, degree, draws, 0.5, selection.ALL, actions[1]
+        greedy._epsilon_greedy(
+            levels, None, index, degree, draws, 0.5, greedy.ALL, actions[1]
         )
         assert actions.tolist() == [[end], [end]]
 
@@ -178,7 +181,9 @@ def test_remembered_probabilities_are_never_out_of_date(
         some = slice(int(rng.integers(ants)), None)
         actions = rng.integers(n_actions, size=ants)
         if operation == "local":
-            pheromone.local_update(index[some], degree[some], actions[some], 0.3)
+            EachVisit().local_update(
+                pheromone, index[some], degree[some], actions[some], 0.3
+            )
         elif operation == "global":
             solutions = recorded(
                 index[:, None],
@@ -186,7 +191,8 @@ def test_remembered_probabilities_are_never_out_of_date(
                 actions[:, None],
                 (np.arange(ants) >= some.start).astype(np.int64),
             )
-            pheromone.global_update(solutions, rng.uniform(1, 9, size=ants), 0.4)
+            deposits = rng.uniform(1, 9, size=ants)
+            Reinforcement(pheromone.levels.size)(pheromone, solutions, deposits, 0.4)
         elif operation == "alpha":
             pheromone.alpha = float(rng.choice(ALPHAS))
         elif operation == "levels":
@@ -316,7 +322,7 @@ def test_kernels_agree_with_themselves_as_plain_python(
     ants, (n_cells, n_actions) = len(index), levels.shape
     draws = rng.random((2, ants))
     ranks = policies.random_ranks(n_cells, n_actions, rng)
-    allowed = selection.ALL
+    allowed = greedy.ALL
     if restricted:
         allowed = rng.random((ants, n_actions)) < 0.7
         allowed[:, 0] = True
@@ -328,11 +334,12 @@ def test_kernels_agree_with_themselves_as_plain_python(
         states = index, degree
         columns, corners = written_out(n_actions), written_out(index.shape[1])
         version(pheromone_module._repair)(
-            levels, alpha, index, columns, corners, probabilities, stale
+            levels, alpha, None, index, columns, corners, probabilities, stale
         )
         version(selection._boltzmann)(
             levels,
             alpha,
+            None,
             probabilities,
             *states,
             draws,
@@ -342,10 +349,10 @@ def test_kernels_agree_with_themselves_as_plain_python(
             corners,
             actions[0],
         )
-        version(selection._epsilon_greedy)(
-            levels, *states, draws, 0.2, allowed, actions[1]
+        version(greedy._epsilon_greedy)(
+            levels, None, *states, draws, 0.2, allowed, actions[1]
         )
-        version(selection._greedy)(levels, ranks, *states, allowed, actions[2])
+        version(greedy._greedy)(levels, ranks, *states, allowed, actions[2])
         results.append((probabilities[~stale], actions))
     for compiled, plain in zip(*results, strict=True):
         np.testing.assert_allclose(compiled, plain, rtol=1e-13, atol=1e-300)

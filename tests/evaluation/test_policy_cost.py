@@ -14,7 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from acl_gym import ACL, Crisp, Fuzzy, QLearning, evaluate_policy_cost
-from acl_gym.agents.acl import _mean_sensitivity
+from acl_gym.colony.pheromone import mean_sensitivity
 from acl_gym.evaluation import PolicyCost, actions_in, record_trajectory
 from tests.agents import reference_colony as reference
 from tests.agents.reference_colony import Chain, chains
@@ -263,8 +263,8 @@ def test_sensitivity_is_that_of_the_equation(
     tau[rng.random(n_cells) < 0.3] = 0.5  # ties: sensitivity 1
     policy = tau.argmax(axis=1)
     expected = reference.sensitivity(tau, alpha)
-    assert _mean_sensitivity(tau, policy, alpha) == pytest.approx(expected, rel=1e-12)
-    assert _mean_sensitivity.py_func(tau, policy, alpha) == pytest.approx(expected)
+    assert mean_sensitivity(tau, policy, alpha) == pytest.approx(expected, rel=1e-12)
+    assert mean_sensitivity.py_func(tau, policy, alpha) == pytest.approx(expected)
     assert 0.0 <= expected <= 1.0
 
 

@@ -35,10 +35,7 @@ DOES_NOT = {
 
 def names(files: dict[str, Path]) -> set[str]:
     return {
-        path.relative_to(ROOT)
-        .with_suffix("")
-        .as_posix()
-        .removesuffix("/__init__")
+        path.relative_to(ROOT).with_suffix("").as_posix().removesuffix("/__init__")
         for path in files.values()
     }
 
@@ -47,7 +44,9 @@ def test_what_matters_and_what_does_not() -> None:
     files = names(sources_of(RUNS))
     assert files >= MATTERS
     assert files.isdisjoint(DOES_NOT)
-    everything = {p.relative_to(ROOT).with_suffix("").as_posix() for p in ROOT.rglob("*.py")}
+    everything = {
+        p.relative_to(ROOT).with_suffix("").as_posix() for p in ROOT.rglob("*.py")
+    }
     assert everything >= DOES_NOT, "a name is out of date"
 
 

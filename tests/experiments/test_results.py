@@ -112,9 +112,7 @@ def test_a_network_is_made_again(system: Study) -> None:
     from acl_gym.evaluation import evaluate_policy_cost
 
     env = study.task.make_system_env(1)
-    again = evaluate_policy_cost(
-        policy, env, max_steps=None, seed=0
-    )
+    again = evaluate_policy_cost(policy, env, max_steps=None, seed=0)
     assert again.cost == pytest.approx(run.rows["policy_cost"].iloc[-1])
 
 

@@ -1,0 +1,262 @@
+"""The best action of a table, and epsilon-greedy selection on it.
+
+For tables of any kind: levels of pheromone, action values, costs to go.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from acl_gym.utils.typing import BoolArray, CellArray, FloatArray, IntArray, RankArray
+
+ALL: BoolArray = np.empty((0, 0), dtype=np.bool_)
+"""What kernels take as `allowed` where every action is allowed."""
+
+
+def epsilon_greedy_actions(
+    table: FloatArray,
+    index: CellArray,
+    degree: FloatArray,
+    epsilon: float,
+    rng: np.random.Generator,
+    allowed: BoolArray | None = None,
+    heuristic: FloatArray | None = None,
+) -> IntArray:
+    """Rule (3.5) on any table of values, each times `heuristic`; see `choose_actions`."""
+    draws = rng.random((2, index.shape[0]))
+    actions = np.empty(index.shape[0], dtype=np.int64)
+    any_action = ALL if allowed is None else allowed
+    _epsilon_greedy(
+        table, heuristic, index, degree, draws, epsilon, any_action, actions
+    )
+    return actions
+
+
+def greedy_actions(
+    table: FloatArray,
+    ranks: RankArray,
+    index: CellArray,
+    degree: FloatArray,
+    allowed: BoolArray | None = None,
+) -> IntArray:
+    """The policy (4.16): the action with the largest degree-weighted value.
+
+    Args:
+        table: `(n_cells, n_actions)`, pheromone levels or action values.
+        ranks: `(n_cells, n_actions)`, an order of the actions for each cell. Of
+            tied actions the one with the lowest rank in the state's cell of largest
+            degree is taken.
+        index: `(n, k)`.
+        degree: `(n, k)`.
+        allowed: the actions to choose from, `(n, n_actions)`, at least one per state;
+            None: all.
+
+    Returns:
+        Indices of actions, `(n,)`.
+    """
+    actions = np.empty(index.shape[0], dtype=np.int64)
+    _greedy(table, ranks, index, degree, ALL if allowed is None else allowed, actions)
+    return actions
+
+
+@njit(cache=True, inline="always")
+def best_value(
+    table: FloatArray, index: CellArray, degree: FloatArray, j: int, allowed: BoolArray
+) -> float:
+    """The largest degree-weighted value that state j offers, over U_q.
+
+    For kernels: the inner part of (3.40), (3.44) and (4.16).
+
+    Args:
+        table: `(n_cells, n_actions)`.
+        index: `(n, k)`.
+        degree: `(n, k)`.
+        j: which of the n states.
+        allowed: U_q, `(n, n_actions)`; an empty array if every action is allowed.
+    """
+    best = -np.inf
+    for u in range(table.shape[1]):
+        if allowed.size > 0 and not allowed[j, u]:
+            continue
+        value = 0.0
+        for c in range(index.shape[1]):
+            value += degree[j, c] * table[index[j, c], u]
+        best = max(best, value)
+    return best
+
+
+@njit(cache=True)
+def mark_greedy(
+    table: FloatArray,
+    index: CellArray,
+    degree: FloatArray,
+    actions: IntArray,
+    allowed: BoolArray,
+    greedy: BoolArray,
+) -> None:
+    """Write to `greedy`, `(m,)`, whether each action is a best one, ties included.
+
+    Exact if the actions were chosen on this `table`: the sums are those of selection.
+    """
+    for j in range(actions.size):
+        value = _value(table, index[j], degree[j], actions[j])
+        greedy[j] = value >= best_value(table, index, degree, j, allowed)
+
+
+@njit(cache=True, inline="always")
+def _value(table: FloatArray, cells: CellArray, degrees: FloatArray, u: int) -> float:
+    """The sum over a state's cells of degree times table entry."""
+    total = 0.0
+    for c in range(cells.size):
+        total += degrees[c] * table[cells[c], u]
+    return total
+
+
+@njit(cache=True, inline="always")
+def _weighed(
+    table: FloatArray,
+    heuristic: FloatArray,
+    cells: CellArray,
+    degrees: FloatArray,
+    u: int,
+) -> float:
+    """The sum over a state's cells of degree times table entry times heuristic."""
+    total = 0.0
+    for c in range(cells.size):
+        total += degrees[c] * table[cells[c], u] * heuristic[cells[c], u]
+    return total
+
+
+@njit(cache=True)
+def _values(
+    table: FloatArray,
+    heuristic: FloatArray | None,
+    cells: CellArray,
+    degrees: FloatArray,
+    allowed: BoolArray,
+    j: int,
+    values: FloatArray,
+) -> float:
+    """Write the value of each action of ant j, -inf where it is not allowed.
+
+    Returns:
+        The largest value; -inf where no value is a number.
+    """
+    best = -np.inf
+    for u in range(values.size):
+        values[u] = -np.inf
+        if allowed.size == 0 or allowed[j, u]:
+            if heuristic is None:
+                values[u] = _value(table, cells, degrees, u)
+            else:
+                values[u] = _weighed(table, heuristic, cells, degrees, u)
+        if values[u] > best:
+            best = values[u]
+    return best
+
+
+@njit(cache=True)
+def best_action(
+    table: FloatArray,
+    heuristic: FloatArray | None,
+    index: CellArray,
+    degree: FloatArray,
+    choice: float,
+    allowed: BoolArray,
+    j: int,
+) -> int:
+    """The action of ant j with the largest value, for kernels.
+
+    Args:
+        table: `(n_cells, n_actions)`.
+        heuristic: what the table is multiplied by, `(n_cells, n_actions)`; None: 1.
+            Where it is 0 for all that is allowed, it is left out.
+        index: `(m, k)`.
+        degree: `(m, k)`.
+        choice: in [0, 1), draws one of the actions that tie.
+        allowed: U_q, `(m, n_actions)`; an empty array where every action is allowed.
+        j: which of the m ants.
+    """
+    values = np.empty(table.shape[1])
+    cells, degrees = index[j], degree[j]
+    best = _values(table, heuristic, cells, degrees, allowed, j, values)
+    if heuristic is not None and best == 0.0:
+        best = _values(table, None, cells, degrees, allowed, j, values)
+    if best == -np.inf:
+        return any_action(choice, j, values.size, allowed)
+    tied = 0
+    for u in range(values.size):
+        tied += values[u] == best
+    skip = int(choice * tied)
+    for u in range(values.size):
+        if values[u] == best:
+            if skip == 0:
+                return u
+            skip -= 1
+    return 0
+
+
+@njit(cache=True)
+def any_action(choice: float, j: int, n_actions: int, allowed: BoolArray) -> int:
+    """One of the actions that ant j may take, all equally likely; choice in [0, 1)."""
+    if allowed.size == 0:
+        return int(choice * n_actions)
+    count = 0
+    for u in range(n_actions):
+        count += allowed[j, u]
+    skip = int(choice * count)
+    for u in range(n_actions):
+        if allowed[j, u]:
+            if skip == 0:
+                return u
+            skip -= 1
+    return 0
+
+
+@njit(cache=True)
+def _epsilon_greedy(
+    levels: FloatArray,
+    heuristic: FloatArray | None,
+    index: CellArray,
+    degree: FloatArray,
+    draws: FloatArray,
+    epsilon: float,
+    allowed: BoolArray,
+    actions: IntArray,
+) -> None:
+    for j in range(actions.size):
+        if draws[0, j] < epsilon:
+            actions[j] = any_action(draws[1, j], j, levels.shape[1], allowed)
+        else:
+            actions[j] = best_action(
+                levels, heuristic, index, degree, draws[1, j], allowed, j
+            )
+
+
+@njit(cache=True)
+def _greedy(
+    table: FloatArray,
+    ranks: RankArray,
+    index: CellArray,
+    degree: FloatArray,
+    allowed: BoolArray,
+    actions: IntArray,
+) -> None:
+    for j in range(actions.size):
+        foremost = 0
+        for c in range(1, index.shape[1]):
+            if degree[j, c] > degree[j, foremost]:
+                foremost = c
+        rank = ranks[index[j, foremost]]
+        best = -np.inf
+        action = -1
+        for u in range(table.shape[1]):
+            if allowed.size > 0 and not allowed[j, u]:
+                continue
+            value = _value(table, index[j], degree[j], u)
+            tied = value == best and action >= 0 and rank[u] < rank[action]
+            if action < 0 or value > best or tied:
+                best = value
+                action = u
+        actions[j] = action

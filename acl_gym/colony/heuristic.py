@@ -1,0 +1,51 @@
+"""What ants know of an action before anybody has tried it: the heuristic eta."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from acl_gym.partitions import Partition
+from acl_gym.utils.typing import FloatArray
+
+Heuristic = ArrayLike | Callable[[Any, Partition], ArrayLike]
+"""eta as an array `(n_cells, n_actions)`, or a function of environment and partition."""
+
+
+def as_heuristic(
+    heuristic: Heuristic | None, env: Any, partition: Partition, shape: tuple[int, int]
+) -> FloatArray | None:
+    """A heuristic as an array of its own, which cannot be written to.
+
+    Args:
+        heuristic: an array, a function that returns one, or None.
+        env: first argument of the function.
+        partition: second argument of the function.
+        shape: `(n_cells, n_actions)`.
+
+    Raises:
+        ValueError: it is not an array of that shape, finite, >= 0 and positive
+            somewhere in each row.
+    """
+    if heuristic is None:
+        return None
+    found = heuristic(env, partition) if callable(heuristic) else heuristic
+    eta = np.array(found, dtype=np.float64)
+    if eta.shape != shape:
+        raise ValueError(
+            f"heuristic must have shape {shape}, a row per cell and a column per "
+            f"action, got {eta.shape}."
+        )
+    valid = np.isfinite(eta).all(axis=1) & (eta >= 0.0).all(axis=1)
+    valid &= (eta > 0.0).any(axis=1)
+    if not valid.all():
+        cell = int(np.argmin(valid))
+        raise ValueError(
+            "heuristic must be finite, >= 0 and positive for at least one action of "
+            f"each cell, got {eta[cell].tolist()!r:.200} in cell {cell}."
+        )
+    eta.flags.writeable = False
+    return eta

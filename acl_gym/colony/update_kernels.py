@@ -1,0 +1,228 @@
+"""Kernels of the update rules: how pheromone decays, and how it is deposited."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from acl_gym.colony.selection import choose_alone
+from acl_gym.utils.typing import ActionArray, BoolArray, CellArray, FloatArray, IntArray
+
+
+@njit(cache=True, inline="always")
+def _decayed(level: float, decay: float, tau0: float) -> float:
+    """(4.17): written around tau0, so that a level at tau0 stays there exactly."""
+    excess = level - tau0
+    return tau0 + (1.0 - decay) * excess
+
+
+@njit(cache=True)
+def decay(
+    index: CellArray,
+    degree: FloatArray,
+    corners: tuple[int, ...],
+    actions: IntArray,
+    local_decay: float,
+    tau0: float,
+    levels: FloatArray,
+    stale: BoolArray,
+) -> None:
+    """Local update (4.12): every ant's pair decays with (1 - gamma beta)."""
+    for j in range(actions.size):
+        action = np.uint64(actions[j])
+        for c in range(len(corners) or index.shape[1]):
+            if degree[j, c] > 0.0:
+                cell = np.uint64(index[j, c])
+                levels[cell, action] = _decayed(
+                    levels[cell, action], local_decay * degree[j, c], tau0
+                )
+                stale[cell] = True
+
+
+# Columns of what ants have laid on a pair, side by side because they are used together.
+_LAST, _DUE, _TOTAL, _LARGEST = range(4)
+
+
+@njit(cache=True)
+def lay(
+    index: CellArray,
+    degree: FloatArray,
+    corners: tuple[int, ...],
+    action: ActionArray,
+    ends: IntArray,
+    first: int,
+    deposits: FloatArray,
+    laid: FloatArray,
+    touched: IntArray,
+    n_touched: int,
+    n_actions: int,
+) -> int:
+    """Sum up what some ants lay on the pairs that they visited, (4.14) and (4.15).
+
+    Within a solution a pair counts with its largest degree (4.13). So what an ant lays
+    on it stays due, and may grow, until another ant visits the pair; then it is added
+    to the total. That takes one look at each visit and no list of the pairs of one
+    ant. Written without a branch, which the processor could not predict.
+
+    Args:
+        index: cells, the rows of one ant after those of the one before, `(r, k)`.
+        degree: degrees, `(r, k)`.
+        corners: k, written out.
+        action: actions, `(r,)`.
+        ends: where the rows of each ant end, `(b,)`.
+        first: the number of the first of these ants.
+        deposits: what each ant lays, `(b,)`, > 0.
+        laid: for each pair the last ant that visited it, what is due from that ant,
+            the total of those before it, the largest degree so far. Added to; all
+            columns but the first are zero before the first call.
+        touched: the pairs visited so far with a degree > 0, and room for one more;
+            added to.
+        n_touched: their number.
+        n_actions: columns of the table.
+
+    Returns:
+        The number of `touched` pairs.
+    """
+    # All indices are unsigned: no check for indices from the end.
+    row, count, width = np.uint64(0), np.uint64(n_touched), np.uint64(n_actions)
+    for i in range(ends.size):
+        ant, deposit, end = float(first + i), deposits[i], np.uint64(ends[i])
+        while row < end:
+            u = np.uint64(action[row])
+            for c in range(len(corners) or index.shape[1]):
+                pair = np.uint64(index[row, c]) * width + u
+                weight = degree[row, c]
+                new = laid[pair, _LAST] != ant
+                due, largest = laid[pair, _DUE], laid[pair, _LARGEST]
+                laid[pair, _LAST] = ant
+                laid[pair, _TOTAL] += due if new else 0.0
+                laid[pair, _DUE] = max(0.0 if new else due, deposit * weight)
+                laid[pair, _LARGEST] = max(largest, weight)
+                touched[count] = pair
+                count += np.uint64((largest == 0.0) & (weight > 0.0))
+            row += np.uint64(1)
+    return int(count)
+
+
+@njit(cache=True)
+def reinforce(
+    touched: IntArray,
+    laid: FloatArray,
+    global_decay: float,
+    levels: FloatArray,
+    stale: BoolArray,
+) -> None:
+    """Global update (4.15) of the touched pairs; clears all columns of `laid` but one."""
+    n_actions = levels.shape[1]
+    for pair in touched:
+        cell, u = pair // n_actions, pair % n_actions
+        deposit = laid[pair, _TOTAL] + laid[pair, _DUE]
+        kept = (1.0 - global_decay * laid[pair, _LARGEST]) * levels[cell, u]
+        levels[cell, u] = kept + global_decay * deposit
+        stale[cell] = True
+        laid[pair, 1:] = 0.0
+
+
+@njit(cache=True, error_model="numpy")
+def choose_and_decay(
+    levels: FloatArray,
+    alpha: float,
+    heuristic: FloatArray | None,
+    index: CellArray,
+    degree: FloatArray,
+    draws: FloatArray,
+    epsilon: float,
+    greedy: bool,
+    allowed: BoolArray,
+    local_decay: float,
+    tau0: float,
+    stale: BoolArray,
+    actions: IntArray,
+) -> None:
+    """Let one ant after the other choose and then decay its pair by (4.12)."""
+    for j in range(actions.size):
+        action = choose_alone(
+            levels, alpha, heuristic, index, degree, draws, epsilon, greedy, allowed, j
+        )
+        actions[j] = action
+        for c in range(index.shape[1]):
+            cell = index[j, c]
+            levels[cell, action] = _decayed(
+                levels[cell, action], local_decay * degree[j, c], tau0
+            )
+            stale[cell] = True
+
+
+# Columns of the largest degrees on a pair: of the last ant, and of all ants.
+_OF_ANT, _OF_ALL = 1, 2
+
+
+@njit(cache=True)
+def note_visits(
+    index: CellArray,
+    degree: FloatArray,
+    action: ActionArray,
+    ends: IntArray,
+    first: int,
+    local_decay: float,
+    visits: FloatArray,
+    kept: FloatArray,
+    n_actions: int,
+) -> None:
+    """Gather what decay at the end of a trial needs, over the pairs some ants visited.
+
+    Args:
+        index: cells, the rows of one ant after those of the one before, `(r, k)`.
+        degree: degrees, `(r, k)`.
+        action: actions, `(r,)`.
+        ends: where the rows of each ant end, `(b,)`.
+        first: the number of the first of these ants.
+        local_decay: gamma.
+        visits: `(n_pairs, 3)`: for each pair the last ant that visited it (-1 before
+            the first), that ant's largest degree, the largest of all ants; updated.
+        kept: `(n_pairs,)`, the product of 1 - gamma * (largest degree) over the ants
+            before the last one; 1 before the first call, updated.
+        n_actions: columns of the table.
+    """
+    row = 0
+    for i in range(ends.size):
+        ant = float(first + i)
+        while row < ends[i]:
+            for c in range(index.shape[1]):
+                pair = index[row, c] * n_actions + action[row]
+                if visits[pair, _LAST] != ant:
+                    kept[pair] *= 1.0 - local_decay * visits[pair, _OF_ANT]
+                    visits[pair, _LAST], visits[pair, _OF_ANT] = ant, 0.0
+                weight = degree[row, c]
+                visits[pair, _OF_ANT] = max(visits[pair, _OF_ANT], weight)
+                visits[pair, _OF_ALL] = max(visits[pair, _OF_ALL], weight)
+            row += 1
+
+
+@njit(cache=True)
+def decay_late(
+    visits: FloatArray,
+    kept: FloatArray,
+    each_ant: bool,
+    local_decay: float,
+    tau0: float,
+    levels: FloatArray,
+) -> None:
+    """Decay all pairs once after a trial: once for each visitor (3.13), or once.
+
+    Args:
+        visits: as `note_visits` left it.
+        kept: as `note_visits` left it.
+        each_ant: decay once for each ant that visited a pair, else once for all.
+        local_decay: gamma.
+        tau0: the level towards which pairs decay.
+        levels: `(n_cells, n_actions)`, changed in place.
+    """
+    n_actions = levels.shape[1]
+    for pair in range(kept.size):
+        if each_ant:
+            left = kept[pair] * (1.0 - local_decay * visits[pair, _OF_ANT])
+        else:
+            left = 1.0 - local_decay * visits[pair, _OF_ALL]
+        cell, u = pair // n_actions, pair % n_actions
+        levels[cell, u] = left * (levels[cell, u] - tau0) + tau0

@@ -1,0 +1,160 @@
+"""What a colony does to its pheromone, as one replaceable part: the interface."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acl_gym.colony.episodes import Episodes
+from acl_gym.colony.pheromone import Pheromone
+from acl_gym.colony.selection import choose_actions
+from acl_gym.colony.solutions import Solutions
+from acl_gym.utils.serialization import Savable
+from acl_gym.utils.typing import BoolArray, CellArray, FloatArray, IntArray
+
+
+@dataclass(frozen=True, slots=True)
+class TrialResult:
+    """What the ants of a trial did and what it cost.
+
+    Attributes:
+        solutions: S_trial, the cells, degrees and actions of every ant.
+        costs: J of each ant, `(n_ants,)`.
+        deposits: what each ant deposits, `(n_ants,)`, in the thesis 1 / J.
+        success: whether each ant ended in a terminal state, `(n_ants,)`.
+        episodes: observations, actions and stage costs, step by step; None unless
+            the rule's `needs_episodes` is True.
+    """
+
+    solutions: Solutions
+    costs: FloatArray
+    deposits: FloatArray
+    success: BoolArray
+    episodes: Episodes | None = None
+
+
+class UpdateRule(Savable, ABC):
+    """The local and the global update of the pheromone.
+
+    Subclasses are dataclasses whose fields are the parameters of the rule. A colony
+    works with a copy of the rule it is given, so a rule may also keep what it needs
+    from step to step and from trial to trial; what it must remember across `save` and
+    `load` it hands out in `memory`.
+
+    In each trial a colony calls `start_trial`, then `choose` and `local_update` in
+    every step, then `global_update`. Predictions never call a rule.
+
+    Attributes:
+        needs_episodes: whether `TrialResult.episodes` is recorded, which costs memory
+            for every step.
+    """
+
+    needs_episodes: ClassVar[bool] = False
+
+    def start_trial(self, pheromone: Pheromone, trial: int) -> None:
+        """Prepare for trial k = 0, 1, ...; by default there is nothing to do."""
+
+    def choose(
+        self,
+        selection: str,
+        pheromone: Pheromone,
+        index: CellArray,
+        degree: FloatArray,
+        epsilon: float,
+        rng: np.random.Generator,
+        allowed: BoolArray | None,
+        local_decay: float,
+    ) -> IntArray:
+        """Choose an action for each walking ant, by default all on the same pheromone.
+
+        Args:
+            selection: the selection rule, one of `acl_gym.colony.selection.RULES`.
+            pheromone: the shared table.
+            index: cells of the ants' states, `(m, k)`.
+            degree: their degrees, `(m, k)`.
+            epsilon: exploration probability, in [0, 1].
+            rng: the colony's generator.
+            allowed: U_q, `(m, n_actions)`; None: all actions.
+            local_decay: gamma, in [0, 1).
+
+        Returns:
+            Indices of actions, `(m,)`.
+        """
+        return choose_actions(
+            selection, pheromone, index, degree, epsilon, rng, allowed
+        )
+
+    @abstractmethod
+    def local_update(
+        self,
+        pheromone: Pheromone,
+        index: CellArray,
+        degree: FloatArray,
+        actions: IntArray,
+        local_decay: float,
+    ) -> None:
+        """Change the pheromone after a step of all walking ants.
+
+        Args:
+            pheromone: the shared table, changed in place.
+            index: cells of the states that the ants acted in, `(m, k)`.
+            degree: their degrees, `(m, k)`.
+            actions: the actions chosen, `(m,)`.
+            local_decay: gamma, in [0, 1).
+        """
+
+    @abstractmethod
+    def global_update(
+        self,
+        pheromone: Pheromone,
+        result: TrialResult,
+        local_decay: float,
+        global_decay: float,
+    ) -> None:
+        """Change the pheromone after a trial.
+
+        Args:
+            pheromone: the shared table, changed in place.
+            result: what the ants did and what it cost.
+            local_decay: gamma, in [0, 1).
+            global_decay: rho, in [0, 1].
+        """
+
+    def memory(self) -> dict[str, NDArray[Any]]:
+        """What the rule must remember to go on after `load`; by default nothing."""
+        return {}
+
+    def restore(self, memory: dict[str, NDArray[Any]]) -> None:
+        """Take over what `memory` gave when the agent was saved."""
+
+
+@dataclass
+class MissingRule(UpdateRule):
+    """Stands in for a user's own update rule in an agent read from a file.
+
+    Attributes:
+        name: of the rule's class.
+    """
+
+    name: str
+
+    def start_trial(self, pheromone: Pheromone, trial: int) -> None:
+        """Report which rule is missing.
+
+        Raises:
+            ValueError: always.
+        """
+        raise ValueError(
+            f"update was the rule {self.name!r}, which a file cannot hold; set "
+            "agent.update to it before learning continues."
+        )
+
+    def local_update(self, *arguments: Any) -> None:
+        """Never called: a trial does not start."""
+
+    def global_update(self, *arguments: Any) -> None:
+        """Never called: a trial does not start."""

@@ -1,0 +1,309 @@
+"""The update rules that a colony can be asked to follow by name.
+
+In the thesis all ants choose on the same pheromone, every visited pair decays at each
+visit, and ants deposit at the end of the trial (a decision). Algorithms 3.1 to 4.2 can
+also be read in other ways, and so can the analysis of chapter 3: those readings differ
+in when and how often a pair decays.
+"""
+
+from __future__ import annotations
+
+import copy
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from acl_gym.colony.greedy import ALL
+from acl_gym.colony.pheromone import Pheromone
+from acl_gym.colony.solutions import Solutions
+from acl_gym.colony.update_kernels import (
+    choose_and_decay,
+    decay,
+    decay_late,
+    lay,
+    note_visits,
+    reinforce,
+)
+from acl_gym.colony.update_rule import MissingRule, TrialResult, UpdateRule
+from acl_gym.partitions.kernels import written_out
+from acl_gym.utils import validation
+from acl_gym.utils.serialization import from_settings, to_settings
+from acl_gym.utils.typing import BoolArray, CellArray, FloatArray, IntArray
+
+
+class Reinforcement:
+    """The deposits of a trial, eq. (4.15), and the scratch memory they need.
+
+    Args:
+        n_pairs: entries of the table.
+    """
+
+    def __init__(self, n_pairs: int) -> None:
+        self._laid: FloatArray = np.zeros((n_pairs, 4))
+        self._touched: IntArray = np.empty(n_pairs + 1, dtype=np.int64)
+        self._interrupted = False  # an update that did not end left the scratch dirty
+
+    def __call__(
+        self,
+        pheromone: Pheromone,
+        solutions: Solutions,
+        deposits: FloatArray,
+        global_decay: float,
+    ) -> None:
+        """Reinforce along every solution.
+
+        Within a solution a pair counts once, with its largest degree (4.13); the
+        deposit is summed over ants, the decay weighs with the largest degree over
+        all ants (4.14). Cells that no ant visited are not touched.
+
+        Raises:
+            ValueError: a deposit is not positive and finite.
+        """
+        _check_deposits(deposits)
+        if self._interrupted:
+            self._laid[:] = 0.0
+        self._interrupted = True
+        n_touched = 0
+        for block in solutions.blocks():
+            n_touched = lay(
+                block.index,
+                block.degree,
+                written_out(block.index.shape[1]),
+                block.action,
+                block.ends,
+                block.ants.start,
+                deposits[block.ants],
+                self._laid,
+                self._touched,
+                n_touched,
+                pheromone.n_actions,
+            )
+        touched = self._touched[:n_touched]
+        reinforce(touched, self._laid, global_decay, pheromone.levels, pheromone.stale)
+        self._interrupted = False
+
+
+def _check_deposits(deposits: FloatArray) -> None:
+    with np.errstate(over="ignore"):
+        total = deposits.sum()
+    valid = np.isfinite(deposits) & (deposits > 0.0)
+    if not (valid.all() and np.isfinite(total)):
+        ant = int(np.argmin(valid)) if not valid.all() else int(np.argmax(deposits))
+        raise ValueError(
+            "deposits must be > 0 and their sum finite, got "
+            f"{deposits[ant]} for ant {ant}; scale the cost, or check the deposit."
+        )
+
+
+class _Thesis(UpdateRule):
+    """The global update of the thesis, eq. (4.15), which its readings share."""
+
+    _reinforcement: Reinforcement | None = None
+
+    def global_update(
+        self,
+        pheromone: Pheromone,
+        result: TrialResult,
+        local_decay: float,
+        global_decay: float,
+    ) -> None:
+        """Deposit along every solution, eq. (4.15); see `Reinforcement`."""
+        if self._reinforcement is None:
+            self._reinforcement = Reinforcement(pheromone.levels.size)
+        self._reinforcement(pheromone, result.solutions, result.deposits, global_decay)
+
+
+@dataclass
+class EachVisit(_Thesis):
+    """The thesis's rule: a pair decays at each visit, after all ants have chosen.
+
+    Several ants on one pair multiply their factors (4.18), in any order.
+    """
+
+    def local_update(
+        self,
+        pheromone: Pheromone,
+        index: CellArray,
+        degree: FloatArray,
+        actions: IntArray,
+        local_decay: float,
+    ) -> None:
+        """Decay the visited pairs towards tau0 by 1 - gamma * degree, eq. (4.12)."""
+        if local_decay > 0.0:
+            decay(
+                index,
+                degree,
+                written_out(index.shape[1]),
+                actions,
+                local_decay,
+                pheromone.tau0,
+                pheromone.levels,
+                pheromone.stale,
+            )
+
+
+@dataclass
+class InTurn(_Thesis):
+    """Each ant in turn chooses and decays its pair before the next one chooses.
+
+    Later ants of a step see what earlier ones have left, so the order of the ants
+    matters, and predictions, which change nothing, choose on the table as it is.
+    """
+
+    def choose(
+        self,
+        selection: str,
+        pheromone: Pheromone,
+        index: CellArray,
+        degree: FloatArray,
+        epsilon: float,
+        rng: np.random.Generator,
+        allowed: BoolArray | None,
+        local_decay: float,
+    ) -> IntArray:
+        """Choose by `selection` and decay by eq. (4.12), ant by ant."""
+        greedy = selection == "epsilon_greedy"
+        actions = np.empty(index.shape[0], dtype=np.int64)
+        choose_and_decay(
+            pheromone.levels,
+            pheromone.alpha,
+            pheromone.roots if greedy else pheromone.weights,
+            index,
+            degree,
+            rng.random((2, index.shape[0])),
+            0.0 if selection == "boltzmann" else epsilon,
+            greedy,
+            ALL if allowed is None else allowed,
+            local_decay,
+            pheromone.tau0,
+            pheromone.stale,
+            actions,
+        )
+        return actions
+
+    def local_update(
+        self,
+        pheromone: Pheromone,
+        index: CellArray,
+        degree: FloatArray,
+        actions: IntArray,
+        local_decay: float,
+    ) -> None:
+        """Do nothing: the pairs decayed when the ants chose."""
+
+
+class _AtTheEnd(_Thesis):
+    """Pairs decay at the end of the trial, before the deposit, not on the way."""
+
+    _each_ant: ClassVar[bool]
+
+    def local_update(
+        self,
+        pheromone: Pheromone,
+        index: CellArray,
+        degree: FloatArray,
+        actions: IntArray,
+        local_decay: float,
+    ) -> None:
+        """Do nothing: the pairs decay at the end of the trial."""
+
+    def global_update(
+        self,
+        pheromone: Pheromone,
+        result: TrialResult,
+        local_decay: float,
+        global_decay: float,
+    ) -> None:
+        """Decay what was visited, with largest degrees; then deposit, eq. (4.15)."""
+        n_pairs = pheromone.levels.size
+        visits, kept = np.zeros((n_pairs, 3)), np.ones(n_pairs)
+        visits[:, 0] = -1.0  # no ant yet
+        for block in result.solutions.blocks():
+            note_visits(
+                block.index,
+                block.degree,
+                block.action,
+                block.ends,
+                block.ants.start,
+                local_decay,
+                visits,
+                kept,
+                pheromone.n_actions,
+            )
+        decay_late(
+            visits,
+            kept,
+            self._each_ant,
+            local_decay,
+            pheromone.tau0,
+            pheromone.levels,
+        )
+        pheromone.stale[:] = True
+        super().global_update(pheromone, result, local_decay, global_decay)
+
+
+@dataclass
+class OncePerAnt(_AtTheEnd):
+    """A pair decays once for each ant that visited it, the total update (3.13).
+
+    An ant that visits a pair several times counts with its largest degree.
+    """
+
+    _each_ant = True
+
+
+@dataclass
+class OncePerTrial(_AtTheEnd):
+    """A pair decays once per trial, with the largest degree of all its visits."""
+
+    _each_ant = False
+
+
+NAMED: dict[str, UpdateRule] = {
+    "each_visit": EachVisit(),
+    "in_turn": InTurn(),
+    "once_per_ant": OncePerAnt(),
+    "once_per_trial": OncePerTrial(),
+}
+"""The update rules that can be asked for by name."""
+
+
+def as_update(update: str | UpdateRule) -> UpdateRule:
+    """A rule of its own for one colony, from its name or from a rule.
+
+    Raises:
+        ValueError: there is no rule of that name.
+        TypeError: it is neither a name nor an `UpdateRule`.
+    """
+    if isinstance(update, str):
+        update = NAMED[validation.one_of("update", update, NAMED)]
+    if not isinstance(update, UpdateRule):
+        raise TypeError(
+            f"update must be one of {', '.join(map(repr, NAMED))} or an UpdateRule, "
+            f"got {update!r}."
+        )
+    return copy.deepcopy(update)
+
+
+def update_to_settings(rule: UpdateRule) -> Any:
+    """What a file holds of a rule: its settings, or the name of a user's own class."""
+    if isinstance(rule, MissingRule):
+        return {"type": "function", "name": rule.name}
+    if type(rule) not in map(type, NAMED.values()):
+        return {"type": "function", "name": type(rule).__qualname__}
+    return to_settings(rule)
+
+
+def update_from_settings(settings: Any) -> UpdateRule:
+    """Undo `update_to_settings`.
+
+    Raises:
+        ValueError: the settings are those of no rule.
+    """
+    if isinstance(settings, dict) and settings.get("type") == "function":
+        return MissingRule(str(settings.get("name")))
+    rule = from_settings("update", settings, [type(each) for each in NAMED.values()])
+    if not isinstance(rule, UpdateRule):
+        raise ValueError(f"update must be an UpdateRule, got {settings!r:.200}.")
+    return rule

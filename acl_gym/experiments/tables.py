@@ -89,13 +89,13 @@ class Comparison(NamedTuple):
 def compare(
     where: str, measure: str, names: tuple[str, str], values: Sequence[FloatArray]
 ) -> Comparison:
-    """Hold a method against a rival.
+    """Compare a method with a rival, by the values of the runs of both.
 
     Args:
         where: see `Comparison`.
         measure: what the values are.
         names: of the method and of the rival.
-        values: of both, one a run, > 0 or infinite.
+        values: one a run, > 0 or infinite, of either.
     """
     found = ratio(values[0], values[1])
     if min(map(len, values)) < FEW:
@@ -269,29 +269,23 @@ def summarise(experiment: Experiment, results: Results) -> list[dict[str, Any]]:
     """
     cost, summary = reference_cost(experiment, results), []
     for label, study in experiment.studies.items():
-        last, best = results.last, results.best
-        values = {
-            "final_policy_cost": last(study),
-            "final_gap_percent": 100 * (last(study) / cost - 1),
-            "final_success_rate": last(study, "success_rate"),
-            "best_policy_cost": best(study),
-            "best_gap_percent": 100 * (best(study) / cost - 1),
-            "best_success_rate": best(study, "success_rate"),
-            "env_steps": last(study, "env_steps"),
-            "seconds": last(study, "seconds"),
-        }
+        values = {}
+        for name, of in (("final", results.last), ("best", results.best)):
+            values[f"{name}_policy_cost"] = of(study)
+            values[f"{name}_gap_percent"] = 100 * (of(study) / cost - 1)
+            values[f"{name}_success_rate"] = of(study, "success_rate")
+        for name in ("env_steps", "seconds"):
+            values[name] = results.last(study, name)
         entry: dict[str, Any] = {
             "agent": experiment.options["agents"][label],
             "label": label,
             "seeds": len(results.runs(study)),
         }
-        for name, each in values.items():
+        times = {f"{x}_to_{m}": at for m, x, at in _times(study, results, cost)}
+        for name, each in {**values, **times}.items():
             entry[name] = estimate(each, median).as_json("median")
-        for mark, x, at in _times(study, results, cost):
-            entry[f"{x}_to_{mark}"] = {
-                **estimate(at, median).as_json("median"),
-                "reached": int(np.isfinite(at).sum()),
-            }
+            if name in times:
+                entry[name]["reached"] = int(np.isfinite(each).sum())
         summary.append(entry)
     return summary
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
-from typer.testing import CliRunner
+from typer.testing import CliRunner, Result
 
 ROOT = Path(__file__).resolve().parents[3]
 SCRIPT = ROOT / "benchmarks" / "compare_acl_rl.py"
@@ -79,27 +79,37 @@ def test_the_report_is_one_file(finished, folder: Path) -> None:
     assert page.count("data:image/png;base64,") == 4
 
 
-def test_a_second_call_runs_nothing_again_and_a_fresh_one_everything(
-    finished, folder: Path
-) -> None:
-    def times() -> list[int]:
-        return [
-            path.stat().st_mtime_ns for path in sorted((folder / "runs").glob("*-*"))
-        ]
+def times(folder: Path) -> list[int]:
+    runs = sorted((folder / "runs").glob("*-*"))
+    return [path.stat().st_mtime_ns for path in runs]
 
-    before = times()
+
+def test_a_second_call_runs_nothing_again(finished, folder: Path) -> None:
+    before = times(folder)
     assert len(before) == 2 * 3 + 2  # of them two of dynamic programming
     again = compare(*SMALL, "--out", str(folder))
     assert again.returncode == 0, again.stderr
-    assert times() == before
-    rows = json.loads((folder / "results.json").read_text())["rows"]
-    fresh = compare(*SMALL, "--out", str(folder), "--fresh")
-    assert fresh.returncode == 0, fresh.stderr
-    assert min(times()) > max(before)
-    for one, other in zip(
-        rows, json.loads((folder / "results.json").read_text())["rows"], strict=True
-    ):
+    assert times(folder) == before
+
+
+def in_this_process(out: Path, *arguments: str) -> Result:
+    """Run the command here; only the runs are in processes of their own."""
+    common = ("--preset", "smoke", "--workers", "1", "--out", str(out))
+    app = runpy.run_path(str(SCRIPT))["app"]
+    done = CliRunner().invoke(app, [*common, *arguments])
+    assert done.exit_code == 0, done.output
+    return done
+
+
+def test_a_fresh_call_makes_every_run_anew(tmp_path: Path) -> None:
+    arguments = ("--env", "acl_gym/GridSearch1D-v0", "--agents", "q-crisp", "--json")
+    found = [
+        json.loads(in_this_process(tmp_path, *arguments, *more).stdout)["rows"]
+        for more in ((), ("--fresh",))
+    ]
+    for one, other in zip(*found, strict=True):
         assert {**one, "seconds": 0} == {**other, "seconds": 0}
+        assert one["seconds"] != other["seconds"]
 
 
 @pytest.mark.parametrize(
@@ -127,16 +137,7 @@ def test_the_other_systems(name: str, tmp_path: Path) -> None:
     env_id, moving = f"acl_gym/{name}-v0", name == "Navigation"
     agents = "acl-crisp,q-lambda-crisp"
     (tmp_path / "trajectories.png").write_text("of a system before")
-    # In this process; only the runs are in one of their own.
-    script = runpy.run_path(str(SCRIPT))
-    done = CliRunner().invoke(
-        script["app"],
-        [
-            *("--preset", "smoke", "--env", env_id, "--agents", agents),
-            *("--workers", "1", "--out", str(tmp_path)),
-        ],
-    )
-    assert done.exit_code == 0, done.output
+    done = in_this_process(tmp_path, "--env", env_id, "--agents", agents)
     results = json.loads((tmp_path / "results.json").read_text())
     assert {row["agent"] for row in results["rows"]} == set(agents.split(","))
     assert [entry["seeds"] for entry in results["summary"]] == [1, 1]

@@ -43,8 +43,8 @@ def in_processes(jobs: list[Job], store: Store, *, workers: int) -> Finished:
         initializer=_start_worker,
         initargs=(os.getpid(),),
     )
+    under_way: dict[Future[None], Job] = {}
     try:
-        under_way: dict[Future[None], Job] = {}
         left = iter(jobs)
         while True:
             # A few ahead: to watch thousands at once would keep this process busy.
@@ -59,7 +59,7 @@ def in_processes(jobs: list[Job], store: Store, *, workers: int) -> Finished:
                 yield job
     finally:
         # Whatever happens, what is under way is lost: these processes, and no others.
-        pool.shutdown(wait=True, kill_workers=True)
+        pool.shutdown(wait=True, kill_workers=bool(under_way))
 
 
 def _raise_failure(job: Job, future: Future[None]) -> None:

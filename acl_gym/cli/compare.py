@@ -182,11 +182,11 @@ def _print_summary(experiment: Experiment, results: Results, terminal: Console) 
 
     from acl_gym.experiments import tables
 
-    symbol = "J*" if experiment.options["optimum"] else "best known"
-    cost = tables.number("cost", tables.reference_cost(experiment, results))
+    known = tables.reference(experiment, results)
+    cost = tables.number("cost", known.cost)
     shown = tables.summary(experiment, results)
     table = Table(
-        title=f"Medians over seeds; {symbol} = {cost}",
+        title=f"Medians over seeds; {known.symbol} = {cost}",
         box=box.SIMPLE_HEAD,
         show_edge=False,
         padding=0,

@@ -55,10 +55,24 @@ class Table:
     best: list[tuple[int, int]] = field(default_factory=list)
 
 
-def reference_cost(experiment: Experiment, results: Results) -> float:
-    """The cost that policies are measured against: that of the first reference."""
+class Reference(NamedTuple):
+    """What policies are measured against: a study, its cost, and whether that is J*."""
+
+    study: Study
+    cost: float
+    optimal: bool
+
+    @property
+    def symbol(self) -> str:
+        """What the cost is called."""
+        return "J*" if self.optimal else "best known"
+
+
+def reference(experiment: Experiment, results: Results) -> Reference:
+    """The first reference; an option says whether it is the optimum."""
     for study in experiment.references.values():
-        return float(results.last(study)[0])
+        cost = float(results.last(study)[0])
+        return Reference(study, cost, experiment.options["optimum"])
     raise LookupError(f"{experiment.name} must have a reference, got none.")
 
 
@@ -111,8 +125,8 @@ def compare(
 
 def system(experiment: Experiment, results: Results) -> Table:
     """One system: costs, and what learning takes in interactions and in time."""
-    cost, rows, values = reference_cost(experiment, results), [], {}
-    name = "J*" if experiment.options["optimum"] else "the best known cost"
+    known, rows, values = reference(experiment, results), [], {}
+    name = "J*" if known.optimal else "the best known cost"
     for label, study in experiment.studies.items():
         runs, last, best = results.runs(study), results.last(study), results.best(study)
         success, seconds = (
@@ -121,7 +135,7 @@ def system(experiment: Experiment, results: Results) -> Table:
         )
         own = {_LAST: last, "cost of the best policy": best}
         times = []
-        for mark, x, at in _times(study, results, cost):
+        for mark, x, at in _times(study, results, known.cost):
             own[f"{_UNITS[x]} to within {mark}% of {name}"] = at
             times.append(_time(at, x))
         rows.append(
@@ -267,7 +281,7 @@ def summarise(experiment: Experiment, results: Results) -> list[dict[str, Any]]:
         (of all training), and for each mark `env_steps_to_25`, `seconds_to_25`,
         `env_steps_to_10`, `seconds_to_10`, with how many `reached` it.
     """
-    cost, summary = reference_cost(experiment, results), []
+    cost, summary = reference(experiment, results).cost, []
     for label, study in experiment.studies.items():
         last, best = results.last, results.best
         values = {

@@ -18,9 +18,11 @@ from PIL import Image
 from acl_gym.evaluation import actions_in
 from acl_gym.experiments import plots, systems
 from acl_gym.experiments.methods import restore_policy
-from acl_gym.experiments.plots import curves, parts
+from acl_gym.experiments.plots import curves
+from acl_gym.experiments.plots.looks import in_symbols, look_of
 from acl_gym.experiments.results import Results
 from acl_gym.experiments.study import Experiment, Study
+from acl_gym.plotting.style import WIDTH, as_pi
 from tests.experiments.synthetic import (
     OPTIMUM,
     TRIALS,
@@ -130,7 +132,7 @@ def texts(figure: Figure) -> list[str]:
 
 
 def lines_of(ax: Any, study: Study) -> list[Any]:
-    color = parts.look(study).color.lower()
+    color = look_of(study).color.lower()
     return [line for line in ax.lines if to_hex(line.get_color()) == color]
 
 
@@ -150,7 +152,7 @@ def test_every_figure_is_drawn_under_its_title(name: str) -> None:
 
 
 def test_every_method_has_a_look_of_its_own() -> None:
-    looks = [parts.look(study) for study in pendulums().values()]
+    looks = [look_of(study) for study in pendulums().values()]
     assert len({each.color for each in looks}) == len(looks)
 
 
@@ -341,7 +343,7 @@ def test_files_are_named_after_the_experiment_or_the_figure(tmp_path: Path) -> N
         "trial.svg",
     ]
     with Image.open(tmp_path / "trial.png") as image:
-        assert image.width == round(150 * parts.WIDTH)
+        assert image.width == round(150 * WIDTH)
     several = replace(experiment, plots=("bands", "policies"))
     names = [plots.file_name(several, plot) for plot in several.plots]
     assert names == ["bands", "policies"]
@@ -369,7 +371,7 @@ def test_pyplot_is_not_touched() -> None:
 
 
 def test_the_animation_is_a_gif(tmp_path: Path) -> None:
-    plots.write_animation(tmp_path / "learning.gif", shown=(0, 1))
+    plots.write_animation(tmp_path / "learning.gif", trials=(0, 1))
     with Image.open(tmp_path / "learning.gif") as image:
         assert image.n_frames > 10
 
@@ -379,8 +381,8 @@ def test_the_animation_is_a_gif(tmp_path: Path) -> None:
     [(0, "0"), (1, "π/2"), (2, "π"), (-1, "−π/2"), (-2, "−π"), (3, "3π/2"), (4, "2π")],
 )
 def test_as_pi(halves: int, text: str) -> None:
-    assert parts.as_pi(halves * math.pi / 2) == text
+    assert as_pi(halves * math.pi / 2) == text
 
 
 def test_in_symbols() -> None:
-    assert parts.in_symbols("gamma = 0.1, tau0") == r"$\gamma$ = 0.1, $\tau_0$"
+    assert in_symbols("gamma = 0.1, tau0") == r"$\gamma$ = 0.1, $\tau_0$"

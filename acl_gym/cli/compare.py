@@ -184,7 +184,7 @@ def _print_summary(experiment: Experiment, results: Results, terminal: Console) 
 
     known = tables.reference(experiment, results)
     cost = tables.number("cost", known.cost)
-    shown = tables.summary(experiment, results)
+    shown = tables.summary(experiment, results, brief=True)
     table = Table(
         title=f"Medians over seeds; {known.symbol} = {cost}",
         box=box.SIMPLE_HEAD,
@@ -197,7 +197,7 @@ def _print_summary(experiment: Experiment, results: Results, terminal: Console) 
         cells = []
         for place, cell in enumerate(row):
             first, _, second = cell.partition("\n")
-            text = Text(first, style="bold" if (line, place) in shown.best else "")
+            text = Text(first, style="bold" if [line, place] in shown.best else "")
             cells.append(text.append(f"\n{second}", style="dim") if second else text)
         table.add_row(*cells)
     terminal.print(table)

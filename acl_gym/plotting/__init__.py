@@ -1,4 +1,4 @@
-"""Drawing policies, and what they do, on the systems of this package."""
+"""Drawing policies, what they do on the systems of this package, and how they came."""
 
 from __future__ import annotations
 
@@ -11,9 +11,16 @@ from acl_gym.envs.navigation.system import Navigation
 from acl_gym.envs.pendulum.system import Pendulum
 from acl_gym.plotting import grid_search, navigation, pendulum
 from acl_gym.plotting.animation import animate
+from acl_gym.plotting.learning import draw_learning_curves
 from acl_gym.plotting.shown import Shown
 
-__all__ = ["Shown", "animate", "draw_policies", "draw_trajectories"]
+__all__ = [
+    "Shown",
+    "animate",
+    "draw_learning_curves",
+    "draw_policies",
+    "draw_trajectories",
+]
 
 _SYSTEMS: dict[type, ModuleType] = {
     Pendulum: pendulum,

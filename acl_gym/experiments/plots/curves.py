@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
@@ -14,12 +13,12 @@ from matplotlib.patches import Patch
 from acl_gym.experiments.plots.dots import draw_strips
 from acl_gym.experiments.plots.looks import cost_line, in_symbols, look_of
 from acl_gym.experiments.plots.policies import best
-from acl_gym.experiments.results import Results, Run, held
+from acl_gym.experiments.results import Results
 from acl_gym.experiments.study import Experiment, Study
 from acl_gym.experiments.systems import optimal_cost
 from acl_gym.experiments.tables import reference
 from acl_gym.plotting import pendulum, style
-from acl_gym.utils.typing import FloatArray
+from acl_gym.plotting.learning import AXES, draw_learning_curves
 
 NAMES = {
     "policy_cost": "policy cost $J^h$",
@@ -73,9 +72,7 @@ def _panels(
     for ax, (_, _, measure) in zip(axes[:columns], shown, strict=False):
         _scale(ax, measure)
     style.label_outer(axes, columns, "trial")
-    style.legend(
-        figure, _handles(experiment, results, optimum=measure == "policy_cost")
-    )
+    style.legend(figure, _handles(experiment, results, measure))
     return figure
 
 
@@ -96,7 +93,7 @@ def bands_and_policies(experiment: Experiment, results: Results) -> Figure:
     axes[0, 0].set_ylabel(NAMES["policy_cost"])
     axes[1, 0].set_ylabel(pendulum.OMEGA)
     handles = pendulum.handles(shown[0].env)
-    style.legend(figure, [*_handles(experiment, results, optimum=True), *handles])
+    style.legend(figure, [*_handles(experiment, results), *handles])
     return figure
 
 
@@ -122,7 +119,7 @@ def _scale(ax: Axes, measure: str) -> None:
 
 
 def _handles(
-    experiment: Experiment, results: Results, optimum: bool = False
+    experiment: Experiment, results: Results, measure: str = "policy_cost"
 ) -> list[Any]:
     studies = list(experiment.studies.values())
     label = f"mean of {len(results.runs(studies[0]))} runs"
@@ -130,13 +127,9 @@ def _handles(
         Line2D([], [], **_MEAN, label=label),
         Patch(color="0.8", label="from the lowest to the highest"),
     ]
-    if optimum and any(optimal_cost(study) for study in studies):
+    if measure == "policy_cost" and any(map(optimal_cost, studies)):
         handles.append(Line2D([], [], **_OPTIMUM, label="optimal cost"))
     return handles
-
-
-_AXES = {"env_steps": "interactions", "seconds": "seconds of learning"}
-_HALVES = ((0.0, 1.0), (0.25, 0.75))
 
 
 def race(experiment: Experiment, results: Results) -> Figure:
@@ -146,7 +139,7 @@ def race(experiment: Experiment, results: Results) -> Figure:
     steps, seconds, last = figure.subplots(1, 3, width_ratios=(1.0, 1.0, 0.8))
     seconds.sharey(steps)
     for ax, x in ((steps, "env_steps"), (seconds, "seconds")):
-        _curves(ax, experiment, results, x, spans=_HALVES)
+        _curves(ax, experiment, results, x, spans=((0.0, 1.0), (0.25, 0.75)))
         ax.axhline(known.cost, **style.BOUND)
     draw_strips(last, [(look_of(study), study) for study in studies], results)
     last.axhline(known.cost, **style.BOUND)  # its own scale: costs are close together
@@ -165,7 +158,7 @@ def learning_curves(experiment: Experiment, results: Results) -> Figure:
     known = reference(experiment, results)
     figure, axes = style.small_multiples(4, 2, 2.3, sharex="col", sharey=True)
     for place, ax in enumerate(axes):
-        x = list(_AXES)[place % 2]
+        x = list(AXES)[place % 2]
         _curves(ax, experiment, results, x, best_so_far=place > 1)
         cost_line(ax, known)
     for ax in axes[:2]:
@@ -179,44 +172,10 @@ def learning_curves(experiment: Experiment, results: Results) -> Figure:
 
 
 def _curves(
-    ax: Axes,
-    experiment: Experiment,
-    results: Results,
-    x: str,
-    *,
-    best_so_far: bool = False,
-    **options: Any,
+    ax: Axes, experiment: Experiment, results: Results, x: str, **options: Any
 ) -> None:
     """Policy costs over `x` for each study, and a legend of the figure."""
-    handles = []
-    for label, study in experiment.studies.items():
-        line = look_of(study).line
-        runs = results.runs(study)
-        at, values = steps_of(runs, x, best_so_far=best_so_far)
-        style.draw_band(ax, at, values, line, step=True, **options)
-        handles.append(Line2D([], [], **line, label=label))
-    ax.set_xscale("log")
-    ax.set_yscale("log")
-    ax.set_xlabel(_AXES[x])
-    if x == "seconds":
-        style.plain_numbers(ax.xaxis)
-    figure: Any = ax.figure
-    if not figure.legends:
-        columns = len(handles) if len(handles) <= 5 else math.ceil(len(handles) / 2)
-        style.legend(figure, handles, ncols=columns)
-
-
-def steps_of(
-    runs: list[Run], x: str, *, best_so_far: bool = False
-) -> tuple[FloatArray, FloatArray]:
-    """Where a policy cost of some run changes, `(n,)`, and all of them, `(runs, n)`.
-
-    A policy counts from its evaluation to the next one, the last one to the end. The
-    curves begin where each run has a policy.
-    """
-    rows = [run.rows for run in runs]
-    if best_so_far:
-        rows = [each.assign(policy_cost=each["policy_cost"].cummin()) for each in rows]
-    at = np.unique(np.concatenate([each[x] for each in rows]))
-    at = at[(at >= max(each[x].iloc[0] for each in rows)) & (at > 0)]  # for a log axis
-    return at, np.stack([held(each, x, at, "policy_cost") for each in rows])
+    studies = experiment.studies
+    logs = {name: [run.rows for run in results.runs(studies[name])] for name in studies}
+    lines = [look_of(study).line for study in studies.values()]
+    draw_learning_curves(ax, logs, lines, x, **options)

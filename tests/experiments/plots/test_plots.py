@@ -18,10 +18,10 @@ from PIL import Image
 from acl_gym.evaluation import actions_in
 from acl_gym.experiments import plots, systems
 from acl_gym.experiments.methods import restore_policy
-from acl_gym.experiments.plots import curves
 from acl_gym.experiments.plots.looks import in_symbols, look_of
 from acl_gym.experiments.results import Results
 from acl_gym.experiments.study import Experiment, Study
+from acl_gym.plotting.learning import steps_of
 from acl_gym.plotting.style import WIDTH, as_pi
 from tests.experiments.synthetic import (
     OPTIMUM,
@@ -180,10 +180,10 @@ class TestCurves:
     def test_steps_begin_where_all_runs_have_a_policy(self) -> None:
         study = TABLES["ACL, fuzzy"]
         runs = [make_run(study, 0, [9.0, 5.0, 7.0]), make_run(study, 2, [8.0, 4.0])]
-        at, values = curves.steps_of(runs, "env_steps")
+        at, values = steps_of([run.rows for run in runs], "env_steps")
         assert at.tolist() == [1014, 2000, 2014, 3000]
         assert values.tolist() == [[9, 5, 5, 7], [8, 8, 4, 4]]
-        _, best = curves.steps_of(runs, "env_steps", best_so_far=True)
+        _, best = steps_of([run.rows for run in runs], "env_steps", best_so_far=True)
         assert best.tolist() == [[9, 5, 5, 5], [8, 8, 4, 4]]
 
     def test_lines_are_medians_and_bands_ranges(self) -> None:
@@ -192,7 +192,9 @@ class TestCurves:
         for study, area in zip(
             experiment.studies.values(), ax.collections, strict=True
         ):
-            at, values = curves.steps_of(results.runs(study), "env_steps")
+            at, values = steps_of(
+                [run.rows for run in results.runs(study)], "env_steps"
+            )
             (line,) = lines_of(ax, study)
             np.testing.assert_array_equal(line.get_xdata(), at)
             np.testing.assert_array_equal(line.get_ydata(), np.median(values, axis=0))

@@ -18,7 +18,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from figure_style import WIDTH, in_style
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter, ScalarFormatter
 from numba import njit
@@ -32,6 +31,7 @@ from acl_gym.colony.update_rules import EachVisit, Reinforcement
 from acl_gym.envs import navigation, pendulum
 from acl_gym.partitions import Fuzzy
 from acl_gym.partitions.kernels import written_out
+from acl_gym.plotting.style import WIDTH, in_style
 
 ANTS = 2_000
 
@@ -246,7 +246,7 @@ def measure(arithmetic: float, bandwidth: float) -> list[Result]:
     return results
 
 
-@in_style
+@in_style()
 def draw_roofline(
     results: list[Result], arithmetic: float, bandwidth: float, path: Path
 ) -> None:
@@ -302,7 +302,7 @@ def _apart(one: Result, other: Result) -> float:
     return float(np.hypot(*np.log(ratios)))
 
 
-@in_style
+@in_style()
 def draw_scaling(path: Path) -> None:
     """Draw the cost over ants, actions, cells per state, and cells of the table."""
     figure = Figure(figsize=(WIDTH, 4.6))

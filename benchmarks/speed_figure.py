@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from figure_style import WIDTH, in_style
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+
+from acl_gym.plotting.style import WIDTH, in_style
 
 PANELS = ("pendulum", "navigation", "grid-1d", "grid-2d")
 PEER_SLOTS = 2_048  # close to the 2,000 of the curves; measured for the ratios only
@@ -21,7 +22,7 @@ CURVES = {
 }
 
 
-@in_style
+@in_style()
 def draw(cases: list[dict[str, Any]], path: str) -> None:
     """Write the figure; the suffix of the path selects the format."""
     systems = [name for name in PANELS if any(case["system"] == name for case in cases)]

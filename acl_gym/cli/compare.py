@@ -182,11 +182,11 @@ def _print_summary(experiment: Experiment, results: Results, terminal: Console) 
 
     from acl_gym.experiments import tables
 
-    symbol = "J*" if experiment.options["optimum"] else "best known"
-    cost = tables.number("cost", tables.reference_cost(experiment, results))
-    shown = tables.summary(experiment, results)
+    known = tables.reference(experiment, results)
+    cost = tables.number("cost", known.cost)
+    shown = tables.summary(experiment, results, brief=True)
     table = Table(
-        title=f"Medians over seeds; {symbol} = {cost}",
+        title=f"Medians over seeds; {known.symbol} = {cost}",
         box=box.SIMPLE_HEAD,
         show_edge=False,
         padding=0,
@@ -197,7 +197,7 @@ def _print_summary(experiment: Experiment, results: Results, terminal: Console) 
         cells = []
         for place, cell in enumerate(row):
             first, _, second = cell.partition("\n")
-            text = Text(first, style="bold" if (line, place) in shown.best else "")
+            text = Text(first, style="bold" if [line, place] in shown.best else "")
             cells.append(text.append(f"\n{second}", style="dim") if second else text)
         table.add_row(*cells)
     terminal.print(table)

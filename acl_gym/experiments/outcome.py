@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -39,10 +38,7 @@ def summary(
         and alternative text; its `table`, see `tables`; and its `studies`, each with
         the costs of its last policies and its curves.
     """
-    table = None
-    if experiment.table:
-        table = asdict(TABLES[experiment.table](experiment, results))
-        table["best"] = [list(place) for place in table["best"]]
+    make_table = TABLES.get(experiment.table)
     return {
         "name": experiment.name,
         "title": experiment.title,
@@ -59,7 +55,7 @@ def summary(
             }
             for plot in experiment.plots
         ],
-        "table": table,
+        "table": vars(make_table(experiment, results)) if make_table else None,
         "studies": [
             _study(label, study, results)
             for label, study in {**experiment.studies, **experiment.references}.items()

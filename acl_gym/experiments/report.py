@@ -12,8 +12,8 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from acl_gym.experiments.claims import HOLDS, IN_PART, NOT, UNDECIDED
 from acl_gym.experiments.outcome import Outcome
-from acl_gym.experiments.statistics import digits
 from acl_gym.utils.files import write_atomically
+from acl_gym.utils.text import digits
 
 _CLASSES = {HOLDS: "yes", IN_PART: "part", NOT: "no", UNDECIDED: "open"}
 _CURVES = ("label", "every", "positions", "curves")

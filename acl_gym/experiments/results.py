@@ -11,7 +11,8 @@ import numpy as np
 import pandas as pd
 
 from acl_gym.experiments.study import Study
-from acl_gym.utils.typing import FloatArray, IntArray
+from acl_gym.utils.steps import held
+from acl_gym.utils.typing import FloatArray
 
 
 @dataclass(frozen=True)
@@ -72,7 +73,8 @@ class Results:
         runs, points = self.runs(study), study.curve_points()
         if points is None:
             return np.stack([run.rows[measure].to_numpy() for run in runs])
-        return np.stack([held(run.rows, "env_steps", points, measure) for run in runs])
+        rows = [run.rows for run in runs]
+        return np.stack([held(r["env_steps"], r[measure], points) for r in rows])
 
     def last(self, study: Study, measure: str = "policy_cost") -> FloatArray:
         """A measure at the end of each run, `(runs,)`."""
@@ -130,11 +132,3 @@ class Results:
             name: sorted({str(each.get(name) or "unknown") for each in facts})
             for name in sorted({name for each in facts for name in each})
         }
-
-
-def held(rows: pd.DataFrame, x: str, points: Any, measure: str) -> FloatArray:
-    """A measure at some `points` of `x`: each value holds until the next one."""
-    place: IntArray = (
-        np.searchsorted(rows[x].to_numpy(), np.asarray(points), side="right") - 1
-    )
-    return np.asarray(rows[measure].to_numpy()[np.maximum(place, 0)])

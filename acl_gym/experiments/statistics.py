@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import stats
 
+from acl_gym.utils.text import digits
 from acl_gym.utils.typing import FloatArray
 
 RESAMPLES = 9_999
@@ -117,11 +118,6 @@ def _unclipped(value: float) -> float:
 def overlap(first: Estimate, second: Estimate) -> bool:
     """Whether two intervals have a point in common."""
     return max(first.low, second.low) <= min(first.high, second.high)
-
-
-def digits(value: float) -> str:
-    """A number to three digits, without powers of ten: 2590, 44.7."""
-    return f"{float(f'{value:.3g}'):g}"
 
 
 def rank_correlation(x: ArrayLike, y: ArrayLike) -> float:

@@ -8,7 +8,7 @@ runs show no difference.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
@@ -34,8 +34,17 @@ NEITHER = "neither"
 """Of times: neither gets there in more than half of its runs."""
 
 NEVER = "never"
-_LAST = "cost of the last policy"
+_COSTS = {
+    "final_policy_cost": "cost of the last policy",
+    "best_policy_cost": "cost of the best policy",
+}
 _UNITS = {"env_steps": "interactions", "seconds": "seconds"}
+_TIMES = {
+    f"{x}_to_{mark}": f"{unit} to within {mark}%"
+    for mark in MARKS
+    for x, unit in _UNITS.items()
+}
+"""What it takes to come close to the reference, by its key."""
 
 
 @dataclass(frozen=True)
@@ -52,13 +61,27 @@ class Table:
     headings: list[str]
     rows: list[list[str]]
     comparisons: list[dict[str, Any]] = field(default_factory=list)
-    best: list[tuple[int, int]] = field(default_factory=list)
+    best: list[list[int]] = field(default_factory=list)
 
 
-def reference_cost(experiment: Experiment, results: Results) -> float:
-    """The cost that policies are measured against: that of the first reference."""
+class Reference(NamedTuple):
+    """What policies are measured against: a study, its cost, and whether that is J*."""
+
+    study: Study
+    cost: float
+    optimal: bool
+
+    @property
+    def symbol(self) -> str:
+        """What the cost is called."""
+        return "J*" if self.optimal else "best known"
+
+
+def reference(experiment: Experiment, results: Results) -> Reference:
+    """The first reference; an option says whether it is the optimum."""
     for study in experiment.references.values():
-        return float(results.last(study)[0])
+        cost = float(results.last(study)[0])
+        return Reference(study, cost, experiment.options["optimum"])
     raise LookupError(f"{experiment.name} must have a reference, got none.")
 
 
@@ -109,108 +132,111 @@ def compare(
     return Comparison(where, measure, *names, verdict, found)
 
 
+def _compared(
+    where: str, measure: str, values: Mapping[str, FloatArray]
+) -> list[Comparison]:
+    """Each colony against each rival by the values under their labels."""
+    colonies = [name for name in values if name in (LABELS["acl"], LABELS[LONG])]
+    return [
+        compare(where, measure, (colony, name), (values[colony], values[name]))
+        for colony in colonies
+        for name in values
+        if name not in colonies
+    ]
+
+
+def _measured(study: Study, results: Results, cost: float) -> dict[str, FloatArray]:
+    """All that tables say of a study, one value a run; `cost` is the reference's."""
+    final, best = results.last(study), results.best(study)
+    return {
+        "final_policy_cost": final,
+        "final_gap_percent": 100 * (final / cost - 1),
+        "final_success_rate": results.last(study, "success_rate"),
+        "best_policy_cost": best,
+        "best_gap_percent": 100 * (best / cost - 1),
+        "best_success_rate": results.best(study, "success_rate"),
+        "env_steps": results.last(study, "env_steps"),
+        "seconds": results.last(study, "seconds"),
+        **{
+            f"{x}_to_{mark}": results.first_within(study, cost * (1 + mark / 100), x)
+            for mark in MARKS
+            for x in _UNITS
+        },
+    }
+
+
 def system(experiment: Experiment, results: Results) -> Table:
     """One system: costs, and what learning takes in interactions and in time."""
-    cost, rows, values = reference_cost(experiment, results), [], {}
-    name = "J*" if experiment.options["optimum"] else "the best known cost"
-    for label, study in experiment.studies.items():
-        runs, last, best = results.runs(study), results.last(study), results.best(study)
-        success, seconds = (
-            results.last(study, "success_rate"),
-            [r.seconds for r in runs],
-        )
-        own = {_LAST: last, "cost of the best policy": best}
-        times = []
-        for mark, x, at in _times(study, results, cost):
-            own[f"{_UNITS[x]} to within {mark}% of {name}"] = at
-            times.append(_time(at, x))
+    known, rows = reference(experiment, results), []
+    studies = experiment.studies.items()
+    found = {label: _measured(each, results, known.cost) for label, each in studies}
+    for label, own in found.items():
+        last, runs = own["final_policy_cost"], results.runs(experiment.studies[label])
         rows.append(
             [
                 label,
                 str(estimate(last)),
                 f"{last.min():.4g} to {last.max():.4g}",
-                str(estimate(best)),
-                f"{100 * success.mean():.0f}%",
-                *times,
-                f"{runs[0].rows['env_steps'].iloc[-1]:,.0f}",
-                f"{iqm(seconds):.2g}",
+                str(estimate(own["best_policy_cost"])),
+                f"{100 * own['final_success_rate'].mean():.0f}%",
+                *(_time(own[key], key) for key in _TIMES),
+                f"{own['env_steps'][0]:,.0f}",
+                f"{iqm(own['seconds']):.2g}",
                 str(sum(bool(run.failure) for run in runs) or "none"),
             ]
         )
-        values[label] = own
-    acl = LABELS["acl"]
+    name = "J*" if known.optimal else "the best known cost"
     comparisons = [
-        compare("", measure, (acl, label), (values[acl][measure], each)).as_json()
-        for label, own in values.items()
-        if label != acl
-        for measure, each in own.items()
+        each.as_json()
+        for key, measure in (_COSTS | _TIMES).items()
+        for each in _compared(
+            "",
+            f"{measure} of {name}" if key in _TIMES else measure,
+            {label: own[key] for label, own in found.items()},
+        )
     ]
     headings = ["Method", "Cost of the last policy", "Range", "Cost of the best"]
     headings += ["Reach the goal"]
-    headings += [f"{u.capitalize()} to {m}%" for m in MARKS for u in _UNITS.values()]
+    headings += [each.replace("within ", "").capitalize() for each in _TIMES.values()]
     headings += ["Interactions of a run", "Seconds of a run", "Broke down"]
     return Table(headings, rows, comparisons)
 
 
-def _times(
-    study: Study, results: Results, cost: float
-) -> Iterator[tuple[int, str, FloatArray]]:
-    """Mark, measure, and when each run first came so close to a cost."""
-    for mark in MARKS:
-        for x in _UNITS:
-            yield mark, x, results.first_within(study, cost * (1 + mark / 100), x)
-
-
-def _time(at: FloatArray, x: str) -> str:
+def _time(at: FloatArray, key: str) -> str:
     """The interquartile mean of times, and how many runs got there."""
     count, middle = int(np.isfinite(at).sum()), float(iqm(at))
     text = NEVER
     if math.isfinite(middle):
-        text = f"{float(f'{middle:.3g}'):,.0f}" if x == "env_steps" else f"{middle:.2g}"
+        steps = key.startswith("env_steps")
+        text = f"{float(f'{middle:.3g}'):,.0f}" if steps else f"{middle:.2g}"
     return text if count == len(at) else f"{text} ({count} of {len(at)})"
 
 
 def harder(experiment: Experiment, results: Results) -> Table:
     """Several tasks: the cost of the last policy, ACL against each rival."""
-    table = experiment.options["rows"]
-    names = list(next(iter(table.values())))
-    colonies = [name for name in names if name in ("acl", LONG)]
-    pairs = [
-        (one, rival) for one in colonies for rival in names if rival not in colonies
-    ]
-    rows, comparisons = [], []
-    for where, row in table.items():
-        last = {name: results.last(study) for name, study in row.items()}
-        own = [
-            compare(where, _LAST, (LABELS[one], LABELS[m]), (last[one], last[m]))
-            for one, m in pairs
-        ]
+    rows, comparisons, headings = [], [], [experiment.options["of"]]
+    for where, row in experiment.options["rows"].items():
+        last = {LABELS[name]: results.last(study) for name, study in row.items()}
+        own = _compared(where, _COSTS["final_policy_cost"], last)
         verdicts = [f"{each.verdict}, {each.ratio} times" for each in own]
-        rows.append(
-            [where, *(str(estimate(each)) for each in last.values()), *verdicts]
-        )
+        rows.append([where, *(str(estimate(x)) for x in last.values()), *verdicts])
         comparisons += [each.as_json() for each in own]
-    headings = [experiment.options["of"], *(LABELS[name] for name in names)]
-    headings += [f"{LABELS[one]} against {LABELS[m]}" for one, m in pairs]
+    headings += [*last, *(f"{each.method} against {each.rival}" for each in own)]
     return Table(headings, rows, comparisons)
 
 
 def overview(experiment: Experiment, results: Results) -> Table:
     """As `harder`, compared as well by the interactions and the time that learning takes."""
-    found = harder(experiment, results)
-    comparisons: dict[str, list[dict[str, Any]]] = {}
+    table, found = harder(experiment, results), {}
     for where, row in experiment.options["rows"].items():
         cost = float(results.last(experiment.references[where])[0])
-        times = {name: _times(study, results, cost) for name, study in row.items()}
-        for acl, *rivals in zip(*times.values(), strict=True):
-            measure = f"{_UNITS[acl[1]]} to within {acl[0]}% of the reference"
-            comparisons.setdefault(measure, []).extend(
-                compare(
-                    where, measure, (LABELS["acl"], LABELS[m]), (acl[2], at)
-                ).as_json()
-                for m, (_, _, at) in zip(list(row)[1:], rivals, strict=True)
-            )
-    return replace(found, comparisons=sum(comparisons.values(), found.comparisons))
+        found[where] = {LABELS[n]: _measured(row[n], results, cost) for n in row}
+    for key, text in _TIMES.items():
+        for where, row in found.items():
+            values = {name: own[key] for name, own in row.items()}
+            compared = _compared(where, f"{text} of the reference", values)
+            table.comparisons.extend(each.as_json() for each in compared)
+    return table
 
 
 def slots(experiment: Experiment, results: Results) -> Table:
@@ -261,81 +287,83 @@ def summarise(experiment: Experiment, results: Results) -> list[dict[str, Any]]:
 
     Returns:
         One entry for each method: `agent`, `label`, `seeds` (how many), and estimates
-        (`median`, `low`, `high`; None where infinite or not there) `final_policy_cost`,
-        `best_policy_cost`, `final_gap_percent` and `best_gap_percent` (above the
-        reference), `final_success_rate`, `best_success_rate`, `env_steps` and `seconds`
-        (of all training), and for each mark `env_steps_to_25`, `seconds_to_25`,
-        `env_steps_to_10`, `seconds_to_10`, with how many `reached` it.
+        (`median`, `low`, `high`; None where infinite or not there) for each key of
+        `_COLUMNS`, gaps being percent above the reference; of the times until policies
+        are close to it also how many `reached` it.
     """
-    cost, summary = reference_cost(experiment, results), []
+    cost, summary = reference(experiment, results).cost, []
     for label, study in experiment.studies.items():
-        values = {}
-        for name, of in (("final", results.last), ("best", results.best)):
-            values[f"{name}_policy_cost"] = of(study)
-            values[f"{name}_gap_percent"] = 100 * (of(study) / cost - 1)
-            values[f"{name}_success_rate"] = of(study, "success_rate")
-        for name in ("env_steps", "seconds"):
-            values[name] = results.last(study, name)
         entry: dict[str, Any] = {
             "agent": experiment.options["agents"][label],
             "label": label,
             "seeds": len(results.runs(study)),
         }
-        times = {f"{x}_to_{m}": at for m, x, at in _times(study, results, cost)}
-        for name, each in {**values, **times}.items():
-            entry[name] = estimate(each, median).as_json("median")
-            if name in times:
-                entry[name]["reached"] = int(np.isfinite(each).sum())
+        for key, values in _measured(study, results, cost).items():
+            entry[key] = estimate(values, median).as_json("median")
+            if key in _TIMES:
+                entry[key]["reached"] = int(np.isfinite(values).sum())
         summary.append(entry)
     return summary
 
 
-_COLUMNS: tuple[tuple[str, str, Callable[[Sequence[float]], float]], ...] = (
-    *(
-        (f"{word}\n{title}", f"{name}_{key}", best)
+_COLUMNS: dict[str, tuple[str, Callable[[Sequence[float]], float] | None]] = {
+    **{
+        f"{name}_{key}": (f"{word}\n{title}", best)
         for name, word in (("final", "last"), ("best", "best"))
         for title, key, best in (
             ("cost", "policy_cost", min),
             ("above", "gap_percent", min),
             ("goal", "success_rate", max),
         )
-    ),
-    *(
-        (f"{mark}%\n{title}", f"{x}_to_{mark}", min)
+    },
+    **{
+        f"{x}_to_{mark}": (f"{mark}%\n{title}", min)
         for mark in MARKS
         for x, title in (("env_steps", "steps"), ("seconds", "time s"))
-    ),
-)
-"""Of the summary: heading, key of an entry, and which of the medians is the best."""
+    },
+    **{"env_steps": ("training\nsteps", None), "seconds": ("training\ntime s", None)},
+}
+"""Of the summary: key of an entry -> heading, and which of the medians is the best."""
 
 
-def summary(experiment: Experiment, results: Results) -> Table:
-    """What `acl-gym compare` prints: medians over seeds, costs with their intervals."""
-    entries, emphasised = summarise(experiment, results), []
-    for place, (_, key, best) in enumerate(_COLUMNS, start=1):
+def summary(experiment: Experiment, results: Results, *, brief: bool = False) -> Table:
+    """Medians over seeds, their intervals, and how many runs got somewhere.
+
+    Args:
+        experiment: see `summarise`.
+        results: its runs.
+        brief: whether it has to fit into a terminal, which has no room for the whole
+            training, nor for intervals other than those of costs.
+    """
+    entries, headings, emphasised = summarise(experiment, results), [""], []
+    rows = [[str(entry["label"])] for entry in entries]
+    for key, (heading, best) in _COLUMNS.items():
+        if brief and best is None:
+            continue
         medians = [entry[key]["median"] for entry in entries]
         known = [value for value in medians if value is not None]
-        if known and len(set(medians)) > 1:
-            found = best(known)
-            emphasised += [(i, place) for i, v in enumerate(medians) if v == found]
-    rows = [
-        [entry["label"], *(_cell(key, entry) for _, key, _ in _COLUMNS)]
-        for entry in entries
-    ]
-    headings = ["", *(heading for heading, _, _ in _COLUMNS)]
+        if best and known and len(set(medians)) > 1:
+            found, place = best(known), len(headings)
+            emphasised += [[i, place] for i, v in enumerate(medians) if v == found]
+        headings.append(heading)
+        for row, entry in zip(rows, entries, strict=True):
+            row.append(_cell(key, entry, intervals=not brief or key.endswith("cost")))
     return Table(headings, rows, best=emphasised)
 
 
-def _cell(key: str, entry: dict[str, Any]) -> str:
-    """The median, and below it the interval of a cost or how many runs got there."""
+def _cell(key: str, entry: dict[str, Any], *, intervals: bool) -> str:
+    """The median, and below it the interval and how many runs got there if not all."""
     found, seeds = entry[key], entry["seeds"]
     reached = found.get("reached", seeds)
-    text = number(key, found["median"])
+    lines = [number(key, found["median"])]
     if found["median"] is None and reached:
-        text = "–"
-    if key.endswith("cost") and found["low"] is not None:
-        text += f"\n{number(key, found['low'])}–{number(key, found['high'])}"
-    return f"{text}\n{reached} of {seeds}" if 0 < reached < seeds else text
+        lines = ["–"]
+    if intervals and found["low"] is not None:
+        ends = (number(key, found[end]) for end in ("low", "high"))
+        lines.append("–".join(end.strip("+%") for end in ends))
+    if 0 < reached < seeds:
+        lines.append(f"{reached} of {seeds}")
+    return "\n".join(lines)
 
 
 def number(key: str, value: float | None) -> str:

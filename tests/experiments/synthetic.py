@@ -71,7 +71,11 @@ def make_experiment(
         references={"J*": reference},
         plots=plots,
         text="What is tried.",
-        options={"agents": {label: label for label in studies}, **options},
+        options={
+            "agents": {label: label for label in studies},
+            "optimum": True,
+            **options,
+        },
     )
 
 

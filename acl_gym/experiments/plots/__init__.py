@@ -6,21 +6,18 @@ import io
 import tomllib
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
-import matplotlib as mpl
 from matplotlib.figure import Figure
 
+from acl_gym.experiments import systems
+from acl_gym.experiments.methods import make_agent
 from acl_gym.experiments.plots import curves, dots, policies, theory
-from acl_gym.experiments.plots.animation import animate
-from acl_gym.experiments.plots.parts import in_symbols
+from acl_gym.experiments.plots.looks import in_symbols
 from acl_gym.experiments.results import Results
 from acl_gym.experiments.study import Experiment
+from acl_gym.plotting.animation import SHOWN, animate
+from acl_gym.plotting.style import in_style
 from acl_gym.utils.files import write_atomically
-
-__all__ = ["CAPTIONS", "PLOTS", "draw", "file_name", "save", "write_animation"]
-
-_STYLE = Path(__file__).with_name("acl_gym.mplstyle")
 
 PLOTS: dict[str, Callable[[Experiment, Results], Figure]] = {
     "bands": curves.bands,
@@ -42,13 +39,13 @@ PLOTS: dict[str, Callable[[Experiment, Results], Figure]] = {
 }
 """What draws the figure of each name."""
 
-
 CAPTIONS: dict[str, dict[str, str]] = tomllib.loads(
     Path(__file__).with_name("captions.toml").read_text()
 )
 """For the figure of each name the `text` below it, and `alt`, what it shows."""
 
 
+@in_style()
 def draw(plot: str, experiment: Experiment, results: Results) -> Figure:
     """Draw a figure.
 
@@ -57,9 +54,8 @@ def draw(plot: str, experiment: Experiment, results: Results) -> Figure:
         experiment: what is shown.
         results: its runs.
     """
-    with mpl.rc_context(fname=_STYLE):
-        figure = PLOTS[plot](experiment, results)
-        figure.suptitle(in_symbols(experiment.title), x=0.01, ha="left")
+    figure = PLOTS[plot](experiment, results)
+    figure.suptitle(in_symbols(experiment.title), x=0.01, ha="left")
     return figure
 
 
@@ -68,6 +64,7 @@ def file_name(experiment: Experiment, plot: str) -> str:
     return experiment.name if len(experiment.plots) == 1 else plot
 
 
+@in_style()
 def save(
     experiment: Experiment,
     results: Results,
@@ -86,13 +83,12 @@ def save(
         figure = draw(plot, experiment, results)
         for kind in kinds:
             buffer = io.BytesIO()
-            with mpl.rc_context(fname=_STYLE):
-                figure.savefig(buffer, format=kind)
+            figure.savefig(buffer, format=kind)
             path = directory / f"{file_name(experiment, plot)}.{kind}"
             write_atomically(path, buffer.getvalue())
 
 
-def write_animation(path: Path, **options: Any) -> None:
-    """Write the animation of a learning colony, see `animation.animate`."""
-    with mpl.rc_context(fname=_STYLE):
-        animate(path, **options)
+def write_animation(path: Path, trials: tuple[int, ...] = SHOWN) -> None:
+    """Write how 250 ants learn the fuzzy pendulum of Table 5.2, see `animate`."""
+    study = systems.pendulum("fuzzy")
+    animate(path, make_agent(study, seed=0), study.task.make_system_env(1), trials)

@@ -12,12 +12,12 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import NullFormatter
 
 from acl_gym.experiments.comparison.experiments import LABELS
-from acl_gym.experiments.plots import parts
-from acl_gym.experiments.plots.parts import LOOKS, Look
+from acl_gym.experiments.plots.looks import LOOKS, Look, cost_line, look_of
 from acl_gym.experiments.results import Results
 from acl_gym.experiments.statistics import estimate
 from acl_gym.experiments.study import Experiment, Study
-from acl_gym.experiments.tables import MARKS, summarise
+from acl_gym.experiments.tables import MARKS, reference, summarise
+from acl_gym.plotting import style
 from acl_gym.utils.typing import FloatArray
 
 _NARROW = 1.05
@@ -27,10 +27,10 @@ _NARROW = 1.05
 def strips(experiment: Experiment, results: Results) -> Figure:
     """The cost of the last policy of each run: a panel for each of `options["rows"]`."""
     rows = experiment.options["rows"]
-    figure, axes = parts.small_multiples(len(rows), len(rows), 2.0)
+    figure, axes = style.small_multiples(len(rows), len(rows), 2.0)
     for ax, (label, row) in zip(axes, rows.items(), strict=True):
         draw_strips(ax, [(LOOKS[name], each) for name, each in row.items()], results)
-        parts.plain_log(ax.yaxis)
+        style.plain_log(ax.yaxis)
         ax.set_title(label.replace(", ", "\n", 1), fontsize="medium")
     axes[0].set_ylabel("cost of the last policy")
     _legend(figure, experiment)
@@ -57,7 +57,7 @@ def draw_strips(
 def sweep(experiment: Experiment, results: Results) -> Figure:
     """The last cost of each method over what `options["rows"]` vary."""
     rows, x = experiment.options["rows"], experiment.options["x"]
-    figure = parts.new_figure(3.2, 5.0)
+    figure = style.new_figure(3.2, 5.0)
     ax = figure.subplots()
     names = list(next(iter(rows.values())))
     for place, name in enumerate(names):
@@ -71,7 +71,7 @@ def sweep(experiment: Experiment, results: Results) -> Figure:
     ax.set_yscale("log")
     ax.set_xticks(x, labels=list(map(str, x)))
     ax.minorticks_off()
-    parts.plain_log(ax.yaxis)
+    style.plain_log(ax.yaxis)
     ax.set_xlabel(experiment.options["xlabel"])
     ax.set_ylabel("cost of the last policy")
     _legend(figure, experiment)
@@ -81,14 +81,14 @@ def sweep(experiment: Experiment, results: Results) -> Figure:
 def order(experiment: Experiment, results: Results) -> Figure:
     """Last costs with the slots in reverse order over those in order."""
     pairs = experiment.options["pairs"]
-    figure, axes = parts.small_multiples(len(pairs), len(pairs), 2.4)
+    figure, axes = style.small_multiples(len(pairs), len(pairs), 2.4)
     for ax, (label, (forth, back)) in zip(axes, pairs.items(), strict=True):
         runs = min(len(results.runs(forth)), len(results.runs(back)))
         x, y = results.last(forth)[:runs], results.last(back)[:runs]
         low, high = min(x.min(), y.min()), max(x.max(), y.max())
         room = 0.08 * (high - low) or 0.01 * high
-        ax.plot([low - room, high + room], [low - room, high + room], **parts.BOUND)
-        _points(ax, x, y, parts.look(forth), markersize=4, alpha=0.8)
+        ax.plot([low - room, high + room], [low - room, high + room], **style.BOUND)
+        _points(ax, x, y, look_of(forth), markersize=4, alpha=0.8)
         ax.set_aspect("equal")
         ax.set_title(label)
         ax.set_xlabel("cost, slots in order")
@@ -98,8 +98,8 @@ def order(experiment: Experiment, results: Results) -> Figure:
 
 def _points(ax: Axes, x: Any, y: FloatArray, look: Look, **options: Any) -> None:
     """Values of runs, faintly."""
-    style = {"marker": look.marker, "markersize": 2.5, "alpha": 0.45, **options}
-    ax.plot(x, y, linestyle="", color=look.color, **style)
+    options = {"marker": look.marker, "markersize": 2.5, "alpha": 0.45, **options}
+    ax.plot(x, y, linestyle="", color=look.color, **options)
 
 
 def _estimates(
@@ -117,17 +117,14 @@ def _legend(figure: Figure, experiment: Experiment) -> None:
         Line2D([], [], marker=LOOKS[key].marker, **LOOKS[key].line, label=LABELS[key])
         for key in next(iter(experiment.options["rows"].values()))
     ]
-    parts.legend(figure, handles, ncols=len(handles))
+    style.legend(figure, handles, ncols=len(handles))
 
 
 def summary(experiment: Experiment, results: Results) -> Figure:
     """Medians of costs, and of the time until policies were close to the reference."""
-    known, entries = (
-        parts.reference(experiment, results),
-        summarise(experiment, results),
-    )
-    colors = [parts.look(study).color for study in experiment.studies.values()]
-    figure = parts.new_figure(1.3 + 0.36 * len(entries))
+    known, entries = reference(experiment, results), summarise(experiment, results)
+    colors = [look_of(study).color for study in experiment.studies.values()]
+    figure = style.new_figure(1.3 + 0.36 * len(entries))
     axes = figure.subplots(1, 3, sharey=True, width_ratios=(1.2, 1, 1))
     axes[0].set_yticks(range(len(entries)), [entry["label"] for entry in entries])
     axes[0].set_ylim(len(entries) - 0.5, -0.7)
@@ -158,14 +155,14 @@ def summary(experiment: Experiment, results: Results) -> Figure:
             Line2D([], [], **_marker("0.3", hollow=hollow), label=name)
             for hollow, name in zip((True, False), names, strict=True)
         ]
-        parts.legend(
+        style.legend(
             *(ax, handles), ncols=2, loc="lower left", bbox_to_anchor=(0.0, 1.02),
             borderpad=0.0, borderaxespad=0.3, handlelength=1.0, handletextpad=0.4,
         )  # fmt: skip
     axes[0].set_xlim(left=0.94 * known.cost)
-    parts.cost_line(axes[0], known, vertical=True)
-    parts.plain_log(axes[0].xaxis)
-    parts.plain_numbers(axes[1].xaxis)
+    cost_line(axes[0], known, vertical=True)
+    style.plain_log(axes[0].xaxis)
+    style.plain_numbers(axes[1].xaxis)
     return figure
 
 
@@ -180,10 +177,10 @@ def _draw_median(
     reached = found.get("reached", runs)
     if reached < runs:
         text = f"{reached} of {runs}" if reached else "never"
-        style: Any = {"va": "center", "fontsize": "small", "color": "0.3"}
-        ax.text(1.02, y, text, transform=ax.get_yaxis_transform(), **style)
+        place: Any = {"transform": ax.get_yaxis_transform(), "va": "center"}
+        ax.text(1.02, y, text, fontsize="small", color="0.3", **place)
 
 
 def _marker(color: str, *, hollow: bool) -> dict[str, Any]:
-    style = {"marker": "o", "linestyle": "", "markersize": 5, "markeredgewidth": 1.2}
-    return {"color": color, "markerfacecolor": "white" if hollow else color, **style}
+    look = {"marker": "o", "linestyle": "", "markersize": 5, "markeredgewidth": 1.2}
+    return {"color": color, "markerfacecolor": "white" if hollow else color, **look}

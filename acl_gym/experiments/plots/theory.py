@@ -8,8 +8,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from acl_gym import theory
-from acl_gym.experiments.plots import parts
-from acl_gym.experiments.plots.parts import BLACK, BLUE, ORANGE
+from acl_gym.experiments.plots.looks import in_symbols
 from acl_gym.experiments.results import Results
 from acl_gym.experiments.study import Experiment
 from acl_gym.experiments.thesis.theory import (
@@ -19,6 +18,8 @@ from acl_gym.experiments.thesis.theory import (
     kept,
     parameters,
 )
+from acl_gym.plotting import style
+from acl_gym.plotting.style import BLACK, BLUE, ORANGE
 
 _LEVEL = r"level $\tau$ in q"
 
@@ -26,7 +27,7 @@ _LEVEL = r"level $\tau$ in q"
 def level_band(experiment: Experiment, results: Results) -> Figure:
     """The level in q between the bounds on its expectation: a panel for each study."""
     count = len(experiment.studies)
-    figure, axes = parts.small_multiples(count, count, 2.2)
+    figure, axes = style.small_multiples(count, count, 2.2)
     for ax, (label, study) in zip(axes, experiment.studies.items(), strict=True):
         levels = results.values(study, "level_q")
         trials = np.arange(levels.shape[1] + 1)  # levels rise in the first few
@@ -37,29 +38,29 @@ def level_band(experiment: Experiment, results: Results) -> Figure:
             int(trials[-1]), *parameters(study), expected_deposits(study)[0]
         )
         mean = {"color": BLACK, "linewidth": 1.1}
-        parts.draw_band(ax, trials, levels, mean, centre=np.mean)
+        style.draw_band(ax, trials, levels, mean, centre=np.mean)
         ax.plot(trials, high, color=BLUE, linewidth=1.0, linestyle="--")
         ax.plot(trials, low, color=BLUE, linewidth=1.0, linestyle=":")
         ax.set_title(label)
         ax.set_xscale("symlog", linthresh=1.0)
         ax.set_xlim(0, trials[-1])
-        parts.plain_numbers(ax.xaxis)
+        style.plain_numbers(ax.xaxis)
         ax.set_ylim(bottom=0.0)
-    parts.label_outer(axes, count, "trial", _LEVEL)
+    style.label_outer(axes, count, "trial", _LEVEL)
     handles = [
         Patch(color="0.85", label="all runs"),
         Line2D([], [], color=BLACK, label="mean"),
         Line2D([], [], color=BLUE, linestyle="--", label="upper bound, eq. (3.27)"),
         Line2D([], [], color=BLUE, linestyle=":", label="lower bound, eq. (3.28)"),
     ]
-    parts.legend(figure, handles)
+    style.legend(figure, handles)
     return figure
 
 
 def policy_gap(experiment: Experiment, results: Results) -> Figure:
     """Both regions of Figure 3.4 for each study, and how many runs have settled."""
     studies = experiment.studies
-    figure = parts.new_figure(1.3 + 0.34 * len(studies))
+    figure = style.new_figure(1.3 + 0.34 * len(studies))
     left, right = figure.subplots(1, 2, sharey=True, width_ratios=(2, 1))
     for place, study in enumerate(studies.values()):
         deposits = expected_deposits(study)
@@ -75,7 +76,7 @@ def policy_gap(experiment: Experiment, results: Results) -> Figure:
         share = kept(results, study).mean()
         right.barh(place, share, height=0.5, color=BLUE if gap(study) > 0 else "0.6")
         right.text(share + 0.02, place, f"{share:.0%}", va="center", fontsize="small")
-    left.set_yticks(range(len(studies)), list(map(parts.in_symbols, studies)))
+    left.set_yticks(range(len(studies)), list(map(in_symbols, studies)))
     left.invert_yaxis()
     left.set_xscale("log")
     left.set_xlabel(_LEVEL)
@@ -90,5 +91,5 @@ def policy_gap(experiment: Experiment, results: Results) -> Figure:
         Patch(color=BLUE, label=r"$\Delta$ > 0"),
         Patch(color="0.6", label=r"$\Delta$ < 0"),
     ]
-    parts.legend(figure, handles, ncols=3)
+    style.legend(figure, handles, ncols=3)
     return figure

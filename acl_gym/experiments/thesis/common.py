@@ -8,8 +8,9 @@ from typing import Any, TypeVar
 
 from acl_gym.experiments.claims import Claim, Part, Tried
 from acl_gym.experiments.results import Results
-from acl_gym.experiments.statistics import digits, estimate, ratio
+from acl_gym.experiments.statistics import estimate, ratio
 from acl_gym.experiments.study import Experiment, Study
+from acl_gym.utils.text import digits
 from acl_gym.utils.typing import FloatArray
 
 T = TypeVar("T")

@@ -234,6 +234,11 @@ def test_marks_never_reached_are_none_and_counted() -> None:
     json.dumps(entry, allow_nan=False)
     shown = summary(experiment, results)
     row = dict(zip(shown.headings, shown.rows[0], strict=True))
+    assert row["25%\nsteps"] == "–\n1k–never\n1 of 3"
+    assert row["training\nsteps"] == "1k\n1k–1k"
+    brief = summary(experiment, results, brief=True)
+    row = dict(zip(brief.headings, brief.rows[0], strict=True))
+    assert "training\nsteps" not in row
     assert row["last\ncost"] == "80.0\n45.0–90.0"
     assert row["25%\nsteps"] == "–\n1 of 3"
     assert row["10%\ntime s"] == "never"

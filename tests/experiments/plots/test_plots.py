@@ -18,9 +18,11 @@ from PIL import Image
 from acl_gym.evaluation import actions_in
 from acl_gym.experiments import plots, systems
 from acl_gym.experiments.methods import restore_policy
-from acl_gym.experiments.plots import curves, parts
+from acl_gym.experiments.plots.looks import in_symbols, look_of
 from acl_gym.experiments.results import Results
 from acl_gym.experiments.study import Experiment, Study
+from acl_gym.plotting.learning import steps_of
+from acl_gym.plotting.style import WIDTH, as_pi
 from tests.experiments.synthetic import (
     OPTIMUM,
     TRIALS,
@@ -130,7 +132,7 @@ def texts(figure: Figure) -> list[str]:
 
 
 def lines_of(ax: Any, study: Study) -> list[Any]:
-    color = parts.look(study).color.lower()
+    color = look_of(study).color.lower()
     return [line for line in ax.lines if to_hex(line.get_color()) == color]
 
 
@@ -150,7 +152,7 @@ def test_every_figure_is_drawn_under_its_title(name: str) -> None:
 
 
 def test_every_method_has_a_look_of_its_own() -> None:
-    looks = [parts.look(study) for study in pendulums().values()]
+    looks = [look_of(study) for study in pendulums().values()]
     assert len({each.color for each in looks}) == len(looks)
 
 
@@ -178,10 +180,10 @@ class TestCurves:
     def test_steps_begin_where_all_runs_have_a_policy(self) -> None:
         study = TABLES["ACL, fuzzy"]
         runs = [make_run(study, 0, [9.0, 5.0, 7.0]), make_run(study, 2, [8.0, 4.0])]
-        at, values = curves.steps_of(runs, "env_steps")
+        at, values = steps_of([run.rows for run in runs], "env_steps")
         assert at.tolist() == [1014, 2000, 2014, 3000]
         assert values.tolist() == [[9, 5, 5, 7], [8, 8, 4, 4]]
-        _, best = curves.steps_of(runs, "env_steps", best_so_far=True)
+        _, best = steps_of([run.rows for run in runs], "env_steps", best_so_far=True)
         assert best.tolist() == [[9, 5, 5, 5], [8, 8, 4, 4]]
 
     def test_lines_are_medians_and_bands_ranges(self) -> None:
@@ -190,7 +192,9 @@ class TestCurves:
         for study, area in zip(
             experiment.studies.values(), ax.collections, strict=True
         ):
-            at, values = curves.steps_of(results.runs(study), "env_steps")
+            at, values = steps_of(
+                [run.rows for run in results.runs(study)], "env_steps"
+            )
             (line,) = lines_of(ax, study)
             np.testing.assert_array_equal(line.get_xdata(), at)
             np.testing.assert_array_equal(line.get_ydata(), np.median(values, axis=0))
@@ -341,7 +345,7 @@ def test_files_are_named_after_the_experiment_or_the_figure(tmp_path: Path) -> N
         "trial.svg",
     ]
     with Image.open(tmp_path / "trial.png") as image:
-        assert image.width == round(150 * parts.WIDTH)
+        assert image.width == round(150 * WIDTH)
     several = replace(experiment, plots=("bands", "policies"))
     names = [plots.file_name(several, plot) for plot in several.plots]
     assert names == ["bands", "policies"]
@@ -369,7 +373,7 @@ def test_pyplot_is_not_touched() -> None:
 
 
 def test_the_animation_is_a_gif(tmp_path: Path) -> None:
-    plots.write_animation(tmp_path / "learning.gif", shown=(0, 1))
+    plots.write_animation(tmp_path / "learning.gif", trials=(0, 1))
     with Image.open(tmp_path / "learning.gif") as image:
         assert image.n_frames > 10
 
@@ -379,8 +383,8 @@ def test_the_animation_is_a_gif(tmp_path: Path) -> None:
     [(0, "0"), (1, "π/2"), (2, "π"), (-1, "−π/2"), (-2, "−π"), (3, "3π/2"), (4, "2π")],
 )
 def test_as_pi(halves: int, text: str) -> None:
-    assert parts.as_pi(halves * math.pi / 2) == text
+    assert as_pi(halves * math.pi / 2) == text
 
 
 def test_in_symbols() -> None:
-    assert parts.in_symbols("gamma = 0.1, tau0") == r"$\gamma$ = 0.1, $\tau_0$"
+    assert in_symbols("gamma = 0.1, tau0") == r"$\gamma$ = 0.1, $\tau_0$"

@@ -11,13 +11,13 @@ import numpy as np
 from matplotlib.colors import LogNorm
 from PIL import Image, ImageDraw
 
+from acl_gym.agents.base import TabularAgent
+from acl_gym.envs.control.environments import ControlVectorEnv
 from acl_gym.evaluation import evaluate_policy_cost, record_trajectory
-from acl_gym.experiments import systems
-from acl_gym.experiments.methods import make_agent
-from acl_gym.experiments.plots import parts, pendulum
-from acl_gym.experiments.plots.parts import Shown
-from acl_gym.experiments.statistics import digits
+from acl_gym.plotting import pendulum, style
+from acl_gym.policies import TablePolicy
 from acl_gym.utils.files import write_atomically
+from acl_gym.utils.text import digits
 
 SHOWN = (0, 2, 4, 6, 8, 10, 12, 15, 20, 30, 60, 100)
 """After these trials the policy is shown and followed."""
@@ -25,36 +25,39 @@ SHOWN = (0, 2, 4, 6, 8, 10, 12, 15, 20, 30, 60, 100)
 _SECONDS = 3.0
 """How long the pendulum is swung by each policy."""
 
-_STEP = 0.1  # sampling time, s
 _BETWEEN = 2  # frames from one sample to the next
 _DPI = 110
 _COLOURS = 128
 _ROD, _BOB, _PIVOT = (40, 46, 54), (213, 94, 0), (120, 126, 134)
 
 
-def animate(path: Path, seed: int = 0, shown: tuple[int, ...] = SHOWN) -> None:
-    """Write the animation.
+def animate(
+    path: Path,
+    agent: TabularAgent,
+    env: ControlVectorEnv,
+    trials: tuple[int, ...] = SHOWN,
+) -> None:
+    """Let a colony learn the pendulum and write what it looks like as a GIF.
 
     Args:
-        path: of the GIF, which appears complete or not at all.
-        seed: of the colony: 250 ants on the fuzzy pendulum, Table 5.2.
-        shown: after which trials the policy is shown, increasing.
+        path: of the file, which appears complete or not at all.
+        agent: a new colony on the pendulum; it learns.
+        env: the pendulum on which its policies are shown, with one slot.
+        trials: after which trials the policy is shown, increasing.
     """
-    study = systems.pendulum("fuzzy")
-    agent, task = make_agent(study, seed), study.task
+    system: Any = env.system
+    step = system.sampling_time
     frames: list[Image.Image] = []
-    for trial in shown:
+    for trial in trials:
         if trial > agent.trials:
             agent.learn(trials=trial - agent.trials)
         policy = agent.policy.copy()
-        cost = evaluate_policy_cost(policy, task.make_system_env(1), max_steps=300).cost
+        cost = evaluate_policy_cost(policy, env).cost
         name = f"after {trial} trials" if trial else "before learning"
-        drawn = Shown(f"{name}\npolicy cost {digits(cost)}", "policy", study, policy)
-        steps = round(_SECONDS / _STEP)
-        swing = record_trajectory(
-            policy, task.make_system_env(1), np.zeros(2), max_steps=steps
-        )
-        frames += _swing(*_background(drawn), swing.states[:, 0])
+        title = f"{name}\npolicy cost {digits(cost)}"
+        steps = round(_SECONDS / step)
+        swing = record_trajectory(policy, env, np.zeros(2), max_steps=steps)
+        frames += _swing(*_background(title, env, policy), swing.states[:, 0], steps)
     # One palette for all frames, from the first and the last and much of the bob's colour.
     both = Image.new("RGB", (frames[0].width, 2 * frames[0].height + 60), _BOB)
     both.paste(frames[0], (0, 0))
@@ -64,20 +67,23 @@ def animate(path: Path, seed: int = 0, shown: tuple[int, ...] = SHOWN) -> None:
         frame.quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames
     )
     buffer = io.BytesIO()
-    duration = round(1000 * _STEP / _BETWEEN)
+    duration = round(1000 * step / _BETWEEN)
     options = {"save_all": True, "append_images": rest, "loop": 0, "optimize": True}
     first.save(buffer, format="gif", duration=duration, **options)
     write_atomically(path, buffer.getvalue())
 
 
-def _background(shown: Shown) -> tuple[Image.Image, float, float, float]:
+@style.in_style()
+def _background(
+    title: str, env: ControlVectorEnv, policy: TablePolicy
+) -> tuple[Image.Image, float, float, float]:
     """All but the pendulum; and x, y and length of that in pixels."""
-    figure = parts.new_figure(2.75)
+    figure = style.new_figure(2.75)
     left, middle, right = figure.subplots(1, 3, width_ratios=(1, 1.18, 1))
-    pendulum.draw_policy(left, shown)
+    pendulum.draw_policy(left, env, policy)
+    left.set_title("policy")
     left.set_ylabel(pendulum.OMEGA)
-    policy: Any = shown.policy
-    strongest = policy.table.max(axis=1).reshape(shown.study.cells).T
+    strongest = policy.table.max(axis=1).reshape(pendulum.cells_of(policy)).T
     shades = middle.imshow(
         strongest,
         origin="lower",
@@ -95,7 +101,7 @@ def _background(shown: Shown) -> tuple[Image.Image, float, float, float]:
     right.set_xlim(-1.2, 1.2)
     right.set_ylim(-1.2, 1.2)
     right.set_axis_off()
-    right.set_title(shown.label)
+    right.set_title(title)
     figure.set_dpi(_DPI)
     canvas: Any = figure.canvas
     canvas.draw()
@@ -105,11 +111,11 @@ def _background(shown: Shown) -> tuple[Image.Image, float, float, float]:
 
 
 def _swing(
-    background: Image.Image, x: float, y: float, length: float, angles: Any
+    background: Image.Image, x: float, y: float, length: float, angles: Any, steps: int
 ) -> list[Image.Image]:
     """The pendulum on its way, and standing still as it has ended."""
     theta = np.unwrap(angles, period=2 * math.pi)
-    count = round(_SECONDS / _STEP * _BETWEEN)
+    count = steps * _BETWEEN
     frames = []
     for angle in np.interp(np.arange(count) / _BETWEEN, np.arange(len(theta)), theta):
         frame = background.copy()

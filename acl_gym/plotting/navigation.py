@@ -12,11 +12,13 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Polygon
 from matplotlib.ticker import MultipleLocator
 
+from acl_gym.envs.control.environments import ControlVectorEnv
 from acl_gym.envs.navigation.painter import goal_outline
 from acl_gym.evaluation import actions_in, record_trajectory
-from acl_gym.experiments.plots import parts
-from acl_gym.experiments.plots.parts import Shown
-from acl_gym.experiments.statistics import digits
+from acl_gym.plotting import style
+from acl_gym.plotting.shown import Shown
+from acl_gym.utils.text import digits
+from acl_gym.utils.typing import Predictor
 
 _ARROWS = 25
 """Positions along an axis: three between neighbours of nine centres."""
@@ -28,11 +30,13 @@ _DAMPING = LinearSegmentedColormap.from_list("damping", ["#FFFFFF", "#8A929E"], 
 _FORCE: dict[str, Any] = {"color": "#1F2A36", "linestyle": ""}
 
 
-def policies(shown: list[Shown], paths: bool = False) -> Figure:
+def policies(shown: list[Shown], *, paths: bool = False) -> Figure:
     """The force at rest over the plane; with `paths`, a panel for these beside it."""
     figure, axes = _planes(shown, 1 + paths)
     for place, each in enumerate(shown):
-        _draw_forces(axes[place * (1 + paths)], each)
+        ax = axes[place * (1 + paths)]
+        draw_policy(ax, each.env, each.policy)
+        ax.set_title(each.title)
         if paths:
             _draw_paths(axes[2 * place + 1], each)
             axes[2 * place + 1].set_title(
@@ -43,7 +47,7 @@ def policies(shown: list[Shown], paths: bool = False) -> Figure:
         [], [], marker=r"$\rightarrow$", markersize=8, label="force", **_FORCE
     )
     none = Line2D([], [], marker=".", markersize=3, label="none", **_FORCE)
-    parts.legend(figure, [arrow, none, *_handles()])
+    style.legend(figure, [arrow, none, *_handles()])
     return figure
 
 
@@ -56,51 +60,43 @@ def trajectories(shown: list[Shown]) -> Figure:
         Line2D([], [], **_end("0.2", success=True), label="arrived at the goal"),
         Line2D([], [], **_end("0.2", success=False), label="time was up"),
     ]
-    parts.legend(figure, [*ends, *_handles()])
+    style.legend(figure, [*ends, *_handles()])
     return figure
 
 
 def _planes(shown: list[Shown], panels: int = 1) -> tuple[Figure, list[Axes]]:
     """Panels with damping and goal, for each policy one or two."""
-    system = _system(shown[0])
+    system: Any = shown[0].env.system
     count = panels * len(shown)
     columns = 2 if panels == 2 or count == 4 else min(count, 3)
-    width = min(2.5 * columns + 0.5, parts.WIDTH)
+    width = min(2.5 * columns + 0.5, style.WIDTH)
     options = {"sharex": True, "sharey": True}
-    figure, axes = parts.small_multiples(count, columns, 2.85, width, **options)
+    figure, axes = style.small_multiples(count, columns, 2.85, width, **options)
     largest = system.position_max
     fine, extent = np.linspace(-largest, largest, _SHADES), 2 * (-largest, largest)
-    style: dict[str, Any] = {
-        "cmap": _DAMPING,
-        "interpolation": "bilinear",
-        "zorder": 0.5,
-    }
+    shading: Any = {"interpolation": "bilinear", "zorder": 0.5}
     for ax in axes:
         damping = system.damping(fine[None, :], fine[:, None])
-        ax.imshow(damping, origin="lower", extent=extent, **style)
-        goal = Polygon(goal_outline(system), color=parts.GREEN, linewidth=0, zorder=1.5)
+        ax.imshow(damping, _DAMPING, origin="lower", extent=extent, **shading)
+        goal = Polygon(goal_outline(system), color=style.GREEN, linewidth=0, zorder=1.5)
         ax.add_patch(goal)
         ax.grid(visible=False)
         limits = (-1.04 * largest, 1.04 * largest)
         ax.set(xlim=limits, ylim=limits, aspect="equal")
         for axis in (ax.xaxis, ax.yaxis):
             axis.set_major_locator(MultipleLocator(largest / 2))
-    parts.label_outer(axes, columns, "$c_1$ (m)", "$c_2$ (m)")
+    style.label_outer(axes, columns, "$c_1$ (m)", "$c_2$ (m)")
     return figure, axes
 
 
-def _system(shown: Shown) -> Any:
-    return shown.study.task.make_system_env(1).system
-
-
-def _draw_forces(ax: Axes, shown: Shown) -> None:
-    """An arrow for the force at each position, a dot where there is none."""
-    system = _system(shown)
+def draw_policy(ax: Axes, env: ControlVectorEnv, policy: Predictor) -> None:
+    """An arrow for the force at each position at rest, a dot where there is none."""
+    system: Any = env.system
     axis = np.linspace(-system.position_max, system.position_max, _ARROWS)
     c1, c2 = (each.ravel() for each in np.meshgrid(axis, axis))
     states = np.stack([c1, 0 * c1, c2, 0 * c2], axis=1)
-    env = shown.study.task.make_system_env(len(states))
-    u1, u2 = np.array(system.forces)[actions_in(shown.policy, env, states)].T
+    actions = actions_in(policy, env.with_slots(len(states)), states)
+    u1, u2 = np.array(system.forces)[actions].T
     none, spacing = (u1 == 0) & (u2 == 0), axis[1] - axis[0]
     ax.quiver(
         *(each[~none] for each in (c1, c2, u1, u2)),
@@ -109,19 +105,19 @@ def _draw_forces(ax: Axes, shown: Shown) -> None:
         headwidth=3.2, headlength=3.2, headaxislength=2.8, zorder=2,
     )  # fmt: skip
     ax.plot(c1[none], c2[none], marker=".", markersize=1.5, **_FORCE)
-    ax.set_title(shown.title)
 
 
 def _draw_paths(ax: Axes, shown: Shown) -> None:
     """Paths from corners and edges, and whether they end at the goal."""
-    largest, color = _system(shown).position_max, parts.look(shown.study).color
+    system: Any = shown.env.system
+    largest, color = system.position_max, shown.line["color"]
     starts = [
         (i * largest, j * largest) for i in (-1, 0, 1) for j in (-1, 0, 1) if i or j
     ]
     paths = []
     for c1, c2 in starts:
-        env = shown.study.task.make_system_env(1)
-        path = record_trajectory(shown.policy, env, np.array([c1, 0.0, c2, 0.0]))
+        start, env = np.array([c1, 0.0, c2, 0.0]), shown.env.with_slots(1)
+        path = record_trajectory(shown.policy, env, start)
         x, y = path.states[:, [0, 2]].T
         ax.plot(x, y, color=color, linewidth=1.1, zorder=2)
         ax.plot(x[-1], y[-1], **_end(color, success=path.success))
@@ -142,5 +138,5 @@ def _end(color: str, *, success: bool) -> dict[str, Any]:
 def _handles() -> list[Any]:
     return [
         Patch(facecolor="#B9BEC6", label="damping, darker is stronger"),
-        Patch(facecolor=parts.GREEN, label="goal"),
+        Patch(facecolor=style.GREEN, label="goal"),
     ]

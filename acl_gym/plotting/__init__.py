@@ -1,0 +1,71 @@
+"""Drawing policies, what they do on the systems of this package, and how they came."""
+
+from __future__ import annotations
+
+from types import ModuleType
+
+from matplotlib.figure import Figure
+
+from acl_gym.envs.grid_search.system import GridSearch
+from acl_gym.envs.navigation.system import Navigation
+from acl_gym.envs.pendulum.system import Pendulum
+from acl_gym.plotting import grid_search, navigation, pendulum
+from acl_gym.plotting.animation import animate
+from acl_gym.plotting.learning import draw_learning_curves
+from acl_gym.plotting.shown import Shown
+
+__all__ = [
+    "Shown",
+    "animate",
+    "draw_learning_curves",
+    "draw_policies",
+    "draw_trajectories",
+]
+
+_SYSTEMS: dict[type, ModuleType] = {
+    Pendulum: pendulum,
+    Navigation: navigation,
+    GridSearch: grid_search,
+}
+
+
+def draw_policies(shown: list[Shown], *, paths: bool = False) -> Figure:
+    """Draw policies of one system over its states, a panel for each.
+
+    Args:
+        shown: the policies.
+        paths: on the plane of the navigation, whether a panel beside each shows where
+            its vehicles go.
+
+    Raises:
+        TypeError: this system has no picture.
+    """
+    figure: Figure = _module(shown).policies(shown, paths=paths)
+    return figure
+
+
+def draw_trajectories(shown: list[Shown]) -> Figure:
+    """Draw what policies do from states at rest.
+
+    Args:
+        shown: policies of the pendulum, or of the navigation.
+
+    Raises:
+        TypeError: this system has no such picture.
+    """
+    module = _module(shown)
+    if not hasattr(module, "trajectories"):
+        raise TypeError("trajectories are drawn of the pendulum and the navigation.")
+    figure: Figure = module.trajectories(shown)
+    return figure
+
+
+def _module(shown: list[Shown]) -> ModuleType:
+    system = shown[0].env.system
+    for kind, module in _SYSTEMS.items():
+        if isinstance(system, kind):
+            return module
+    raise TypeError(
+        "policies are drawn of the pendulum, the navigation and the grids, got "
+        f"{type(system).__name__}."
+    )

@@ -4,17 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from functools import partial
-from typing import Any
 
 import numpy as np
 
-from acl_gym.evaluation import control_env
 from acl_gym.experiments.claims import Part, Tried, settled_from
 from acl_gym.experiments.methods import restore_policy
 from acl_gym.experiments.results import Results
 from acl_gym.experiments.statistics import estimate, rank_correlation, ratio
 from acl_gym.experiments.study import Study
-from acl_gym.experiments.systems import GRID_STATES, grid_1d, grid_2d
+from acl_gym.experiments.systems import (
+    GRID_STATES,
+    free_states,
+    grid_1d,
+    grid_2d,
+    grid_optimum,
+)
 from acl_gym.experiments.thesis import chapter3
 from acl_gym.experiments.thesis.common import LATE, centres, claim, listed, percentages
 from acl_gym.planning.model import TabularModel
@@ -30,21 +34,6 @@ def optimal(results: Results, study: Study) -> BoolArray:
     return np.asarray(results.values(study) <= OPTIMUM_1D + 1e-9)
 
 
-def solved(study: Study) -> tuple[TabularModel, Any, IntArray]:
-    """The model of a grid, its value iteration, and the states that are not goals."""
-    env = study.task.make_system_env(1)
-    model = TabularModel.from_env(env)
-    optimum = value_iteration(model)
-    goals = control_env(env).system.goal_states  # type: ignore[attr-defined]
-    return model, optimum, np.setdiff1d(np.arange(len(optimum.values)), goals)
-
-
-def optimal_cost(study: Study) -> float:
-    """J* of a grid, the mean over the states that are not goals."""
-    _, optimum, free = solved(study)
-    return float(-optimum.values[free].mean())
-
-
 def best_actions(results: Results, study: Study) -> IntArray:
     """The last policy of each run, `(runs, cells)`."""
     runs = results.runs(study)
@@ -53,8 +42,8 @@ def best_actions(results: Results, study: Study) -> IntArray:
 
 def exact_costs(results: Results, study: Study) -> FloatArray:
     """The cost of each run's last policy; infinite if a state never gets to the goal."""
-    model, _, free = solved(study)
-    policies = best_actions(results, study)
+    model = TabularModel.from_env(study.task.make_system_env(1))
+    free, policies = free_states(study), best_actions(results, study)
     return np.array([-policy_value(model, each)[free].mean() for each in policies])
 
 
@@ -93,7 +82,7 @@ def _one_ant(results: Results) -> Tried:
 
 
 def _every_run(results: Results) -> Tried:
-    shortest, found = optimal_cost(grid_2d()), {}
+    shortest, found = grid_optimum(grid_2d()), {}
     for p in chapter3.PROBABILITIES:
         costs = exact_costs(results, grid_2d(p=p))
         near, lost = np.mean(costs * p / shortest <= 1.1), np.isinf(costs).mean()
@@ -105,7 +94,7 @@ def _every_run(results: Results) -> Tried:
 def _costs_with(choice: str, results: Results) -> Tried:
     found = {}
     for p, study in chapter3.CHOICES[choice].items():
-        cost, optimum = estimate(exact_costs(results, study)), optimal_cost(study)
+        cost, optimum = estimate(exact_costs(results, study)), grid_optimum(study)
         found[f"p = {p:g}"] = f"{cost} (optimum {optimum:.2f})"
     return Tried(f"{choice}: cost of the last policy", listed(found))
 
@@ -209,7 +198,7 @@ def _c5(results: Results) -> Iterator[Part]:
     (_every_run, *(partial(_costs_with, choice) for choice in chapter3.CHOICES)),
 )
 def _c6(results: Results) -> Iterator[Part]:
-    shortest = optimal_cost(grid_2d())
+    shortest = grid_optimum(grid_2d())
     for p in chapter3.PROBABILITIES:
         found = estimate(exact_costs(results, grid_2d(p=p)))
         yield Part(
@@ -229,8 +218,9 @@ def _c6(results: Results) -> Iterator[Part]:
     "long.",
 )
 def _c7(results: Results) -> Iterator[Part]:
-    _, optimum, free = solved(grid_2d())
-    values = optimum.action_values[free]
+    study = grid_2d()
+    free = free_states(study)
+    values = value_iteration(study.task.make_system_env(1)).action_values[free]
     best = values >= values.max(axis=1, keepdims=True) - 1e-6
     cells = free[best.sum(axis=1) == 1]
     low, high = (best_actions(results, grid_2d(p=p))[:, cells] for p in (0.5, 0.9))

@@ -280,6 +280,9 @@ TASKS = {
 }
 """All tasks by name."""
 
+HARDER: dict[str, dict[str, Any]] = _READ["harder"]
+"""The experiments on harder tasks, as keyword arguments of `experiments._harder`."""
+
 PLAIN = {name: task for name, task in TASKS.items() if name in SYSTEMS}
 """The four systems as they are."""
 

@@ -247,15 +247,12 @@ class TunedTask:
         settings["max_steps"] = self.max_steps or self.system.max_steps
         return {"slots": self.system.colony.slots, "kind": kind, **settings}
 
-    def study(
-        self, method: str, found: Settings, most_runs: int | None = None
-    ) -> Study:
+    def study(self, method: str, found: Settings) -> Study:
         """A method with the settings that a search has found.
 
         Args:
             method: one of `methods`.
             found: what differs from `defaults`.
-            most_runs: see `Study`.
         """
         settings = {**self.defaults(method), **found}
         if method == "dqn":
@@ -281,7 +278,7 @@ TASKS = {
 """All tasks by name."""
 
 HARDER: dict[str, dict[str, Any]] = _READ["harder"]
-"""The experiments on harder tasks, as keyword arguments of `experiments._harder`."""
+"""The experiments on harder tasks, by name; see `experiments.EXPERIMENTS`."""
 
 PLAIN = {name: task for name, task in TASKS.items() if name in SYSTEMS}
 """The four systems as they are."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import os
 from collections.abc import Sequence
@@ -12,13 +11,13 @@ from rich.console import Console
 
 from acl_gym.experiments import comparison, outcome, plots, thesis
 from acl_gym.experiments.outcome import Outcome, without_curves
-from acl_gym.experiments.provenance import ROOT, circumstances
+from acl_gym.experiments.provenance import ROOT, circumstances, hashed
 from acl_gym.experiments.report import write_claims, write_report
 from acl_gym.experiments.results import Results
 from acl_gym.experiments.runner import EXECUTORS, alone_in, list_jobs, run_studies
 from acl_gym.experiments.store import Job, Store
 from acl_gym.experiments.study import Experiment
-from acl_gym.experiments.thesis import CLAIMS, RUNS, experiments_of, trials_of
+from acl_gym.experiments.thesis import CLAIMS, RUNS
 from acl_gym.experiments.thesis.common import FEWER
 from acl_gym.utils.files import write_atomically
 
@@ -95,14 +94,13 @@ def reproduce(
         FolderInUseError: another run works on `directory`.
     """
     experiments = chosen(names)
-    every = [each.name for each in experiments]
     studies = [study for each in experiments for study in each.everything]
     seeds = range(first_seed, first_seed + runs)
     jobs = list_jobs(studies, seeds)
-    for drawn in (True,) if figures else (True, False):
-        found = _finished(directory, jobs, every, drawn)
-        if found is not None:
-            return found, True
+    stamp = _stamp(jobs)
+    found = _finished(directory, stamp, jobs, figures)
+    if found is not None:
+        return found, True
     console = console or Console(quiet=True)
     workers = workers or os.cpu_count() or 1
     directory.mkdir(parents=True, exist_ok=True)
@@ -113,8 +111,13 @@ def reproduce(
             executor=executor,
             console=console,
         )
-        made = _outcome(experiments, results, runs, first_seed)
-        made["made"] = circumstances(workers)
+        made = {
+            "runs": runs,
+            "first_seed": first_seed,
+            **_outcome(experiments, results, runs),
+            "runs_made": results.made(studies),
+            "made": circumstances(workers),
+        }
         _clear(directory)
         write_atomically(directory / RESULTS, json.dumps(made).encode())
         _write_rows(directory / ROWS, experiments, results)
@@ -123,40 +126,34 @@ def reproduce(
             for each in experiments:
                 with console.status(f"Drawing {each.name}"):
                     plots.save(each, results, directory / _FIGURES)
-            if ANIMATED in every:
+            if any(each.name == ANIMATED for each in experiments):
                 with console.status("Drawing the animation"):
                     plots.write_animation(directory / _FIGURES / ANIMATION)
             write_pages(directory)
-        stamp = {"stamp": _stamp(jobs, figures)}
-        write_atomically(directory / _FINISHED, json.dumps(stamp).encode())
+        files = [path.relative_to(directory).as_posix() for path in _made(directory)]
+        finished = {"stamp": stamp, "files": files}
+        write_atomically(directory / _FINISHED, json.dumps(finished).encode())
     return made, False
 
 
-def _outcome(
-    experiments: Sequence[Experiment], results: Results, runs: int, first_seed: int
-) -> Outcome:
+def _outcome(experiments: Sequence[Experiment], results: Results, runs: int) -> Outcome:
     """Each experiment summed up, and each claim judged."""
-    studies = [study for each in experiments for study in each.everything]
-    return {
-        "runs": runs,
-        "first_seed": first_seed,
-        "experiments": [
-            outcome.summary(
-                *(each, results),
-                "Experiments" if each in thesis.EXPERIMENTS else _AGAINST,
-            )
-            for each in experiments
-        ],
-        "claims": [
-            {
-                **claim.judge(results, runs),
-                "experiments": experiments_of(claim.name),
-                "trials": trials_of(claim.name),
-            }
-            for claim in CLAIMS
-        ],
-        "runs_made": results.made(studies),
-    }
+    summaries = [
+        outcome.summary(
+            *(each, results),
+            "Experiments" if each in thesis.EXPERIMENTS else _AGAINST,
+        )
+        for each in experiments
+    ]
+    claims = [
+        {
+            **claim.judge(results, runs),
+            "experiments": [e.name for e in EXPERIMENTS if claim.name in e.claims],
+            "trials": [e.name for e in EXPERIMENTS if claim.name in e.explains],
+        }
+        for claim in CLAIMS
+    ]
+    return {"experiments": summaries, "claims": claims}
 
 
 def _write_rows(
@@ -233,34 +230,32 @@ def write_pages(directory: Path) -> Path:
     return directory / PAGE
 
 
-def _stamp(jobs: Sequence[Job], figures: bool) -> str:
-    """A hash over all that a folder is made from: runs, and the package's files."""
-    digest = hashlib.sha256(json.dumps([job.key for job in jobs]).encode())
-    digest.update(str(figures).encode())
-    for path in sorted(ROOT.rglob("*")):
-        if path.is_file() and path.parent.name != "__pycache__":
-            digest.update(path.relative_to(ROOT).as_posix().encode())
-            digest.update(path.read_bytes())
-    return digest.hexdigest()
-
-
 def _finished(
-    directory: Path, jobs: Sequence[Job], names: Sequence[str], figures: bool
+    directory: Path, stamp: str, jobs: Sequence[Job], figures: bool
 ) -> Outcome | None:
     """The outcome in a folder if all of it is there, made from this; None otherwise."""
     try:
-        stamp = json.loads((directory / _FINISHED).read_text())["stamp"]
+        known = json.loads((directory / _FINISHED).read_text())
+        complete = (
+            known["stamp"] == stamp
+            and all((directory / file).is_file() for file in known["files"])
+            and (PAGE in known["files"] or not figures)
+        )
         found = read_outcome(directory)
     except (OSError, ValueError, KeyError, TypeError):
         return None
-    files = [directory / ROWS, *(_drawn(directory, names) if figures else [])]
     store = Store(directory / _KEPT_RUNS)
-    complete = (
-        stamp == _stamp(jobs, figures)
-        and all(path.is_file() for path in files)
-        and all(store.has(job) for job in jobs)
-    )
-    return found if complete else None
+    return found if complete and all(store.has(job) for job in jobs) else None
+
+
+def _stamp(jobs: Sequence[Job]) -> str:
+    """A hash over all that a folder is made from: runs, and the package's files."""
+    files = {
+        path.relative_to(ROOT).as_posix(): path.read_bytes().hex()
+        for path in ROOT.rglob("*")
+        if path.is_file() and path.parent.name != "__pycache__"
+    }
+    return hashed([[job.key for job in jobs], files])
 
 
 def _clear(directory: Path) -> None:
@@ -268,16 +263,14 @@ def _clear(directory: Path) -> None:
 
     Runs stay, and pictures that are not of an experiment.
     """
-    old = [directory / _FINISHED, *_drawn(directory, [e.name for e in EXPERIMENTS])]
-    for folder in (directory, directory / _FIGURES):
-        old += folder.glob(".*.tmp")
+    old = [directory / _FINISHED, *_made(directory), *directory.rglob(".*.tmp")]
     for path in old:
         path.unlink(missing_ok=True)
 
 
-def _drawn(directory: Path, names: Sequence[str]) -> list[Path]:
-    """The report, and the figures of experiments."""
-    files = [f"{name}.{kind}" for name in names for kind in ("png", "svg")]
-    files += [ANIMATION] if ANIMATED in names else []
-    pages = [directory / PAGE, directory / CLAIMS_TABLE]
-    return pages + [directory / _FIGURES / file for file in files]
+def _made(directory: Path) -> list[Path]:
+    """The files in a folder that come of results: rows, reports, and figures."""
+    names = {Path(ANIMATION).stem, *(experiment.name for experiment in EXPERIMENTS)}
+    files = [directory / name for name in (ROWS, PAGE, CLAIMS_TABLE)]
+    files += [p for p in (directory / _FIGURES).glob("*.*") if p.stem in names]
+    return [path for path in files if path.is_file()]

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import logging
 import os
-from collections.abc import Iterable, Iterator, Sequence
-from contextlib import closing, contextmanager
+from collections.abc import Iterable, Sequence
+from contextlib import AbstractContextManager, closing
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 from filelock import FileLock, Timeout
 from rich.console import Console
@@ -114,8 +115,7 @@ def list_jobs(studies: Iterable[Study], seeds: Sequence[int]) -> list[Job]:
     return sorted(jobs, key=lambda job: job.study.method != "dqn")
 
 
-@contextmanager
-def alone_in(directory: Path) -> Iterator[None]:
+def alone_in(directory: Path) -> AbstractContextManager[Any]:
     """Hold a lock that the system takes back when this process ends, however it does.
 
     Args:
@@ -124,18 +124,13 @@ def alone_in(directory: Path) -> Iterator[None]:
     Raises:
         FolderInUseError: another one does.
     """
-    lock = FileLock(directory / "running.lock")
     try:
-        lock.acquire(timeout=0)
+        return FileLock(directory / "running.lock").acquire(timeout=0)
     except Timeout as error:
         raise FolderInUseError(
             f"another run works on {directory}; wait for its end, or take another "
             "folder."
         ) from error
-    try:
-        yield
-    finally:
-        lock.release()
 
 
 def _compile_kernels(jobs: list[Job], console: Console) -> None:

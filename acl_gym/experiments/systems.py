@@ -20,6 +20,7 @@ from acl_gym.experiments.study import (
     Task,
 )
 from acl_gym.planning.value_iteration import value_iteration
+from acl_gym.utils.typing import IntArray
 
 # Chapter 3 names no alpha, epsilon, tau_0, T, K.
 _GRID = {
@@ -162,7 +163,15 @@ def optimal_cost(study: Study) -> float | None:
     task = study.task
     if task.env_id == PENDULUM:  # known for omega_max = 9 rad/s
         return None if "omega_max" in task.env else PENDULUM_OPTIMUM
-    if task.env_id not in (GRID_1D, GRID_2D):
-        return None
-    states = task.evaluation_states()[:, 0].astype(np.int64)
-    return float(-value_iteration(task.make_system_env(1)).values[states].mean())
+    return grid_optimum(study) if task.env_id in (GRID_1D, GRID_2D) else None
+
+
+def grid_optimum(study: Study) -> float:
+    """J* of a grid, the mean over the states that are not goals."""
+    values = value_iteration(study.task.make_system_env(1)).values
+    return float(-values[free_states(study)].mean())
+
+
+def free_states(study: Study) -> IntArray:
+    """The states of a grid that are not goals, where evaluations start."""
+    return study.task.evaluation_states()[:, 0].astype(np.int64)

@@ -9,6 +9,7 @@ from dataclasses import replace
 from typing import Any
 
 from acl_gym.experiments.comparison.tasks import (
+    HARDER,
     METHODS,
     PLAIN,
     TABLE_METHODS,
@@ -56,18 +57,9 @@ def _overview() -> Experiment:
         task.label: {method: tuned(name, method) for method in task.methods}
         for name, task in PLAIN.items()
     }
-    text = (
-        "The four systems at a glance; each has a figure of its own below. "
-        f"{_TUNED} {_JUDGED}"
-    )
-    found = _of_rows(
-        "versus",
-        "ACL against reinforcement learning",
-        rows,
-        text,
-        "overview",
-        of="System",
-    )
+    text = "The four systems at a glance; each has a figure of its own below."
+    text, title = f"{text} {_TUNED} {_JUDGED}", "ACL against reinforcement learning"
+    found = _of_rows("versus", title, rows, text, "overview", of="System")
     references = {task.label: task.system.reference() for task in PLAIN.values()}
     return replace(found, references=references)
 
@@ -92,7 +84,7 @@ def _system(name: str) -> Experiment:
 
 
 def _harder(
-    name: str, title: str, tasks: tuple[str, ...], text: str, **options: Any
+    name: str, title: str, tasks: list[str], text: str, **options: Any
 ) -> Experiment:
     rows = {}
     for each in tasks:
@@ -131,17 +123,14 @@ def _slots() -> Experiment:
         }
         for slots in SLOTS
     }
-    text = (
-        "The more slots learn in parallel, the fewer steps one after the other the same "
-        "number of interactions takes. The other settings are those found for 40 x 41 "
-        f"cells. {_JUDGED}"
-    )
     return _of_rows(
         "versus-slots",
         "More slots, the same number of interactions: pendulum",
         rows,
-        text,
-        "slots",
+        "The more slots learn in parallel, the fewer steps one after the other the same "
+        "number of interactions takes. The other settings are those found for 40 x 41 "
+        f"cells. {_JUDGED}",
+        table="slots",
         of="Slots",
         x=SLOTS,
         xlabel="slots",
@@ -178,42 +167,7 @@ def _order() -> Experiment:
 EXPERIMENTS = (
     _overview(),
     *map(_system, PLAIN),
-    _harder(
-        "versus-cells",
-        "Coarse partitions: pendulum",
-        ("pendulum-10x11", "pendulum-16x17", "pendulum-24x25", "pendulum-40x41"),
-        "The same number of interactions with ever more cells.",
-        of="Cells",
-        x=(110, 272, 600, 1640),
-        xlabel="cells",
-    ),
-    _harder(
-        "versus-noise",
-        "Noise",
-        ("grid-p0.7", "grid-p0.5", "pendulum-noise", "pendulum-slips"),
-        "Moves that fail with probability 1 - p; observations with normal noise of 0.1 "
-        "rad and 0.5 rad/s; actions of which every fifth is replaced by one drawn from "
-        "all. Policies are evaluated under the same noise.",
-        of="Task",
-    ),
-    _harder(
-        "versus-partial",
-        "Partial states",
-        ("navigation-hidden", "pendulum-sign"),
-        "The vehicle does not observe its velocity along the second axis; the pendulum "
-        "observes in which direction it turns, but not how fast.",
-        of="Task",
-    ),
-    _harder(
-        "versus-episode-costs",
-        "Costs of whole episodes: pendulum",
-        ("pendulum-settling", "pendulum-switches", "pendulum-peak"),
-        "Settling time to within 0.3 rad and half the overshoot; the time and a half for "
-        "each change of torque; the time and the top speed. ACL learns from these costs; "
-        "no reward per step expresses them, so the others learn from the stage costs or "
-        "from the number of steps, whichever their search found better.",
-        of="Cost",
-    ),
+    *(_harder(f"versus-{name}", **each) for name, each in HARDER.items()),
     _slots(),
     _order(),
 )

@@ -1,15 +1,16 @@
 """The systems and tasks on which methods are compared, and what each method runs with.
 
-All of it is data. A `System` is one of the four systems as `acl-gym compare` runs it, a
-`TunedTask` is a system, as it is or made harder, for which each method was tuned. A
-system more is one entry of `SYSTEMS`, a task more one of `TASKS`, a method more one of
-`METHODS` with its settings in each system. How settings were chosen is in
+All of it is data, in tasks.toml and settings.json. A `System` is one of the four systems
+as `acl-gym compare` runs it, a `TunedTask` is a system, as it is or made harder, for which
+each method was tuned. A system or a task more is one entry of tasks.toml, a method more
+one of `METHODS` with its settings in each system. How settings were chosen is in
 docs/comparison-settings.md and docs/versus.md.
 """
 
 from __future__ import annotations
 
 import json
+import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache
@@ -162,91 +163,25 @@ def _dqn(task: Task, settings: dict[str, Any], steps: int, every: int) -> Study:
     )
 
 
-def _both_ways(*distances: float) -> list[float]:
-    """0, and distances from it in both directions, in order."""
-    return sorted({0.0, *distances, *(-each for each in distances)})
+_READ = tomllib.loads(Path(__file__).with_name("tasks.toml").read_text())
 
-
-# Centres of a position and of a velocity of the navigation, along either axis.
-_COARSE = [_both_ways(0.1, 0.3, 1.0, 2.0, 3.5, 5.0), _both_ways(0.25, 1.0, 2.0)]
-_MEDIUM = [
-    _both_ways(0.1, 0.25, 0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0),
-    _both_ways(0.1, 0.3, 0.7, 1.3, 2.0),
-]
-_FINE = [
-    _both_ways(
-        *(0.08, 0.16, 0.25, 0.4, 0.7, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5, 4.0, 4.5, 5.0)
-    ),
-    _both_ways(0.05, 0.15, 0.4, 0.8, 1.3, 2.0),
-]
-
-_LONG_RUN = {"exploration_fraction": 0.02, "final_learning_rate": 1e-5}
-_Q_ON_PENDULUM = {"learning_rate": 0.3, "discount": 0.98, "epsilon": 0.1}
-_Q_ON_NAVIGATION = {"learning_rate": 0.3, "discount": 0.9, "epsilon": 0.1}
-_Q_ON_GRIDS = {"learning_rate": 0.5, "discount": 1.0, "epsilon": 0.1}
-_ON_GRIDS = {"q": _Q_ON_GRIDS, "q-lambda": {**_Q_ON_GRIDS, "trace_decay": 0.8}}
+_COLONIES = {
+    "pendulum": systems.pendulum("fuzzy"),
+    "navigation": systems.navigation("quadratic", "fuzzy"),
+    "row": systems.grid_1d(),
+    # tabu: the assumption of §3.4.2 that no ant walks in circles.
+    "grid": systems.grid_2d(local_decay=0.01, tabu=True),
+}
 
 SYSTEMS = {
-    "pendulum": System(
-        label="pendulum",
-        colony=systems.pendulum("fuzzy"),
-        settings={
-            "q": _Q_ON_PENDULUM,
-            "q-lambda": {**_Q_ON_PENDULUM, "trace_decay": 0.5},
-            "dqn-long": _LONG_RUN,
-        },
+    name: System(
+        colony=_COLONIES[name],
         budgets={
-            # To see that all of it works; its figures mean nothing.
-            "smoke": Budget(2, 1_200, 400, [100, 101]),
-            "quick": Budget(100, 20_000, 1_000, [400, 401]),
-            "full": Budget(100, 200_000, 2_000, [1600, 1601], "long"),
+            preset: Budget(**each) for preset, each in entry.pop("budgets").items()
         },
-    ),
-    "navigation": System(
-        label="navigation",
-        colony=systems.navigation("quadratic", "fuzzy"),
-        settings={
-            "q": _Q_ON_NAVIGATION,
-            "q-lambda": {**_Q_ON_NAVIGATION, "discount": 0.95, "trace_decay": 0.9},
-            # Bins make the next state uncertain: smaller steps average over it.
-            "q-crisp": {"learning_rate": 0.1, "discount": 0.95},
-            "q-lambda-crisp": {"learning_rate": 0.1},
-            "dqn": {"reward_scale": 1.0},
-            "dqn-long": _LONG_RUN,
-        },
-        budgets={
-            "smoke": Budget(2, 1_200, 600, 2 * _COARSE),
-            "quick": Budget(200, 20_000, 1_000, 2 * _MEDIUM),
-            "full": Budget(200, 200_000, 2_000, 2 * _FINE, "long"),
-        },
-        optimum=False,
-    ),
-    "row": System(
-        label="1-D grid",
-        colony=systems.grid_1d(),
-        settings={
-            **_ON_GRIDS,
-            "dqn": {"max_episode_steps": 50, "learning_starts": 200},
-        },
-        budgets={
-            "smoke": Budget(3, 400, 200),
-            "quick": Budget(100, 4_000, 200),
-            "full": Budget(100, 10_000, 200),
-        },
-        finite=True,
-    ),
-    "grid": System(
-        label="2-D grid",
-        # tabu: the assumption of §3.4.2 that no ant walks in circles.
-        colony=systems.grid_2d(local_decay=0.01, tabu=True),
-        settings={**_ON_GRIDS, "dqn": {"max_episode_steps": 50}},
-        budgets={
-            "smoke": Budget(3, 1_200, 600),
-            "quick": Budget(200, 10_000, 500),
-            "full": Budget(200, 20_000, 500),
-        },
-        finite=True,
-    ),
+        **entry,
+    )
+    for name, entry in _READ["systems"].items()
 }
 """The systems, the default one first."""
 
@@ -272,7 +207,7 @@ class TunedTask:
     label: str
     system: System
     steps: int
-    spacing: float
+    spacing: float = 1.3
     changes: Settings = field(default_factory=dict)
     cells: Any = None
     max_steps: int | None = None
@@ -312,15 +247,12 @@ class TunedTask:
         settings["max_steps"] = self.max_steps or self.system.max_steps
         return {"slots": self.system.colony.slots, "kind": kind, **settings}
 
-    def study(
-        self, method: str, found: Settings, most_runs: int | None = None
-    ) -> Study:
+    def study(self, method: str, found: Settings) -> Study:
         """A method with the settings that a search has found.
 
         Args:
             method: one of `methods`.
             found: what differs from `defaults`.
-            most_runs: see `Study`.
         """
         settings = {**self.defaults(method), **found}
         if method == "dqn":
@@ -339,64 +271,17 @@ class TunedTask:
         )
 
 
-OFTEN, SELDOM = 1.04, 1.3
-"""Spacings of evaluations: where times count, and where only the last policy does."""
-
-
-def _plain(name: str, steps: int, dqn_steps: int, every: int = 500) -> TunedTask:
-    system = SYSTEMS[name]
-    return TunedTask(
-        *(system.label, system, steps, OFTEN), dqn_steps=dqn_steps, evaluate_every=every
-    )
-
-
-def _pendulum(label: str, cells: Any = None, **changes: Any) -> TunedTask:
-    return TunedTask(label, SYSTEMS["pendulum"], 2_000_000, SELDOM, changes, cells)
-
-
-def _slippery(p: float) -> TunedTask:
-    return TunedTask(
-        *(f"2-D grid, p = {p:g}", SYSTEMS["grid"], 1_000_000, SELDOM),
-        changes={"env": {"transition_probability": p}, "repeats": 3},
-        max_steps=systems.grid_2d(p=p).settings["max_steps"],
-    )
-
-
-PLAIN = {
-    "row": _plain("row", 5_000, 3_000, 100),
-    "grid": _plain("grid", 200_000, 10_000, 250),
-    "navigation": _plain("navigation", 2_500_000, 15_000),
-    "pendulum": _plain("pendulum", 2_500_000, 15_000),
-}
-"""The four systems as they are."""
-
 TASKS = {
-    **PLAIN,
-    # Where ACL might win: coarse cells, noise, partial states, costs of whole episodes.
-    "pendulum-10x11": _pendulum("10 x 11 cells", [10, 11]),
-    "pendulum-16x17": _pendulum("16 x 17 cells", [16, 17]),
-    "pendulum-24x25": _pendulum("24 x 25 cells", [24, 25]),
-    "pendulum-40x41": _pendulum("40 x 41 cells"),
-    "grid-p0.7": _slippery(0.7),
-    "grid-p0.5": _slippery(0.5),
-    "pendulum-noise": _pendulum(
-        "pendulum, noisy observations", perturbations={"noise": [0.1, 0.5]}
-    ),
-    "pendulum-slips": _pendulum(
-        "pendulum, slipping actions", perturbations={"slips": 0.2}
-    ),
-    "navigation-hidden": TunedTask(
-        *("navigation, a velocity hidden", SYSTEMS["navigation"], 1_000_000, SELDOM),
-        changes={"perturbations": {"hidden": [3]}},
-    ),
-    "pendulum-sign": _pendulum(
-        "pendulum, the velocity's sign only", [40, 3], perturbations={"rounded": [0, 2]}
-    ),
-    "pendulum-settling": _pendulum("settling time and overshoot", cost="settling"),
-    "pendulum-switches": _pendulum("time and switching", cost="switches"),
-    "pendulum-peak": _pendulum("time and top speed", cost="peak"),
+    name: TunedTask(system=SYSTEMS[entry.pop("system")], **entry)
+    for name, entry in _READ["tasks"].items()
 }
 """All tasks by name."""
+
+HARDER: dict[str, dict[str, Any]] = _READ["harder"]
+"""The experiments on harder tasks, by name; see `experiments.EXPERIMENTS`."""
+
+PLAIN = {name: task for name, task in TASKS.items() if name in SYSTEMS}
+"""The four systems as they are."""
 
 
 @cache

@@ -16,7 +16,7 @@ from acl_gym.experiments.thesis import (
 )
 from acl_gym.experiments.thesis.common import FEWER
 
-__all__ = ["CLAIMS", "EXPERIMENTS", "FEWER", "RUNS", "experiments_of", "trials_of"]
+__all__ = ["CLAIMS", "EXPERIMENTS", "FEWER", "RUNS"]
 
 RUNS = 30
 """Runs of each study, as in the thesis; their seeds are 0 to 29."""
@@ -34,13 +34,3 @@ CLAIMS: tuple[Claim, ...] = (
     *chapter5_claims.CLAIMS,
     *theory.CLAIMS,
 )
-
-
-def experiments_of(claim: str) -> list[str]:
-    """The names of the experiments that decide a claim, such as "C5"."""
-    return [each.name for each in EXPERIMENTS if claim in each.claims]
-
-
-def trials_of(claim: str) -> list[str]:
-    """The names of the experiments that were tried to understand a claim."""
-    return [each.name for each in EXPERIMENTS if claim in each.explains]

@@ -4,17 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from functools import partial
-from typing import Any
 
 import numpy as np
 
-from acl_gym.evaluation import control_env
 from acl_gym.experiments.claims import Part, Tried, settled_from
 from acl_gym.experiments.methods import restore_policy
 from acl_gym.experiments.results import Results
 from acl_gym.experiments.statistics import estimate, rank_correlation, ratio
 from acl_gym.experiments.study import Study
-from acl_gym.experiments.systems import GRID_STATES, grid_1d, grid_2d
+from acl_gym.experiments.systems import (
+    GRID_STATES,
+    free_states,
+    grid_1d,
+    grid_2d,
+    grid_optimum,
+)
 from acl_gym.experiments.thesis import chapter3
 from acl_gym.experiments.thesis.common import LATE, centres, claim, listed, percentages
 from acl_gym.planning.model import TabularModel
@@ -30,21 +34,6 @@ def optimal(results: Results, study: Study) -> BoolArray:
     return np.asarray(results.values(study) <= OPTIMUM_1D + 1e-9)
 
 
-def solved(study: Study) -> tuple[TabularModel, Any, IntArray]:
-    """The model of a grid, its value iteration, and the states that are not goals."""
-    env = study.task.make_system_env(1)
-    model = TabularModel.from_env(env)
-    optimum = value_iteration(model)
-    goals = control_env(env).system.goal_states  # type: ignore[attr-defined]
-    return model, optimum, np.setdiff1d(np.arange(len(optimum.values)), goals)
-
-
-def optimal_cost(study: Study) -> float:
-    """J* of a grid, the mean over the states that are not goals."""
-    _, optimum, free = solved(study)
-    return float(-optimum.values[free].mean())
-
-
 def best_actions(results: Results, study: Study) -> IntArray:
     """The last policy of each run, `(runs, cells)`."""
     runs = results.runs(study)
@@ -53,8 +42,8 @@ def best_actions(results: Results, study: Study) -> IntArray:
 
 def exact_costs(results: Results, study: Study) -> FloatArray:
     """The cost of each run's last policy; infinite if a state never gets to the goal."""
-    model, _, free = solved(study)
-    policies = best_actions(results, study)
+    model = TabularModel.from_env(study.task.make_system_env(1))
+    free, policies = free_states(study), best_actions(results, study)
     return np.array([-policy_value(model, each)[free].mean() for each in policies])
 
 
@@ -93,7 +82,7 @@ def _one_ant(results: Results) -> Tried:
 
 
 def _every_run(results: Results) -> Tried:
-    shortest, found = optimal_cost(grid_2d()), {}
+    shortest, found = grid_optimum(grid_2d()), {}
     for p in chapter3.PROBABILITIES:
         costs = exact_costs(results, grid_2d(p=p))
         near, lost = np.mean(costs * p / shortest <= 1.1), np.isinf(costs).mean()
@@ -105,7 +94,7 @@ def _every_run(results: Results) -> Tried:
 def _costs_with(choice: str, results: Results) -> Tried:
     found = {}
     for p, study in chapter3.CHOICES[choice].items():
-        cost, optimum = estimate(exact_costs(results, study)), optimal_cost(study)
+        cost, optimum = estimate(exact_costs(results, study)), grid_optimum(study)
         found[f"p = {p:g}"] = f"{cost} (optimum {optimum:.2f})"
     return Tried(f"{choice}: cost of the last policy", listed(found))
 
@@ -128,25 +117,21 @@ def _within(share: float, results: Results) -> Tried:
     return Tried(f"median trials until within {share:.0%} of the end", listed(found))
 
 
-@claim("§3.6.3", "rho = 0 never converges.")
+@claim()
 def _c1(results: Results) -> Iterator[Part]:
     late = optimal(results, grid_1d(global_decay=0.0))[:, -LATE:].all(axis=1)
     statement = f"no run keeps J = 5 over the last {LATE} trials"
     yield Part(statement, f"{late.sum()} of {late.size} runs", not late.any())
 
 
-@claim(
-    "§3.6.3", "rho = 0.1 with gamma = 0 converges to the optimum, J = 5, in every run."
-)
+@claim()
 def _c2(results: Results) -> Iterator[Part]:
     late = optimal(results, grid_1d())[:, -LATE:].all(axis=1)
     statement = f"every run keeps J = 5 over the last {LATE} trials"
     yield Part(statement, f"{late.sum()} of {late.size} runs", bool(late.all()))
 
 
-@claim(
-    "§3.6.3", "A large rho (0.9, 1) converges first, and does not settle afterwards."
-)
+@claim()
 def _c3(results: Results) -> Iterator[Part]:
     for rho in (0.9, 1.0):
         reached = optimal(results, grid_1d(global_decay=rho))
@@ -158,15 +143,7 @@ def _c3(results: Results) -> Iterator[Part]:
         yield Part(statement, f"{left:.0%}", bool(left >= 0.5))
 
 
-@claim(
-    "§3.6.4",
-    "gamma = 0 is best; the larger gamma, the worse.",
-    (*(partial(_read_as, each) for each in chapter3.READ_AS), _first_trials),
-    "Up to gamma = 0.1 every value finds the optimum within two or three trials, and "
-    "their order is chance; from 0.2 on a larger gamma is worse, as the thesis says. If "
-    "the local update is made once an ant or once a trial, gamma hardly matters, even at "
-    "0.5.",
-)
+@claim(*[partial(_read_as, each) for each in chapter3.READ_AS], _first_trials)
 def _c4(results: Results) -> Iterator[Part]:
     studies = {gamma: grid_1d(local_decay=gamma) for gamma in (0.0, *chapter3.GAMMAS)}
     # The mean over the trials is low where learning is both fast and good.
@@ -183,14 +160,7 @@ def _c4(results: Results) -> Iterator[Part]:
     yield Part(statement, f"{rank:.2f}", rank >= 0.9)
 
 
-@claim(
-    "§3.6.5",
-    "More ants need fewer trials; 1, 5 and 9 ants all reach the optimum.",
-    (_one_ant,),
-    "A single ant settles on the first path that it finds, because no other ant finds a "
-    "better one. A weaker preference (alpha = 1) or exploration (epsilon = 0.1, a tabu "
-    "list) prevents that; a smaller tau0 or ten times as many trials do not.",
-)
+@claim(_one_ant)
 def _c5(results: Results) -> Iterator[Part]:
     reached = [optimal(results, grid_1d(ants)) for ants in (1, 5, 9)]
     first = [float(np.median(settled_from(each))) for each in reached]
@@ -202,14 +172,9 @@ def _c5(results: Results) -> Iterator[Part]:
     yield Part(statement, percentages(ends), min(ends) >= 0.95)
 
 
-@claim(
-    "§3.6.7",
-    "In the interquartile mean of the runs, the last policy costs about the mean "
-    "shortest path divided by p.",
-    (_every_run, *(partial(_costs_with, choice) for choice in chapter3.CHOICES)),
-)
+@claim(_every_run, *[partial(_costs_with, choice) for choice in chapter3.CHOICES])
 def _c6(results: Results) -> Iterator[Part]:
-    shortest = optimal_cost(grid_2d())
+    shortest = grid_optimum(grid_2d())
     for p in chapter3.PROBABILITIES:
         found = estimate(exact_costs(results, grid_2d(p=p)))
         yield Part(
@@ -220,17 +185,11 @@ def _c6(results: Results) -> Iterator[Part]:
         )
 
 
-@claim(
-    "§3.6.7",
-    "p = 0.5 and p = 0.9 give nearly the same policy.",
-    [partial(_agreement_with, choice) for choice in chapter3.CHOICES],
-    "The policies at two values of p differ no more than those of two runs at one: the "
-    "rest is chance, and cells in which the ants settle on a path that is one step too "
-    "long.",
-)
+@claim(*[partial(_agreement_with, choice) for choice in chapter3.CHOICES])
 def _c7(results: Results) -> Iterator[Part]:
-    _, optimum, free = solved(grid_2d())
-    values = optimum.action_values[free]
+    study = grid_2d()
+    free = free_states(study)
+    values = value_iteration(study.task.make_system_env(1)).action_values[free]
     best = values >= values.max(axis=1, keepdims=True) - 1e-6
     cells = free[best.sum(axis=1) == 1]
     low, high = (best_actions(results, grid_2d(p=p))[:, cells] for p in (0.5, 0.9))
@@ -243,13 +202,7 @@ def _c7(results: Results) -> Iterator[Part]:
     yield Part(statement, measured, between >= within - 0.05)
 
 
-@claim(
-    "§3.6.8",
-    "The number of trials depends on the coverage by ants, and hardly on the size.",
-    (partial(_within, 0.1), partial(_within, 0.25)),
-    "We first took the trial from which on the cost stays within 5% of its end. In many "
-    "runs that is infinite, because single cells lose their path for a trial.",
-)
+@claim(partial(_within, 0.1), partial(_within, 0.25))
 def _c8(results: Results) -> Iterator[Part]:
     trials = {each: trials_to(results, s, 0.05) for each, s in chapter3.COVERED.items()}
     for size in GRID_STATES:

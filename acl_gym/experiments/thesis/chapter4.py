@@ -233,12 +233,7 @@ def _arrivals(results: Results) -> Tried:
     return Tried(what, listed(found))
 
 
-@claim(
-    "§4.5.2",
-    "With the quadratic cost fuzzy ACL converges faster, to a lower cost, and with less "
-    "spread than crisp ACL.",
-    (partial(_other_rule, "quadratic"), _other_shares),
-)
+@claim(partial(_other_rule, "quadratic"), _other_shares)
 def _c9(results: Results) -> Iterator[Part]:
     fuzzy, crisp = late_costs(results, "quadratic")
     fast, slow = trials_of_fall(results, "quadratic")
@@ -251,14 +246,7 @@ def _c9(results: Results) -> Iterator[Part]:
     yield Part(statement, f"{narrow:.3g} against {wide:.3g}", narrow < wide)
 
 
-@claim(
-    "§4.5.2",
-    "The policy variation never reaches zero; the sensitivity falls, and crisp ACL ends "
-    "with the lower one.",
-    [partial(_sensitivities, rule) for rule in RULES],
-    "The sensitivity of fuzzy ACL falls in the first twenty trials, too, and then rises "
-    "again; we have not found out why. The other goal rule changes nothing.",
-)
+@claim(*[partial(_sensitivities, rule) for rule in RULES])
 def _c10(results: Results) -> Iterator[Part]:
     ends = {}
     for kind in FUZZY_FIRST:
@@ -274,11 +262,7 @@ def _c10(results: Results) -> Iterator[Part]:
     yield below_one("crisp ends less sensitive", ends["crisp"], ends["fuzzy"])
 
 
-@claim(
-    "§4.5.2",
-    "The policies of fuzzy ACL cost about as much as that of fuzzy Q-iteration.",
-    (_cheapest,),
-)
+@claim(_cheapest)
 def _c11(results: Results) -> Iterator[Part]:
     cost = results.last(reference("quadratic"))[0]
     found = estimate(late_costs(results, "quadratic")[0] / cost)
@@ -291,19 +275,7 @@ def _c11(results: Results) -> Iterator[Part]:
     yield Part("they cost at most 15% more: the ratio", str(found), found.value <= 1.15)
 
 
-@claim(
-    "§4.5.3",
-    "With the time-spent cost on denser cells fuzzy ACL ends at a lower cost than crisp "
-    "ACL; its best policy arrives from nearly all starts, on paths with hardly more "
-    "damping than those of fuzzy Q-iteration; the best crisp policy fails from some "
-    "corners.",
-    (partial(_other_rule, "time"), _arrivals, _longer_walks),
-    "An ant that does not arrive costs 150 whatever it did, and at first hardly one in a "
-    "hundred arrives, so little tells a good solution from a bad one. The wider goal and "
-    "longer walks in learning help much. Q-learning, which also learns from each step of "
-    "those that do not arrive, gets to 40 with the same slots and cells "
-    "(docs/reproduction.md).",
-)
+@claim(partial(_other_rule, "time"), _arrivals, _longer_walks)
 def _c12(results: Results) -> Iterator[Part]:
     study = navigation("time", "fuzzy")
     fuzzy, crisp, q_iteration = (

@@ -28,14 +28,7 @@ from acl_gym.experiments.thesis.common import (
 )
 
 
-@claim(
-    "§5.3.1",
-    "Crisp ACL does not converge for rho = 0, 0.5 and 1; rho = 0.001 is best; rho = "
-    "0.1 settles at a higher cost.",
-    measures.TRIED_C13,
-    "With rho = 0.1 a hundred trials are too few: the colony is still improving, and "
-    "settles later.",
-)
+@claim(*measures.TRIED_C13)
 def _c13(results: Results) -> Iterator[Part]:
     studies = chapter5.varied("crisp", "rho")
     for rho in (0.0, 0.5, 1.0):
@@ -53,14 +46,7 @@ def _c13(results: Results) -> Iterator[Part]:
     yield above_one("rho = 0.1 ends higher than 0.001", ends[0.1], ends[0.001])
 
 
-@claim(
-    "§5.3.1",
-    "Fuzzy ACL converges for every rho > 0, also for 1.",
-    measures.TRIED_C14,
-    "What swings are single trials whose greedy policy hovers beside the goal "
-    "(docs/hovering.md); the cost between them stays the same. More trials do not end "
-    "that.",
-)
+@claim(*measures.TRIED_C14)
 def _c14(results: Results) -> Iterator[Part]:
     for rho in chapter5.RHOS[1:]:
         study = pendulum("fuzzy", global_decay=rho)
@@ -69,17 +55,7 @@ def _c14(results: Results) -> Iterator[Part]:
         yield Part(statement, measured, converged)
 
 
-@claim(
-    "§5.3.2",
-    "For crisp ACL gamma = 0.1 is clearly best; gamma = 0.5 and 1 do not converge.",
-    measures.TRIED_C15,
-    "Only one change restores the thesis's result: how often the level of a pair "
-    "decays. The local update, eq. (4.12), as it is written decays it at each visit "
-    "of each ant. If it decays once for each ant that has been there, as in the total "
-    "local update, eq. (3.13), where no ant visits a pair twice, gamma = 0.1 is best. "
-    "Other bounds on the velocity, and ants that choose and decay in turn, do not "
-    "change that. We suspect that the thesis's program decayed a pair once an ant.",
-)
+@claim(*measures.TRIED_C15)
 def _c15(results: Results) -> Iterator[Part]:
     studies = chapter5.varied("crisp", "gamma")
     ends = measures.late_costs(results, studies)
@@ -98,13 +74,7 @@ def _c15(results: Results) -> Iterator[Part]:
         yield Part(statement, measured, not converged)
 
 
-@claim(
-    "§5.3.2",
-    "For fuzzy ACL gamma matters little; 0.1 is slightly best.",
-    measures.TRIED_C16,
-    "As for C15: where a pair decays once an ant, or once a trial, gamma matters "
-    "little up to 0.1.",
-)
+@claim(*measures.TRIED_C16)
 def _c16(results: Results) -> Iterator[Part]:
     costs = centres(measures.late_costs(results, chapter5.varied("fuzzy", "gamma")))
     small = [cost for gamma, cost in costs.items() if gamma <= 0.1]
@@ -115,12 +85,7 @@ def _c16(results: Results) -> Iterator[Part]:
     yield Part("of all gamma, 0.1 ends lowest", listed(costs), lowest == 0.1)
 
 
-@claim(
-    "§5.3.3",
-    "More ants are faster (a lower mean cost over the trials) and better (a lower "
-    "cost of the last policies); 250 fuzzy ants are enough, and crisp ACL needs at "
-    "least 1000 ants to come close to them.",
-)
+@claim()
 def _c17(results: Results) -> Iterator[Part]:
     ends = {}
     for kind in FUZZY_FIRST:
@@ -151,15 +116,7 @@ def _c17(results: Results) -> Iterator[Part]:
     )
 
 
-@claim(
-    "§5.3",
-    "From hanging at rest the best fuzzy policy swings up within about 3 s (gamma = "
-    "0.01) and 2 s (gamma = 0.1); the best crisp policies swing more often before.",
-    measures.TRIED_C18,
-    "The best of the policies are as fast as the thesis says, and so is the best "
-    "crisp one with rho = 0.001, which swings more in the thesis; the typical run "
-    "with gamma = 0.1 is slower than in the thesis, see C15.",
-)
+@claim(*measures.TRIED_C18)
 def _c18(results: Results) -> Iterator[Part]:
     turns = []
     for gamma, seconds in ((0.01, 3.0), (0.1, 2.0)):
@@ -184,16 +141,7 @@ def _c18(results: Results) -> Iterator[Part]:
         )
 
 
-@claim(
-    "§5.3.4",
-    "With finer cells crisp ACL gains little past N = 32; fuzzy ACL gains steadily "
-    "and is nearly without spread at N = 64.",
-    measures.TRIED_C19,
-    "Past N = 32 fuzzy ACL has nothing more to gain here, also with as many ants on "
-    "every partition. With the median of the last ten trials, which leaves out single "
-    "trials of hovering policies (docs/hovering.md), a small gain from 32 to 64 "
-    "remains.",
-)
+@claim(*measures.TRIED_C19)
 def _c19(results: Results) -> Iterator[Part]:
     crisp, fuzzy = (
         measures.late_costs(results, chapter5.partitions(k)) for k in ("crisp", "fuzzy")
@@ -213,15 +161,7 @@ def _c19(results: Results) -> Iterator[Part]:
     yield Part(statement, f"{spread:.1%}", spread <= 0.05)
 
 
-@claim(
-    "§5.3",
-    "The fuzzy policy is structured (it destabilises near hanging and stabilises near "
-    "upright), the crisp one is noisy.",
-    measures.TRIED_C20,
-    "The figure of the thesis shows cells from which the pendulum can be caught: "
-    "there the fuzzy policy brakes. Where the pendulum moves away faster than the "
-    "torque can stop it, braking gains nothing.",
-)
+@claim(*measures.TRIED_C20)
 def _c20(results: Results) -> Iterator[Part]:
     fuzzy, crisp = (measures.structure(results, pendulum(kind)) for kind in FUZZY_FIRST)
     statement = "neighbouring cells agree more often in fuzzy than in crisp policies"

@@ -14,7 +14,7 @@ from acl_gym.experiments.methods import restore_policy
 from acl_gym.experiments.results import Results
 from acl_gym.experiments.statistics import estimate
 from acl_gym.experiments.study import Study
-from acl_gym.experiments.systems import pendulum
+from acl_gym.experiments.systems import PENDULUM_OPTIMUM, pendulum
 from acl_gym.experiments.thesis import chapter5, common
 from acl_gym.experiments.thesis.common import (
     KINDS,
@@ -24,9 +24,6 @@ from acl_gym.experiments.thesis.common import (
     sweep,
 )
 from acl_gym.utils.typing import FloatArray
-
-OPTIMUM = 38.5
-"""J* on the evaluation states, by value iteration on fine cells (docs/comparison.md)."""
 
 SETTLED = 0.25
 """A run has settled if its cost swings by at most this share in the last 20 trials."""
@@ -56,7 +53,7 @@ def late_costs(results: Results, studies: Mapping[Any, Study]) -> dict[Any, Floa
 def convergence(results: Results, study: Study) -> tuple[bool, str]:
     """Whether most runs have settled on a good policy, and the figures behind it."""
     costs = results.values(study)
-    good = late_cost(results, study) <= GOOD * OPTIMUM
+    good = late_cost(results, study) <= GOOD * PENDULUM_OPTIMUM
     share = float(((late_swing(costs) <= SETTLED) & good).mean())
     return share > 0.5, f"{share:.0%} of the runs, cost {estimate(costs[:, -1])}"
 
@@ -153,7 +150,7 @@ def _spikes(kind: str, results: Results) -> Tried:
 def _first_below(kind: str, results: Results) -> Tried:
     found = {}
     for rho, costs in _by_rho(kind, results).items():
-        below = np.flatnonzero(costs.mean(axis=0) <= 3 * OPTIMUM)
+        below = np.flatnonzero(costs.mean(axis=0) <= 3 * PENDULUM_OPTIMUM)
         found[rho] = str(below[0] + 1) if below.size else "never"
     what = "the trial at which the mean cost is first at most 3 J*"
     return Tried(what, listed(found))

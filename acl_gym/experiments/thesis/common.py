@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
+from pathlib import Path
 from typing import Any, TypeVar
 
 from acl_gym.experiments.claims import Claim, Part, Tried
@@ -14,6 +16,8 @@ from acl_gym.utils.text import digits
 from acl_gym.utils.typing import FloatArray
 
 T = TypeVar("T")
+
+_WORDS = tomllib.loads(Path(__file__).with_name("claims.toml").read_text())
 
 Attempt = Callable[[Results], Tried]
 Decide = Callable[[Results], Iterator[Part]]
@@ -117,12 +121,10 @@ def above_one(statement: str, first: FloatArray, second: FloatArray) -> Part:
     return Part(statement, str(found), found.low > 1)
 
 
-def claim(
-    section: str, text: str, tried: Iterable[Attempt] = (), understanding: str = ""
-) -> Callable[[Decide], Claim]:
+def claim(*tried: Attempt) -> Callable[[Decide], Claim]:
     """Make a claim, see `claims.Claim`, of a function that yields its statements.
 
-    Its name is that of the function: C1 of `_c1`.
+    Its name is that of the function, C1 of `_c1`, and its words are in claims.toml.
     """
 
     def made(decide: Decide) -> Claim:
@@ -130,6 +132,6 @@ def claim(
             return list(decide(results))
 
         name = decide.__name__.lstrip("_").upper()
-        return Claim(name, text, section, parts, tuple(tried), understanding)
+        return Claim(name=name, decide=parts, tried=tried, **_WORDS[name])
 
     return made

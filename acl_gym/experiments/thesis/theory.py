@@ -96,7 +96,7 @@ def _one_ant() -> list[tuple[float, Study, float]]:
     return found
 
 
-@claim("§3.4.5", "The levels stay between tau0 and the bound of eq. (3.23).")
+@claim()
 def _c21(results: Results) -> Iterator[Part]:
     lowest, highest = math.inf, 0.0
     for study in (*_BAND.values(), *_GAPS.values()):
@@ -121,11 +121,7 @@ def _over_more_trials(results: Results) -> Tried:
     return Tried(what, listed(found))
 
 
-@claim(
-    "§3.4.7",
-    "For one ant the mean level converges to the limit of §3.4.7.",
-    (_over_more_trials,),
-)
+@claim(_over_more_trials)
 def _c22(results: Results) -> Iterator[Part]:
     for gamma, study, limit in _one_ant():
         late = results.values(study, "level_q")[:, -LIMIT:].mean(axis=1)
@@ -152,11 +148,7 @@ def _each_gap(results: Results) -> Tried:
     return Tried("Delta and the runs that keep the optimal action", listed(found, "; "))
 
 
-@claim(
-    "§3.4.8",
-    "Delta > 0 predicts a settled policy on the two-state system of Figure 3.2.",
-    (_each_gap,),
-)
+@claim(_each_gap)
 def _c23(results: Results) -> Iterator[Part]:
     shares = [(gap(each), kept(results, each).mean()) for each in _GAPS.values()]
     positive = [share for delta, share in shares if delta > 0]

@@ -16,8 +16,10 @@ from acl_gym.experiments.methods import restore_policy
 from acl_gym.experiments.results import Results, Run
 from acl_gym.experiments.study import Study
 from acl_gym.experiments.systems import (
+    free_states,
     grid_1d,
     grid_2d,
+    grid_optimum,
     navigation,
     pendulum,
     two_state,
@@ -28,9 +30,7 @@ from acl_gym.experiments.thesis import (
     chapter3_claims,
     chapter4,
     chapter5_measures,
-    experiments_of,
     theory,
-    trials_of,
 )
 from acl_gym.planning.value_iteration import value_iteration
 
@@ -89,7 +89,7 @@ def of(study: Study, table: Any = (0.0,), **measures: Any) -> Results:
 
 @pytest.mark.parametrize("claim", CLAIMS, ids=lambda each: each.name)
 def test_a_claim_is_decided_by_its_own_experiments_alone(claim: Claim) -> None:
-    own = experiments_of(claim.name)
+    own = [each.name for each in EXPERIMENTS if claim.name in each.claims]
     found = claim.judge(results_of(own))
     assert found["verdict"] != "undecided"
     assert json.loads(json.dumps(found)) == found
@@ -99,7 +99,8 @@ def test_a_claim_is_decided_by_its_own_experiments_alone(claim: Claim) -> None:
 
 @pytest.mark.parametrize("claim", CLAIMS, ids=lambda each: each.name)
 def test_what_was_tried_needs_its_experiments(claim: Claim) -> None:
-    own, beside = experiments_of(claim.name), trials_of(claim.name)
+    own = [each.name for each in EXPERIMENTS if claim.name in each.claims]
+    beside = [each.name for each in EXPERIMENTS if claim.name in each.explains]
     everything = [attempt(results_of([*own, *beside])) for attempt in claim.tried]
     assert all(each.what and each.found for each in everything)
     found = claim.judge(results_of(own))
@@ -133,13 +134,15 @@ def test_convergence_on_the_1d_grid(late: list[float], verdicts: Any) -> None:
 
 def test_the_optimal_policy_of_a_grid_costs_the_optimum() -> None:
     study = grid_2d()
-    model, optimum, free = chapter3_claims.solved(study)
-    best = np.eye(model.n_actions)[value_iteration(model).policy.best_actions()]
+    optimum = value_iteration(study.task.make_system_env(1))
+    each_action = np.eye(optimum.action_values.shape[1])
+    best = each_action[optimum.policy.best_actions()]
     costs = chapter3_claims.exact_costs(of(study, best, policy_cost=[1.0]), study)
-    assert costs == pytest.approx([chapter3_claims.optimal_cost(study)])
+    assert costs == pytest.approx([grid_optimum(study)])
     assert costs == pytest.approx([9.99], abs=0.005)
-    assert len(free) == len(optimum.values) - 1
-    lost = np.eye(model.n_actions)[np.zeros(model.n_states, dtype=int)]
+    n_states = len(optimum.values)
+    assert len(free_states(study)) == n_states - 1
+    lost = each_action[np.zeros(n_states, dtype=int)]
     found = chapter3_claims.exact_costs(of(study, lost, policy_cost=[1.0]), study)
     assert found.tolist() == [np.inf]
 

@@ -15,7 +15,7 @@ from acl_gym.experiments.systems import (
     pendulum,
     planned,
 )
-from acl_gym.experiments.thesis import CLAIMS, EXPERIMENTS, RUNS, trials_of
+from acl_gym.experiments.thesis import CLAIMS, EXPERIMENTS, RUNS
 from acl_gym.experiments.thesis.common import FEWER
 
 FIGURES = [
@@ -159,8 +159,3 @@ def test_a_key_is_what_a_study_depends_on() -> None:
     ]
     assert len({study.key, *(each.key for each in others)}) == 1 + len(others)
     assert json.loads(json.dumps(study.inputs))["task"]["env_id"] == study.task.env_id
-
-
-def test_trials_are_found_by_their_claims() -> None:
-    assert trials_of("C15") == ["omega-max", "local-update"]
-    assert trials_of("C1") == []

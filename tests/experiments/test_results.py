@@ -70,7 +70,7 @@ def test_a_long_table_of_all_rows() -> None:
 
 
 def test_runs_that_are_missing() -> None:
-    with pytest.raises(MissingRunsError, match="9 slots, 3 trials.* was not run"):
+    with pytest.raises(MissingRunsError, match=r"9 slots, 3 trials.* was not run"):
         Results({}).runs(STUDY)
 
 

@@ -27,7 +27,6 @@ def write_report(
     figures: Path,
     command: str,
     made: Mapping[str, Any],
-    intro: Sequence[str] = (),
     facts: str = "",
     notes: Sequence[str] = (),
     claims: Sequence[Outcome] = (),
@@ -42,7 +41,6 @@ def write_report(
         figures: the folder of their PNG files; those that are not there are left out.
         command: repeats all of it.
         made: where, when and with what; a value, or a list of them, by name.
-        intro: paragraphs.
         facts: how much was run.
         notes: paragraphs on how it was done.
         claims: judged ones, see `Claim.judge`, with the names of the `experiments`
@@ -55,7 +53,6 @@ def write_report(
         path,
         "report.html.j2",
         title=title,
-        intro=intro,
         facts=facts,
         notes=notes,
         claims=claims,

@@ -101,7 +101,6 @@ def write(folder: Path, *experiments: Outcome, **options: Any) -> str:
             "figures": folder,
             "command": "acl-gym reproduce all",
             "made": {"cpu": "a CPU", "runs, date": ["2026-01-01", "2026-01-02"]},
-            "intro": ["First.", "Second."],
             "facts": "3 runs",
             "notes": ["How it was done."],
             **options,
@@ -147,8 +146,6 @@ def test_the_page_holds_everything(tmp_path: Path, summed: Outcome) -> None:
     for part in (
         *(
             "A report",
-            "First.",
-            "Second.",
             "3 runs",
             "How it was done.",
             "What is tried.",

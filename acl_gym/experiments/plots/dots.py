@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.ticker import NullFormatter
 
 from acl_gym.experiments.comparison.experiments import LABELS
 from acl_gym.experiments.plots.looks import LOOKS, Look, cost_line, look_of
@@ -18,7 +16,12 @@ from acl_gym.experiments.statistics import estimate
 from acl_gym.experiments.study import Experiment, Study
 from acl_gym.experiments.tables import MARKS, reference, summarise
 from acl_gym.plotting import style
-from acl_gym.utils.typing import FloatArray
+from acl_gym.plotting.intervals import (
+    Interval,
+    draw_intervals,
+    draw_pairs,
+    draw_points,
+)
 
 _NARROW = 1.05
 """An axis spans more than this factor, so that nothing looks like much."""
@@ -45,8 +48,10 @@ def draw_strips(
     costs = [results.last(study) for _, study in studies]
     for place, ((look, _), values) in enumerate(zip(studies, costs, strict=True)):
         spread = np.linspace(-0.28, 0.04, len(values)) if len(values) > 1 else [-0.12]
-        _points(ax, place + np.asarray(spread), values, look)
-        _estimates(ax, [place + 0.24], [values], look)
+        draw_points(ax, place + np.asarray(spread), values, look.color, look.marker)
+        draw_intervals(
+            ax, [place + 0.24], [estimate(values)], look.marker, color=look.color
+        )
     low, high = np.min(np.concatenate(costs)), np.max(np.concatenate(costs))
     if high < _NARROW * low:
         ax.set_ylim(low / _NARROW, high * _NARROW)
@@ -64,9 +69,12 @@ def sweep(experiment: Experiment, results: Results) -> Figure:
         # Side by side, so that intervals do not hide each other.
         at = np.array(x) * 1.06 ** (place - (len(names) - 1) / 2)
         costs = [results.last(row[name]) for row in rows.values()]
+        look = LOOKS[name]
         for where, values in zip(at, costs, strict=True):
-            _points(ax, np.full(len(values), where), values, LOOKS[name], marker="_")
-        _estimates(ax, at, costs, LOOKS[name], **LOOKS[name].line)
+            draw_points(ax, np.full(len(values), where), values, look.color, "_")
+        draw_intervals(
+            ax, at, [estimate(each) for each in costs], look.marker, **look.line
+        )
     ax.set_xscale("log")
     ax.set_yscale("log")
     ax.set_xticks(x, labels=list(map(str, x)))
@@ -88,28 +96,13 @@ def order(experiment: Experiment, results: Results) -> Figure:
         low, high = min(x.min(), y.min()), max(x.max(), y.max())
         room = 0.08 * (high - low) or 0.01 * high
         ax.plot([low - room, high + room], [low - room, high + room], **style.BOUND)
-        _points(ax, x, y, look_of(forth), markersize=4, alpha=0.8)
+        look = look_of(forth)
+        draw_points(ax, x, y, look.color, look.marker, markersize=4, alpha=0.8)
         ax.set_aspect("equal")
         ax.set_title(label)
         ax.set_xlabel("cost, slots in order")
     axes[0].set_ylabel("cost, in reverse order")
     return figure
-
-
-def _points(ax: Axes, x: Any, y: FloatArray, look: Look, **options: Any) -> None:
-    """Values of runs, faintly."""
-    options = {"marker": look.marker, "markersize": 2.5, "alpha": 0.45, **options}
-    ax.plot(x, y, linestyle="", color=look.color, **options)
-
-
-def _estimates(
-    ax: Axes, x: Any, costs: list[FloatArray], look: Look, **line: Any
-) -> None:
-    """Interquartile means with their intervals."""
-    value, low, high = np.array([estimate(each) for each in costs]).T
-    ends = np.nan_to_num([value - low, high - value])
-    line = {"color": look.color, "linestyle": "", "linewidth": 1.2, **line}
-    ax.errorbar(x, value, ends, marker=look.marker, **line)
 
 
 def _legend(figure: Figure, experiment: Experiment) -> None:
@@ -135,52 +128,14 @@ def summary(experiment: Experiment, results: Results) -> Figure:
         ("interactions", "env_steps_to_{}", MARKS, close),
     )
     for ax, (title, key, which, names) in zip(axes, panels, strict=True):
-        ax.set_xscale("log")
         ax.set_title(title, pad=21)
-        ax.xaxis.set_minor_formatter(NullFormatter())
-        rows = [
-            (row + shift, entry[key.format(each)], entry["seeds"], color, shift < 0)
-            for row, (entry, color) in enumerate(zip(entries, colors, strict=True))
-            for each, shift in zip(which, (-0.16, 0.16), strict=True)
+        pairs = [
+            [Interval.of(entry[key.format(each)], entry["seeds"]) for each in which]
+            for entry in entries
         ]
-        for y, found, runs, color, hollow in rows:
-            _draw_median(ax, y, found, runs, color, hollow=hollow)
-        end = ax.get_xlim()[1]
-        for y, found, _, color, _ in rows:  # of some runs there is no value
-            if found["low"] is not None and found["high"] is None:
-                ax.plot([found["low"], end], [y, y], color=color)
-                ax.plot(end, y, color=color, marker=">", clip_on=False)
-        ax.set_xlim(right=end)
-        handles = [
-            Line2D([], [], **_marker("0.3", hollow=hollow), label=name)
-            for hollow, name in zip((True, False), names, strict=True)
-        ]
-        style.legend(
-            *(ax, handles), ncols=2, loc="lower left", bbox_to_anchor=(0.0, 1.02),
-            borderpad=0.0, borderaxespad=0.3, handlelength=1.0, handletextpad=0.4,
-        )  # fmt: skip
+        draw_pairs(ax, pairs, colors, names)
     axes[0].set_xlim(left=0.94 * known.cost)
     cost_line(axes[0], known, vertical=True)
     style.plain_log(axes[0].xaxis)
     style.plain_numbers(axes[1].xaxis)
     return figure
-
-
-def _draw_median(
-    ax: Axes, y: float, found: dict[str, Any], runs: int, color: str, *, hollow: bool
-) -> None:
-    """A median and its interval; beside the panel how many runs have a value if few."""
-    if found["low"] is not None and found["high"] is not None:
-        ax.plot([found["low"], found["high"]], [y, y], color=color)
-    if found["median"] is not None:
-        ax.plot(found["median"], y, **_marker(color, hollow=hollow))
-    reached = found.get("reached", runs)
-    if reached < runs:
-        text = f"{reached} of {runs}" if reached else "never"
-        place: Any = {"transform": ax.get_yaxis_transform(), "va": "center"}
-        ax.text(1.02, y, text, fontsize="small", color="0.3", **place)
-
-
-def _marker(color: str, *, hollow: bool) -> dict[str, Any]:
-    look = {"marker": "o", "linestyle": "", "markersize": 5, "markeredgewidth": 1.2}
-    return {"color": color, "markerfacecolor": "white" if hollow else color, **look}

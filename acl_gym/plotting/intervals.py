@@ -97,7 +97,9 @@ def draw_pairs(
         if each.note:
             place: Any = {"transform": ax.get_yaxis_transform(), "va": "center"}
             ax.text(1.02, y, each.note, fontsize="small", color="0.3", **place)
-    end = ax.get_xlim()[1]
+    start, end = ax.get_xlim()
+    if end < 10 * start:  # there may be no power of ten to be labelled
+        style.plain_log(ax.xaxis)
     for y, each, color, _ in shown:
         if each.low is not None and each.high is None:
             ax.plot([each.low, end], [y, y], color=color)

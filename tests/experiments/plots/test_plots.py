@@ -22,13 +22,12 @@ from acl_gym.experiments.plots.looks import in_symbols, look_of
 from acl_gym.experiments.results import Results
 from acl_gym.experiments.study import Experiment, Study
 from acl_gym.plotting.learning import steps_of
-from acl_gym.plotting.style import WIDTH, as_pi
+from acl_gym.plotting.style import WIDTH
 from tests.experiments.synthetic import (
     OPTIMUM,
     TRIALS,
     make_experiment,
     make_results,
-    make_run,
     pendulums,
 )
 
@@ -177,15 +176,6 @@ class TestBands:
 
 
 class TestCurves:
-    def test_steps_begin_where_all_runs_have_a_policy(self) -> None:
-        study = TABLES["ACL, fuzzy"]
-        runs = [make_run(study, 0, [9.0, 5.0, 7.0]), make_run(study, 2, [8.0, 4.0])]
-        at, values = steps_of([run.rows for run in runs], "env_steps")
-        assert at.tolist() == [1014, 2000, 2014, 3000]
-        assert values.tolist() == [[9, 5, 5, 7], [8, 8, 4, 4]]
-        _, best = steps_of([run.rows for run in runs], "env_steps", best_so_far=True)
-        assert best.tolist() == [[9, 5, 5, 5], [8, 8, 4, 4]]
-
     def test_lines_are_medians_and_bands_ranges(self) -> None:
         experiment, results = case("learning_curves")
         ax = drawn("learning_curves").axes[0]
@@ -376,14 +366,6 @@ def test_the_animation_is_a_gif(tmp_path: Path) -> None:
     plots.write_animation(tmp_path / "learning.gif", trials=(0, 1))
     with Image.open(tmp_path / "learning.gif") as image:
         assert image.n_frames > 10
-
-
-@pytest.mark.parametrize(
-    ("halves", "text"),
-    [(0, "0"), (1, "π/2"), (2, "π"), (-1, "−π/2"), (-2, "−π"), (3, "3π/2"), (4, "2π")],
-)
-def test_as_pi(halves: int, text: str) -> None:
-    assert as_pi(halves * math.pi / 2) == text
 
 
 def test_in_symbols() -> None:

@@ -13,6 +13,7 @@ from itertools import islice
 from typing import Any
 
 from loky import ProcessPoolExecutor
+from tqdm import tqdm
 
 from acl_gym.experiments.methods import run as run_study
 from acl_gym.experiments.provenance import circumstances
@@ -99,6 +100,9 @@ def keep(job: Job, run: Run, store: Store, made: dict[str, Any]) -> None:
 def _start_worker(parent: int) -> None:
     # Ctrl-C reaches every process of a terminal; the parent is the one to answer it.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    # The lock that tqdm makes otherwise is one for all processes: when this process is
+    # killed, Python would complain of a leak below the error that is the reason.
+    tqdm.set_lock(threading.RLock())
     threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
 
 

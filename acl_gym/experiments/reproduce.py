@@ -213,8 +213,9 @@ def write_pages(directory: Path) -> Path:
         "interquartile mean over the runs; in a ratio the runs of each setting are drawn "
         "separately."
     )
-    names = {each["name"] for each in found["experiments"]}
-    write_claims(directory / CLAIMS_TABLE, found["claims"], names, facts)
+    names = [each["name"] for each in found["experiments"]]
+    write_claims(directory / CLAIMS_TABLE, found["claims"], set(names), facts)
+    asked_for = "all" if len(names) == len(EXPERIMENTS) else " ".join(names)
     runs_made = {f"runs, {name}": each for name, each in found["runs_made"].items()}
     write_report(
         directory / PAGE,
@@ -224,7 +225,8 @@ def write_pages(directory: Path) -> Path:
         figures=directory / _FIGURES,
         claims=found["claims"],
         animation=ANIMATION,
-        command=f"acl-gym reproduce all --runs {found['runs']}",
+        command=f"acl-gym reproduce {asked_for} --runs {found['runs']} "
+        f"--seed {found['first_seed']}",
         made={**found["made"], **runs_made},
     )
     return directory / PAGE

@@ -54,7 +54,7 @@ def test_an_interrupted_command_says_what_is_kept(
         ([*SMALL, "--cells", "6,7,8"], "cells must be an int or 2 ints"),
         ([*SMALL, "--cells", "six"], "--cells must be whole numbers"),
         ([*SMALL, "--param", "epsilon"], "--param must be name=value, got 'epsilon'"),
-        ([*SMALL, "--param", "speed=1"], "no 'speed'; choose from alpha, "),
+        ([*SMALL, "--param", "speed=1"], "no 'speed'; choose from alpha (> 0), "),
         ([*SMALL, "--param", "seed=1"], "no 'seed'"),
         ([*SMALL, "--param", "epsilon=1.5"], "epsilon must lie in [0, 1]"),
         ([*SMALL, "--param", "epsilon=high"], "epsilon must be a real number"),

@@ -44,6 +44,19 @@ class PartitionPolicy(ABC):
     def n_actions(self) -> int:
         """The number of actions, the columns of the table."""
 
+    @staticmethod
+    def _check_fits(name: str, table: FloatArray, partition: Partition) -> None:
+        """Refuse a table that has not one row per cell: kernels do not check indices.
+
+        Raises:
+            ValueError: the table does not fit the partition.
+        """
+        if table.ndim != 2 or len(table) != partition.n_cells:
+            raise ValueError(
+                f"{name} must have shape ({partition.n_cells}, n_actions), a row for "
+                f"each cell of the partition, got shape {table.shape}."
+            )
+
     @abstractmethod
     def _act(
         self,
@@ -132,16 +145,9 @@ class TablePolicy(PartitionPolicy):
         ranks: RankArray | None = None,
         first_action: int = 0,
     ) -> None:
-        if table.dtype != np.float64 or table.ndim != 2:
-            raise ValueError(
-                f"table must be float64 with two axes, got {table.dtype} with "
-                f"{table.ndim}."
-            )
-        if len(table) != partition.n_cells:
-            raise ValueError(
-                f"table must have {partition.n_cells} rows, one per cell, got "
-                f"{len(table)}."
-            )
+        if table.dtype != np.float64:
+            raise ValueError(f"table must be float64, got {table.dtype}.")
+        self._check_fits("table", table, partition)
         n_cells, n_actions = table.shape
         if ranks is None:
             ranks = random_ranks(n_cells, n_actions, np.random.default_rng(0))
@@ -181,7 +187,7 @@ class TablePolicy(PartitionPolicy):
 
 
 class SoftPolicy(PartitionPolicy):
-    """Actions drawn from the pheromone as the ants draw them (4.11), only steeper.
+    """Actions drawn from the pheromone as ants draw them (4.11), with a larger exponent.
 
     A greedy policy on a coarse table can fall into a cycle beside the goal that it
     never leaves (docs/hovering.md). Drawing in proportion to tau^exponent follows
@@ -196,14 +202,15 @@ class SoftPolicy(PartitionPolicy):
 
     Args:
         partition: turns observations into cells and degrees.
-        levels: pheromone, `(n_cells, n_actions)`; copied.
+        levels: pheromone, `(n_cells, n_actions)`, finite and > 0; copied.
         exponent: > 0; the larger, the closer to the greedy policy.
         seed: of the draws, >= 0; None draws one from the system.
         first_action: the action that column 0 stands for, `Discrete.start`.
 
     Raises:
         TypeError: `seed` is not an integer.
-        ValueError: `exponent` is not > 0 and finite, or `seed` is negative.
+        ValueError: `levels` do not fit the partition or are not all > 0 and finite,
+            `exponent` is not > 0 and finite, or `seed` is negative.
     """
 
     def __init__(
@@ -214,6 +221,10 @@ class SoftPolicy(PartitionPolicy):
         seed: int | None = None,
         first_action: int = 0,
     ) -> None:
+        levels = validation.real_array("levels", levels)
+        self._check_fits("levels", levels, partition)
+        if not (levels > 0.0).all():
+            raise ValueError(f"levels must all be > 0, got {levels.min():g}.")
         exponent = validation.number("exponent", exponent, above=0)
         if seed is not None:
             seed = validation.integer("seed", seed, at_least=0)
@@ -261,7 +272,7 @@ class SoftPolicy(PartitionPolicy):
         )
 
     def _stream(self, drawn: int) -> np.random.Generator:
-        """The generator of the seed after so many numbers have been drawn."""
+        """The generator of the seed, advanced by `drawn` numbers."""
         return np.random.Generator(np.random.PCG64(self._seeds).advance(drawn))
 
 

@@ -146,6 +146,27 @@ def test_soft_policy_refuses_a_bad_seed() -> None:
         SoftPolicy(GRID, np.ones((3, 2)), seed=0.5)  # type: ignore[arg-type]
 
 
+@pytest.mark.parametrize(
+    ("levels", "problem"),
+    [
+        (np.ones((2, 2)), r"shape \(3, n_actions\), a row .* got shape \(2, 2\)"),
+        (np.ones((4, 2)), r"shape \(3, n_actions\), a row .* got shape \(4, 2\)"),
+        (np.ones(3), r"shape \(3, n_actions\), a row .* got shape \(3,\)"),
+        (np.ones((3, 2, 1)), r"shape \(3, n_actions\)"),
+        (np.ones((3, 0)), "an array of finite real numbers"),
+        (np.full((3, 2), np.nan), "an array of finite real numbers"),
+        (np.full((3, 2), np.inf), "an array of finite real numbers"),
+        (np.zeros((3, 2)), "all be > 0, got 0"),
+        (np.array([[1.0, 1.0], [1.0, -2.0], [1.0, 1.0]]), "all be > 0, got -2"),
+    ],
+)
+def test_soft_policy_refuses_levels_that_it_cannot_draw_from(
+    levels: np.ndarray, problem: str
+) -> None:
+    with pytest.raises(ValueError, match=f"^levels must .*{problem}"):
+        SoftPolicy(GRID, levels)
+
+
 def test_colony_hands_out_a_soft_policy_and_learns_on_as_before() -> None:
     env = gym.make_vec("acl_gym/Pendulum-v0", num_envs=20)
     grid = Fuzzy.from_box(env.single_observation_space, (8, 9), circular=[0])

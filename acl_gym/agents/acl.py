@@ -25,7 +25,7 @@ from acl_gym.colony.pheromone import Pheromone, mean_sensitivity
 from acl_gym.colony.schedules import Setting, schedule_from_settings
 from acl_gym.colony.selection import RULES, choose_actions
 from acl_gym.colony.solutions import Solutions
-from acl_gym.colony.update_rule import TrialResult, UpdateRule
+from acl_gym.colony.update_rule import MissingRule, TrialResult, UpdateRule
 from acl_gym.colony.update_rules import (
     as_update,
     update_from_settings,
@@ -154,7 +154,7 @@ class ACL(TabularAgent):
         self._selection = validation.one_of("selection", selection, RULES)
         self.cost = cost
         self.deposit = deposit
-        self.update = update
+        self._update = as_update(update)
         super().__init__(
             env, partition, max_steps=max_steps, seed=seed, n_actions=n_actions
         )
@@ -264,12 +264,19 @@ class ACL(TabularAgent):
 
     @property
     def update(self) -> UpdateRule:
-        """The local and the global update; the colony's own copy of what was set."""
+        """The local and the global update; the colony's own copy of what was set.
+
+        A user's own rule is not saved. Set it again after `load`: a rule of the same
+        class takes over what the saved one remembered.
+        """
         return self._update
 
     @update.setter
     def update(self, value: str | UpdateRule) -> None:
-        self._update = as_update(value)
+        rule = as_update(value)
+        if isinstance(self._update, MissingRule):
+            self._update.hand_over(rule)
+        self._update = rule
 
     @property
     def selection(self) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
 import numpy as np
@@ -136,11 +136,17 @@ class UpdateRule(Savable, ABC):
 class MissingRule(UpdateRule):
     """Stands in for a user's own update rule in an agent read from a file.
 
+    It keeps what that rule remembered, for the rule itself or for the next file.
+
     Attributes:
         name: of the rule's class.
+        kept: what the rule's `memory` gave when the agent was saved.
     """
 
     name: str
+    kept: dict[str, NDArray[Any]] = field(
+        default_factory=dict, init=False, repr=False, compare=False
+    )
 
     def start_trial(self, pheromone: Pheromone, trial: int) -> None:
         """Report which rule is missing.
@@ -158,3 +164,16 @@ class MissingRule(UpdateRule):
 
     def global_update(self, *arguments: Any) -> None:
         """Never called: a trial does not start."""
+
+    def memory(self) -> dict[str, NDArray[Any]]:
+        """What the missing rule remembered."""
+        return self.kept
+
+    def restore(self, memory: dict[str, NDArray[Any]]) -> None:
+        """Keep what the missing rule remembered."""
+        self.kept = memory
+
+    def hand_over(self, rule: UpdateRule) -> None:
+        """Give what is kept to `rule`, if it is of the class that is missing."""
+        if self.kept and type(rule).__qualname__ == self.name:
+            rule.restore(self.kept)

@@ -234,7 +234,39 @@ def test_a_rule_of_ones_own_sees_the_trial(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match=r"the rule 'Counting'.*set agent\.update"):
         restored.learn(trials=1)
     assert restored.parameters() == colony.parameters()
-    restored.update = Counting()
+
+
+def test_a_rule_of_ones_own_is_set_again_and_remembers(tmp_path: Path) -> None:
+    """Saved once more without the rule, a file still holds what it remembered."""
+    colony = ACL(chains(3), ROW, max_steps=2, seed=0, update=Counting())
+    colony.learn(trials=2)
+    own = colony.update
+    assert isinstance(own, Counting)
+    assert own.total > 0.0
+
+    restored = ACL.load(colony.save(tmp_path / "colony"))
+    again = ACL.load(restored.save(tmp_path / "again"), chains(3))
+    again.update = Counting()
+    assert isinstance(again.update, Counting)
+    assert again.update.total == own.total
+    again.learn(trials=1)
+    colony.learn(trials=1)
+    assert again.update.total == own.total
+    np.testing.assert_array_equal(again.table, colony.table)
+
+
+def test_another_rule_does_not_take_over_what_a_missing_one_remembered(
+    tmp_path: Path,
+) -> None:
+    class Other(Counting):
+        pass
+
+    colony = ACL(chains(3), ROW, max_steps=2, seed=0, update=Counting())
+    path = colony.learn(trials=2).save(tmp_path / "colony")
+    restored = ACL.load(path, chains(3))
+    restored.update = Other()
+    assert isinstance(restored.update, Other)
+    assert restored.update.total == 0.0
     assert restored.learn(trials=1).trials == 3
 
 

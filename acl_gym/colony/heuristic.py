@@ -1,4 +1,4 @@
-"""What ants know of an action before anybody has tried it: the heuristic eta."""
+"""Prior knowledge of actions: the heuristic eta."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from acl_gym.partitions import Partition
+from acl_gym.utils import validation
 from acl_gym.utils.typing import FloatArray
 
 Heuristic = ArrayLike | Callable[[Any, Partition], ArrayLike]
@@ -33,7 +34,7 @@ def as_heuristic(
     if heuristic is None:
         return None
     found = heuristic(env, partition) if callable(heuristic) else heuristic
-    eta = np.array(found, dtype=np.float64)
+    eta = validation.real_array("heuristic", found, finite=False, boolean=True)
     if eta.shape != shape:
         raise ValueError(
             f"heuristic must have shape {shape}, a row per cell and a column per "

@@ -103,7 +103,12 @@ def integer(name: str, value: Any, *, at_least: int) -> int:
 
 
 def real_array(
-    name: str, values: Any, *, ndim: int | None = None, finite: bool = True
+    name: str,
+    values: Any,
+    *,
+    ndim: int | None = None,
+    finite: bool = True,
+    boolean: bool = False,
 ) -> NDArray[np.float64]:
     """Return `values` as a new float64 array that is not empty.
 
@@ -114,6 +119,7 @@ def real_array(
         values: the candidate.
         ndim: how many axes it must have; None allows any number.
         finite: refuse NaN and infinity.
+        boolean: accept True and False as 1 and 0.
 
     Raises:
         ValueError: `values` are not such an array.
@@ -123,7 +129,7 @@ def real_array(
     except ValueError:  # ragged
         array = np.empty(0)
     valid = (
-        array.dtype.kind in "iuf"
+        array.dtype.kind in ("iufb" if boolean else "iuf")
         and array.size > 0
         and ndim in (None, array.ndim)
         and (not finite or bool(np.isfinite(array).all()))

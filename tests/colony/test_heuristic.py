@@ -167,8 +167,17 @@ def test_a_heuristic_is_saved_with_the_colony(tmp_path: Path) -> None:
         (-np.eye(6, 2), "cell 0"),
         (np.full((6, 2), np.inf), "cell 0"),
         ([[1, 1]] * 5 + [[np.nan, 1]], "cell 5"),
+        ("x", "an array of real numbers, got 'x'"),
+        ([[1, 1], [1]], "an array of real numbers"),
+        ([], "an array of real numbers"),
     ],
 )
 def test_a_bad_heuristic_is_refused(eta: Any, message: str) -> None:
     with pytest.raises(ValueError, match=f"heuristic must .*{message}"):
         ACL(chains(2), ROW, heuristic=eta)
+
+
+def test_a_heuristic_may_be_of_truth_values() -> None:
+    eta = np.arange(12).reshape(6, 2) % 3 > 0
+    colony = ACL(chains(2), ROW, heuristic=eta)
+    np.testing.assert_array_equal(colony.heuristic, eta.astype(float))

@@ -275,6 +275,30 @@ def _next_allowed(rollout: Rollout, step: Step) -> BoolArray:
     return allowed
 
 
+@njit(cache=True, inline="always")
+def _error(
+    values: FloatArray,
+    index: CellArray,
+    degree: FloatArray,
+    u: int,
+    cost: float,
+    terminated: bool,
+    next_index: CellArray,
+    next_degree: FloatArray,
+    next_allowed: BoolArray,
+    discount: float,
+    j: int,
+) -> float:
+    """The temporal-difference error of slot j: by how much the value of its pair is off."""
+    best = 0.0
+    if not terminated:
+        best = best_value(values, next_index, next_degree, j, next_allowed)
+    error = -cost + discount * best
+    for c in range(index.shape[1]):
+        error -= degree[j, c] * values[index[j, c], u]
+    return error
+
+
 @njit(cache=True)
 def _update(
     values: FloatArray,
@@ -289,19 +313,26 @@ def _update(
     learning_rate: float,
     discount: float,
 ) -> None:
-    """(3.44) for one slot after the other, each on the values as they then are.
+    """Q-learning update, eq. (3.44), slot by slot, each on the values as they then are.
 
     Adding up the slots' corrections instead would overshoot where many slots share a
     cell: with ten slots at a rate of 0.3 it would move by three times the error.
     """
     for j in range(actions.size):
         u = actions[j]
-        best = 0.0
-        if not terminated[j]:
-            best = best_value(values, next_index, next_degree, j, next_allowed)
-        error = -costs[j] + discount * best
-        for c in range(index.shape[1]):
-            error -= degree[j, c] * values[index[j, c], u]
+        error = _error(
+            values,
+            index,
+            degree,
+            u,
+            costs[j],
+            terminated[j],
+            next_index,
+            next_degree,
+            next_allowed,
+            discount,
+            j,
+        )
         for c in range(index.shape[1]):
             values[index[j, c], u] += learning_rate * degree[j, c] * error
 
@@ -329,7 +360,7 @@ def _update_traced(
     count: IntArray,
     mark: FloatArray,
 ) -> None:
-    """(3.45) for one slot after the other, each on the values as they then are.
+    """Q(lambda) update, eq. (3.45), slot by slot, each on the values as they then are.
 
     The degrees of the state are written to `mark`, so that one pass over the slot's
     traces can fade them, merge the state into them, drop the smallest and correct the
@@ -361,12 +392,19 @@ def _update_traced(
     flat = values.reshape(values.size)
     for j in range(actions.size):
         u = actions[j]
-        best = 0.0
-        if not terminated[j]:
-            best = best_value(values, next_index, next_degree, j, next_allowed)
-        error = -costs[j] + discount * best
-        for c in range(index.shape[1]):
-            error -= degree[j, c] * values[index[j, c], u]
+        error = _error(
+            values,
+            index,
+            degree,
+            u,
+            costs[j],
+            terminated[j],
+            next_index,
+            next_degree,
+            next_allowed,
+            discount,
+            j,
+        )
         for c in range(index.shape[1]):
             if degree[j, c] > 0.0:
                 mark[index[j, c] * n_actions + u] = degree[j, c]

@@ -126,12 +126,20 @@ class _Response(Cost):
     variable: int
     target: float
 
+    @property
+    @abstractmethod
+    def period(self) -> float | None:
+        """The period of a circular variable, > 0; else None."""
+
     def __post_init__(self) -> None:
         validation.integer("variable", self.variable, at_least=0)
         validation.number("target", self.target)
+        if self.period is not None:
+            validation.number("period", self.period, above=0)
 
-    def _error(self, episodes: Episodes, period: float | None) -> FloatArray:
+    def _error(self, episodes: Episodes) -> FloatArray:
         """Target less value, `(longest + 1, n)`; circular: to the nearest target."""
+        period = self.period
         values = episodes.variable(self.variable, period)
         target = np.full(len(episodes), self.target)
         if period is not None:
@@ -164,12 +172,10 @@ class RiseTime(_Response):
         validation.number("low", self.low, at_least=0, below=1)
         validation.number("high", self.high, above=self.low, at_most=1)
         validation.number("sampling_time", self.sampling_time, above=0)
-        if self.period is not None:
-            validation.number("period", self.period, above=0)
 
     def __call__(self, episodes: Episodes) -> FloatArray:
         """See `Cost`."""
-        error = self._error(episodes, self.period)
+        error = self._error(episodes)
         span = error[0]
         with np.errstate(divide="ignore", invalid="ignore"):
             progress = np.where(span == 0.0, 1.0, 1.0 - error / span)
@@ -201,12 +207,10 @@ class SettlingTime(_Response):
         super().__post_init__()
         validation.number("tolerance", self.tolerance, above=0)
         validation.number("sampling_time", self.sampling_time, above=0)
-        if self.period is not None:
-            validation.number("period", self.period, above=0)
 
     def __call__(self, episodes: Episodes) -> FloatArray:
         """See `Cost`."""
-        outside = np.abs(self._error(episodes, self.period)) > self.tolerance
+        outside = np.abs(self._error(episodes)) > self.tolerance
         times = np.arange(len(outside))[:, None]
         # The first time of those after which it is inside for good.
         settled = np.max(np.where(outside, times + 1, 0), axis=0)
@@ -217,8 +221,8 @@ class SettlingTime(_Response):
 class Overshoot(_Response):
     """How far the variable goes beyond the target, seen from where it began.
 
-    In units of the variable; 0 without overshoot, so that alone it is no cost to
-    deposit 1 / J for: add another or a constant.
+    In units of the variable; 0 without overshoot, so that it cannot be used alone,
+    because 1 / J would be infinite: add another cost or a constant.
 
     Attributes:
         period: of a circular variable.
@@ -226,14 +230,9 @@ class Overshoot(_Response):
 
     period: float | None = None
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if self.period is not None:
-            validation.number("period", self.period, above=0)
-
     def __call__(self, episodes: Episodes) -> FloatArray:
         """See `Cost`."""
-        error = self._error(episodes, self.period)
+        error = self._error(episodes)
         beyond = -np.sign(error[0]) * error
         return np.asarray(np.max(beyond, axis=0, initial=0.0))
 

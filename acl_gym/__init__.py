@@ -22,6 +22,7 @@ if TYPE_CHECKING:
         PolicyEvaluation,
         TensorBoardLog,
     )
+    from acl_gym.colony.update_rule import UpdateRule
     from acl_gym.envs.wrappers.scaling import ScaledObservation, ScaledVectorObservation
     from acl_gym.envs.wrappers.waiting import WaitingVectorEnv
     from acl_gym.evaluation import PolicyCost, evaluate_policy_cost
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
     from acl_gym.partitions.automatic import automatic_partition
     from acl_gym.planning.q_iteration import fuzzy_q_iteration
     from acl_gym.planning.value_iteration import value_iteration
+    from acl_gym.policies import SoftPolicy
     from acl_gym.sb3.adapter import VectorEnvAdapter
     from acl_gym.utils.threads import get_num_threads, set_num_threads
 
@@ -51,7 +53,9 @@ _PUBLIC = {
     "QLearning": "acl_gym.agents.q_learning",
     "ScaledObservation": "acl_gym.envs.wrappers",
     "ScaledVectorObservation": "acl_gym.envs.wrappers",
+    "SoftPolicy": "acl_gym.policies",
     "TensorBoardLog": "acl_gym.callbacks",
+    "UpdateRule": "acl_gym.colony.update_rule",
     "VectorEnvAdapter": "acl_gym.sb3.adapter",
     "WaitingVectorEnv": "acl_gym.envs.wrappers.waiting",
     "automatic_partition": "acl_gym.partitions.automatic",
@@ -77,7 +81,9 @@ __all__ = [
     "QLearning",
     "ScaledObservation",
     "ScaledVectorObservation",
+    "SoftPolicy",
     "TensorBoardLog",
+    "UpdateRule",
     "VectorEnvAdapter",
     "WaitingVectorEnv",
     "__version__",

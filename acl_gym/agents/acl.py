@@ -35,7 +35,7 @@ from acl_gym.evaluation.rollout import Rollout
 from acl_gym.partitions import Partition
 from acl_gym.policies import SoftPolicy
 from acl_gym.utils import validation
-from acl_gym.utils.parameters import Parameter
+from acl_gym.utils.parameters import Parameter, fixed
 from acl_gym.utils.serialization import to_settings
 from acl_gym.utils.typing import BoolArray, CellArray, FloatArray, IntArray, Row
 
@@ -190,12 +190,12 @@ class ACL(TabularAgent):
         Called again, it continues from the pheromone as it is.
 
         Args:
-            total_timesteps: stop after the trial that reaches so many steps of all
+            total_timesteps: stop after the trial that reaches this many steps of all
                 ants together; None sets no such limit.
             trials: K, how many trials to make; None sets no such limit. Without
                 either limit, 100.
             callback: a `Callback`, a function of `(agent, row)`, or a list of those.
-            log_interval: print a line every so many trials; None prints nothing.
+            log_interval: print a line every `log_interval` trials; None prints nothing.
             progress_bar: show a bar.
 
         Returns:
@@ -283,6 +283,10 @@ class ACL(TabularAgent):
         """The selection rule; fixed once the colony is made."""
         return self._selection
 
+    @selection.setter
+    def selection(self, value: str) -> None:
+        raise fixed("selection", value)
+
     @property
     def _table(self) -> FloatArray:
         return self.pheromone.levels
@@ -330,7 +334,7 @@ class ACL(TabularAgent):
         )
 
     def parameters(self) -> dict[str, Any]:
-        """The keyword arguments of the constructor, but for `heuristic`, an array."""
+        """The keyword arguments of the constructor, except `heuristic`, an array."""
         return {
             "tau0": self.tau0,
             "local_decay": self.local_decay,

@@ -167,7 +167,7 @@ class TabularAgent(PartitionPolicy):
 
     @property
     def rollout(self) -> Rollout:
-        """The slots of the environment, ready to walk."""
+        """The rollout over the environment's slots."""
         if self._rollout is None:
             raise ValueError("the agent has no environment; call set_env(env) first.")
         return self._rollout

@@ -24,12 +24,12 @@ class Training:
 
     Args:
         agent: the agent that learns.
-        total_timesteps: stop after the trial that reaches so many steps of all slots
+        total_timesteps: stop after the trial that reaches this many steps of all slots
             together; None sets no such limit.
-        trials: K, stop after so many trials; None sets no such limit. With neither
+        trials: K, stop after this many trials; None sets no such limit. With neither
             limit, 100 trials.
         callback: see `acl_gym.callbacks`.
-        log_interval: print a line every so many trials; None prints nothing.
+        log_interval: print a line every `log_interval` trials; None prints nothing.
         progress_bar: show a progress bar.
     """
 

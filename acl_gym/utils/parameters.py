@@ -70,10 +70,7 @@ class Parameter:
 
     def __set__(self, instance: Any, value: Any) -> None:
         if self.fixed and self.name in instance.__dict__:
-            raise AttributeError(
-                f"{self.name} is fixed once the agent is made, got {value!r}; make a "
-                f"new agent with {self.name}={value!r}."
-            )
+            raise fixed(self.name, value)
         function = callable(value) and not isinstance(value, type)
         if not (self.scheduled and function):
             value = number(self.name, value, self.range)
@@ -89,6 +86,14 @@ class Parameter:
         if not callable(setting):
             return float(setting)
         return number(f"{self.name} in trial {trial}", setting(trial), self.range)
+
+
+def fixed(name: str, value: Any) -> AttributeError:
+    """The error for setting what only the constructor of an agent sets."""
+    return AttributeError(
+        f"{name} is fixed once the agent is made, got {value!r}; make a new agent with "
+        f"{name}={value!r}."
+    )
 
 
 def parameters_of(kind: type) -> dict[str, Parameter]:

@@ -9,9 +9,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
-from acl_gym.colony.greedy import greedy_actions
+from acl_gym.colony.greedy import NUMBERS_PER_ACTION, greedy_actions
 from acl_gym.colony.pheromone import Pheromone
-from acl_gym.colony.selection import NUMBERS_PER_ACTION, choose_actions
+from acl_gym.colony.selection import choose_actions
 from acl_gym.partitions import Partition
 from acl_gym.utils import validation
 from acl_gym.utils.typing import BoolArray, CellArray, FloatArray, IntArray, RankArray
@@ -125,7 +125,7 @@ class PartitionPolicy(ABC):
 
 
 class TablePolicy(PartitionPolicy):
-    """The action with the largest degree-weighted table entry (4.16).
+    """The greedy policy, eq. (4.16): the action of the largest degree-weighted entry.
 
     Args:
         partition: turns observations into cells and degrees.
@@ -176,7 +176,7 @@ class TablePolicy(PartitionPolicy):
         return greedy_actions(self.table, self.ranks, index, degree, allowed)
 
     def best_actions(self) -> IntArray:
-        """The best column of every cell, `(n_cells,)`, (3.10)."""
+        """The greedy policy, eq. (3.10): the best column of each cell, `(n_cells,)`."""
         return _best_actions(self.table, self.ranks)
 
     def copy(self) -> TablePolicy:
@@ -187,7 +187,7 @@ class TablePolicy(PartitionPolicy):
 
 
 class SoftPolicy(PartitionPolicy):
-    """Actions drawn from the pheromone as ants draw them (4.11), with a larger exponent.
+    """Boltzmann selection, eq. (4.11), as in learning, but with a larger exponent.
 
     A greedy policy on a coarse table can fall into a cycle beside the goal that it
     never leaves (docs/hovering.md). Drawing in proportion to tau^exponent follows

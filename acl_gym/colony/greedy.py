@@ -13,6 +13,9 @@ from acl_gym.utils.typing import BoolArray, CellArray, FloatArray, IntArray, Ran
 ALL: BoolArray = np.empty((0, 0), dtype=np.bool_)
 """What kernels take as `allowed` where every action is allowed."""
 
+NUMBERS_PER_ACTION = 2
+"""How many random numbers the choice of an action takes: a coin and a choice."""
+
 
 def epsilon_greedy_actions(
     table: FloatArray,
@@ -21,15 +24,16 @@ def epsilon_greedy_actions(
     epsilon: float,
     rng: np.random.Generator,
     allowed: BoolArray | None = None,
-    heuristic: FloatArray | None = None,
+    weights: FloatArray | None = None,
 ) -> IntArray:
-    """Rule (3.5) on any table of values, each times `heuristic`; see `choose_actions`."""
-    draws = rng.random((2, index.shape[0]))
+    """Epsilon-greedy selection, eq. (3.5), on any table of values times `weights`.
+
+    See `choose_actions`.
+    """
+    draws = rng.random((NUMBERS_PER_ACTION, index.shape[0]))
     actions = np.empty(index.shape[0], dtype=np.int64)
     any_action = ALL if allowed is None else allowed
-    _epsilon_greedy(
-        table, heuristic, index, degree, draws, epsilon, any_action, actions
-    )
+    _epsilon_greedy(table, weights, index, degree, draws, epsilon, any_action, actions)
     return actions
 
 
@@ -66,7 +70,8 @@ def best_value(
 ) -> float:
     """The largest degree-weighted value that state j offers, over U_q.
 
-    For kernels: the inner part of (3.40), (3.44) and (4.16).
+    For kernels: the maximum in the Bellman equation (3.40), in Q-learning, eq. (3.44),
+    and in the policy, eq. (4.16).
 
     Args:
         table: `(n_cells, n_actions)`.
@@ -116,7 +121,7 @@ def _value(table: FloatArray, cells: CellArray, degrees: FloatArray, u: int) -> 
 @njit(cache=True)
 def _values(
     table: FloatArray,
-    heuristic: FloatArray | None,
+    weights: FloatArray | None,
     cells: CellArray,
     degrees: FloatArray,
     allowed: BoolArray,
@@ -126,23 +131,23 @@ def _values(
     """Write the value of each action of ant j, -inf where it is not allowed."""
     for u in range(values.size):
         values[u] = 0.0 if allowed.size == 0 or allowed[j, u] else -np.inf
-    if heuristic is None:
+    if weights is None:
         for u in range(values.size):
             values[u] += _value(table, cells, degrees, u)
     else:
         for c in range(cells.size):
             cell, counts = cells[c], False
             for u in range(values.size):
-                counts |= values[u] > -np.inf and heuristic[cell, u] > 0.0
+                counts |= values[u] > -np.inf and weights[cell, u] > 0.0
             for u in range(values.size):
-                weight = heuristic[cell, u] if counts else 1.0
+                weight = weights[cell, u] if counts else 1.0
                 values[u] += degrees[c] * table[cell, u] * weight
 
 
 @njit(cache=True)
 def best_action(
     table: FloatArray,
-    heuristic: FloatArray | None,
+    weights: FloatArray | None,
     index: CellArray,
     degree: FloatArray,
     choice: float,
@@ -153,7 +158,7 @@ def best_action(
 
     Args:
         table: `(n_cells, n_actions)`.
-        heuristic: what the table is multiplied by, `(n_cells, n_actions)`; None: 1.
+        weights: what the table is multiplied by, `(n_cells, n_actions)`; None: 1.
             Left out in a cell where it is 0 for all that is allowed.
         index: `(m, k)`.
         degree: `(m, k)`.
@@ -163,7 +168,7 @@ def best_action(
     """
     values = np.empty(table.shape[1])
     cells, degrees = index[j], degree[j]
-    _values(table, heuristic, cells, degrees, allowed, j, values)
+    _values(table, weights, cells, degrees, allowed, j, values)
     best = -np.inf
     for u in range(values.size):
         if values[u] > best:
@@ -202,7 +207,7 @@ def any_action(choice: float, j: int, n_actions: int, allowed: BoolArray) -> int
 @njit(cache=True)
 def _epsilon_greedy(
     levels: FloatArray,
-    heuristic: FloatArray | None,
+    weights: FloatArray | None,
     index: CellArray,
     degree: FloatArray,
     draws: FloatArray,
@@ -215,7 +220,7 @@ def _epsilon_greedy(
             actions[j] = any_action(draws[1, j], j, levels.shape[1], allowed)
         else:
             actions[j] = best_action(
-                levels, heuristic, index, degree, draws[1, j], allowed, j
+                levels, weights, index, degree, draws[1, j], allowed, j
             )
 
 

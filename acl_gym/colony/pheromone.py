@@ -47,7 +47,7 @@ class Pheromone:
         self.stale: BoolArray = np.ones(n_cells, dtype=np.bool_)
         self._heuristic = heuristic
         self._weights: FloatArray | None = None
-        self._roots: FloatArray | None = None
+        self._greedy_weights: FloatArray | None = None
 
     @property
     def alpha(self) -> float:
@@ -58,7 +58,7 @@ class Pheromone:
     def alpha(self, value: float) -> None:
         if value != self._alpha:
             self._alpha = value
-            self._roots = None
+            self._greedy_weights = None
             self.stale[:] = True
 
     @property
@@ -70,7 +70,7 @@ class Pheromone:
     def beta(self, value: float) -> None:
         if value != self._beta:
             self._beta = value
-            self._weights = self._roots = None
+            self._weights = self._greedy_weights = None
             self.stale[:] = True
 
     @property
@@ -81,7 +81,7 @@ class Pheromone:
     @heuristic.setter
     def heuristic(self, value: FloatArray | None) -> None:
         self._heuristic = value
-        self._weights = self._roots = None
+        self._weights = self._greedy_weights = None
         self.stale[:] = True
 
     @property
@@ -95,14 +95,14 @@ class Pheromone:
         return self._weights
 
     @property
-    def roots(self) -> FloatArray | None:
+    def greedy_weights(self) -> FloatArray | None:
         """What tau is multiplied by to find the best action: eta^(beta / alpha).
 
         Each row is divided by its largest, as in `weights`.
         """
-        if self._heuristic is not None and self._roots is None:
-            self._roots = self._scaled_to_the_power(self._beta / self._alpha)
-        return self._roots
+        if self._heuristic is not None and self._greedy_weights is None:
+            self._greedy_weights = self._scaled_to_the_power(self._beta / self._alpha)
+        return self._greedy_weights
 
     def _scaled_to_the_power(self, exponent: float) -> FloatArray:
         eta = np.asarray(self._heuristic)
@@ -133,14 +133,17 @@ class Pheromone:
 def _repair(
     levels: FloatArray,
     alpha: float,
-    heuristic: FloatArray | None,
+    weights: FloatArray | None,
     index: CellArray,
     columns: tuple[int, ...],
     corners: tuple[int, ...],
     probabilities: FloatArray,
     stale: BoolArray,
 ) -> None:
-    """Compute rows of (4.3). Levels are scaled by the largest: no underflow."""
+    """Compute the selection probabilities, eq. (4.3), of the stale cells in `index`.
+
+    Levels are scaled by the largest of their cell: no underflow.
+    """
     n_actions = len(columns) or levels.shape[1]
     whole = int(alpha)
     multiply = whole == alpha and whole <= 8  # cheaper than pow
@@ -150,19 +153,19 @@ def _repair(
             if not stale[cell]:
                 continue
             stale[cell] = False
-            if heuristic is None:
+            if weights is None:
                 largest = levels[cell, 0]
                 for u in range(1, n_actions):
                     largest = max(largest, levels[cell, u])
             else:
                 largest = 0.0
                 for u in range(n_actions):
-                    if heuristic[cell, u] > 0.0:
+                    if weights[cell, u] > 0.0:
                         largest = max(largest, levels[cell, u])
             total = 0.0
             for u in range(n_actions):
                 ratio = levels[cell, u] / largest
-                if heuristic is not None and heuristic[cell, u] == 0.0:
+                if weights is not None and weights[cell, u] == 0.0:
                     ratio = 0.0  # above 1 it could overflow below
                 if multiply:
                     weight = ratio
@@ -170,8 +173,8 @@ def _repair(
                         weight *= ratio
                 else:
                     weight = ratio**alpha
-                if heuristic is not None:
-                    weight *= heuristic[cell, u]
+                if weights is not None:
+                    weight *= weights[cell, u]
                 probabilities[cell, u] = weight
                 total += weight
             for u in range(n_actions):

@@ -11,6 +11,7 @@ from numba import njit, prange
 
 from acl_gym.colony.greedy import (
     ALL,
+    NUMBERS_PER_ACTION,
     any_action,
     best_action,
     epsilon_greedy_actions,
@@ -21,9 +22,6 @@ from acl_gym.utils import threads
 from acl_gym.utils.typing import BoolArray, CellArray, FloatArray, IntArray
 
 RULES = ("boltzmann", "epsilon_greedy", "max_boltzmann")
-
-NUMBERS_PER_ACTION = 2
-"""How many random numbers the choice of an action takes: a coin and a choice."""
 
 
 def choose_actions(
@@ -62,7 +60,13 @@ def choose_actions(
     """
     if rule == "epsilon_greedy":
         return epsilon_greedy_actions(
-            pheromone.levels, index, degree, epsilon, rng, allowed, pheromone.roots
+            pheromone.levels,
+            index,
+            degree,
+            epsilon,
+            rng,
+            allowed,
+            pheromone.greedy_weights,
         )
     draws = rng.random((NUMBERS_PER_ACTION, index.shape[0]))
     actions = np.empty(index.shape[0], dtype=np.int64)
@@ -96,21 +100,25 @@ def choose_actions(
 def _boltzmann_allowed(
     levels: FloatArray,
     alpha: float,
-    heuristic: FloatArray | None,
+    weights: FloatArray | None,
     cells: CellArray,
     degrees: FloatArray,
     allowed: BoolArray,
     choice: float,
 ) -> int:
-    """Draw one ant's action from (4.11), the sums of (4.3) taken over U_q."""
+    """Draw one ant's action by Boltzmann selection, eq. (4.11), among U_q.
+
+    The probabilities, eq. (4.3), are computed anew, with sums over U_q only. Powers are
+    not products as in `Pheromone.repair`, because those are rounded differently.
+    """
     n_actions = allowed.size
     total, weight = np.zeros(n_actions), np.zeros(n_actions)
     for c in range(cells.size):
         cell = cells[c]
         row = levels[cell]
         counts = allowed
-        if heuristic is not None:
-            counts = allowed & (heuristic[cell] > 0.0)
+        if weights is not None:
+            counts = allowed & (weights[cell] > 0.0)
             if not counts.any():
                 counts = allowed
         largest = 0.0
@@ -121,8 +129,8 @@ def _boltzmann_allowed(
         for u in range(n_actions):
             if counts[u]:
                 weight[u] = (row[u] / largest) ** alpha
-                if heuristic is not None and heuristic[cell, u] > 0.0:
-                    weight[u] *= heuristic[cell, u]
+                if weights is not None and weights[cell, u] > 0.0:
+                    weight[u] *= weights[cell, u]
                 share += weight[u]
         for u in range(n_actions):
             if counts[u]:
@@ -142,7 +150,7 @@ def _boltzmann_allowed(
 def _draw_action(
     levels: FloatArray,
     alpha: float,
-    heuristic: FloatArray | None,
+    weights: FloatArray | None,
     probabilities: FloatArray,
     index: CellArray,
     degree: FloatArray,
@@ -160,7 +168,7 @@ def _draw_action(
         if coin < epsilon:
             return any_action(choice, j, n_actions, allowed)
         return _boltzmann_allowed(
-            levels, alpha, heuristic, index[j], degree[j], allowed[j], choice
+            levels, alpha, weights, index[j], degree[j], allowed[j], choice
         )
     # Invert the distribution (4.11). Rounding may leave its sum below 1, so the last
     # action takes what is left. Counting the sums that are passed needs no branch,
@@ -181,7 +189,7 @@ def _draw_action(
 def _boltzmann(
     levels: FloatArray,
     alpha: float,
-    heuristic: FloatArray | None,
+    weights: FloatArray | None,
     probabilities: FloatArray,
     index: CellArray,
     degree: FloatArray,
@@ -196,7 +204,7 @@ def _boltzmann(
         actions[j] = _draw_action(
             levels,
             alpha,
-            heuristic,
+            weights,
             probabilities,
             index,
             degree,
@@ -213,7 +221,7 @@ def _boltzmann(
 def _boltzmann_in_parallel(
     levels: FloatArray,
     alpha: float,
-    heuristic: FloatArray | None,
+    weights: FloatArray | None,
     probabilities: FloatArray,
     index: CellArray,
     degree: FloatArray,
@@ -229,7 +237,7 @@ def _boltzmann_in_parallel(
         actions[j] = _draw_action(
             levels,
             alpha,
-            heuristic,
+            weights,
             probabilities,
             index,
             degree,
@@ -246,7 +254,7 @@ def _boltzmann_in_parallel(
 def choose_alone(
     levels: FloatArray,
     alpha: float,
-    heuristic: FloatArray | None,
+    weights: FloatArray | None,
     index: CellArray,
     degree: FloatArray,
     draws: FloatArray,
@@ -263,12 +271,14 @@ def choose_alone(
     Args:
         levels: `(n_cells, n_actions)`.
         alpha: exponent of the levels.
-        heuristic: `Pheromone.weights`, `Pheromone.roots` if `greedy`; None: eta = 1.
+        weights: `Pheromone.weights`, or `Pheromone.greedy_weights` if `greedy`; None:
+            1 everywhere.
         index: `(m, k)`.
         degree: `(m, k)`.
         draws: the ants' coins and choices, `(2, m)`.
         epsilon: exploration probability.
-        greedy: by rule (3.5); else by (3.6).
+        greedy: epsilon-greedy selection, eq. (3.5); else Boltzmann selection with
+            exploration, eq. (3.6).
         allowed: U_q, `(m, n_actions)`; an empty array where every action is allowed.
         j: which of the m ants.
     """
@@ -277,8 +287,6 @@ def choose_alone(
     if coin < epsilon:
         return any_action(choice, j, n_actions, allowed)
     if greedy:
-        return best_action(levels, heuristic, index, degree, choice, allowed, j)
+        return best_action(levels, weights, index, degree, choice, allowed, j)
     own = allowed[j] if allowed.size > 0 else np.ones(n_actions, dtype=np.bool_)
-    return _boltzmann_allowed(
-        levels, alpha, heuristic, index[j], degree[j], own, choice
-    )
+    return _boltzmann_allowed(levels, alpha, weights, index[j], degree[j], own, choice)

@@ -10,10 +10,27 @@ from acl_gym.utils.typing import ActionArray, BoolArray, CellArray, FloatArray, 
 
 
 @njit(cache=True, inline="always")
-def _decayed(level: float, decay: float, tau0: float) -> float:
-    """(4.17): written around tau0, so that a level at tau0 stays there exactly."""
+def _decayed(level: float, kept: float, tau0: float) -> float:
+    """Decay towards tau0, eq. (4.17), where the fraction `kept` of the excess stays.
+
+    Written so that a level at tau0 stays there exactly.
+    """
     excess = level - tau0
-    return tau0 + (1.0 - decay) * excess
+    return tau0 + kept * excess
+
+
+@njit(cache=True, inline="always")
+def _decay_pair(
+    levels: FloatArray,
+    cell: int | np.uint64,
+    action: int | np.uint64,
+    decay: float,
+    tau0: float,
+    stale: BoolArray,
+) -> None:
+    """Local update of one pair, eq. (4.12), with `decay` = gamma * degree."""
+    levels[cell, action] = _decayed(levels[cell, action], 1.0 - decay, tau0)
+    stale[cell] = True
 
 
 @njit(cache=True)
@@ -27,24 +44,23 @@ def decay(
     levels: FloatArray,
     stale: BoolArray,
 ) -> None:
-    """Local update (4.12): every ant's pair decays with (1 - gamma beta)."""
+    """Local update, eq. (4.12): every ant's pair decays by 1 - gamma * degree."""
     for j in range(actions.size):
         action = np.uint64(actions[j])
         for c in range(len(corners) or index.shape[1]):
             if degree[j, c] > 0.0:
                 cell = np.uint64(index[j, c])
-                levels[cell, action] = _decayed(
-                    levels[cell, action], local_decay * degree[j, c], tau0
+                _decay_pair(
+                    levels, cell, action, local_decay * degree[j, c], tau0, stale
                 )
-                stale[cell] = True
 
 
-# Columns of what ants have laid on a pair, side by side because they are used together.
+# Columns of the deposits on a pair, side by side because they are used together.
 _LAST, _DUE, _TOTAL, _LARGEST = range(4)
 
 
 @njit(cache=True)
-def lay(
+def sum_deposits(
     index: CellArray,
     degree: FloatArray,
     corners: tuple[int, ...],
@@ -52,17 +68,18 @@ def lay(
     ends: IntArray,
     first: int,
     deposits: FloatArray,
-    laid: FloatArray,
+    summed: FloatArray,
     touched: IntArray,
     n_touched: int,
     n_actions: int,
 ) -> int:
-    """Sum up what some ants lay on the pairs that they visited, (4.14) and (4.15).
+    """Sum the deposits of some ants on each pair, for the global update, eq. (4.15).
 
-    Within a solution a pair counts with its largest degree (4.13). So what an ant lays
-    on it stays due, and may grow, until another ant visits the pair; then it is added
-    to the total. That takes one look at each visit and no list of the pairs of one
-    ant. Written without a branch, which the processor could not predict.
+    Within a solution a pair counts with its largest degree, eq. (4.13). So the deposit
+    of an ant stays due, and may grow, until another ant visits the pair; then it is
+    added to the total. The decay of the pair needs the largest degree over all ants,
+    eq. (4.14). That takes one look at each visit and no list of the pairs of one ant.
+    Written without a branch, which the processor could not predict.
 
     Args:
         index: cells, the rows of one ant after those of the one before, `(r, k)`.
@@ -71,8 +88,8 @@ def lay(
         action: actions, `(r,)`.
         ends: where the rows of each ant end, `(b,)`.
         first: the number of the first of these ants.
-        deposits: what each ant lays, `(b,)`, > 0.
-        laid: for each pair the last ant that visited it, what is due from that ant,
+        deposits: the deposit of each ant, `(b,)`, > 0.
+        summed: for each pair the last ant that visited it, what is due from that ant,
             the total of those before it, the largest degree so far. Added to; all
             columns but the first are zero before the first call.
         touched: the pairs visited so far with a degree > 0, and room for one more;
@@ -92,12 +109,12 @@ def lay(
             for c in range(len(corners) or index.shape[1]):
                 pair = np.uint64(index[row, c]) * width + u
                 weight = degree[row, c]
-                new = laid[pair, _LAST] != ant
-                due, largest = laid[pair, _DUE], laid[pair, _LARGEST]
-                laid[pair, _LAST] = ant
-                laid[pair, _TOTAL] += due if new else 0.0
-                laid[pair, _DUE] = max(0.0 if new else due, deposit * weight)
-                laid[pair, _LARGEST] = max(largest, weight)
+                new = summed[pair, _LAST] != ant
+                due, largest = summed[pair, _DUE], summed[pair, _LARGEST]
+                summed[pair, _LAST] = ant
+                summed[pair, _TOTAL] += due if new else 0.0
+                summed[pair, _DUE] = max(0.0 if new else due, deposit * weight)
+                summed[pair, _LARGEST] = max(largest, weight)
                 touched[count] = pair
                 count += np.uint64((largest == 0.0) & (weight > 0.0))
             row += np.uint64(1)
@@ -107,27 +124,30 @@ def lay(
 @njit(cache=True)
 def reinforce(
     touched: IntArray,
-    laid: FloatArray,
+    summed: FloatArray,
     global_decay: float,
     levels: FloatArray,
     stale: BoolArray,
 ) -> None:
-    """Global update (4.15) of the touched pairs; clears all columns of `laid` but one."""
+    """Global update, eq. (4.15), of the touched pairs.
+
+    Resets all but the first column of `summed`.
+    """
     n_actions = levels.shape[1]
     for pair in touched:
         cell, u = pair // n_actions, pair % n_actions
-        deposit = laid[pair, _TOTAL] + laid[pair, _DUE]
-        kept = (1.0 - global_decay * laid[pair, _LARGEST]) * levels[cell, u]
+        deposit = summed[pair, _TOTAL] + summed[pair, _DUE]
+        kept = (1.0 - global_decay * summed[pair, _LARGEST]) * levels[cell, u]
         levels[cell, u] = kept + global_decay * deposit
         stale[cell] = True
-        laid[pair, 1:] = 0.0
+        summed[pair, 1:] = 0.0
 
 
 @njit(cache=True, error_model="numpy")
 def choose_and_decay(
     levels: FloatArray,
     alpha: float,
-    heuristic: FloatArray | None,
+    weights: FloatArray | None,
     index: CellArray,
     degree: FloatArray,
     draws: FloatArray,
@@ -139,18 +159,16 @@ def choose_and_decay(
     stale: BoolArray,
     actions: IntArray,
 ) -> None:
-    """Let one ant after the other choose and then decay its pair by (4.12)."""
+    """Let ants choose one by one, each followed by its local update, eq. (4.12)."""
     for j in range(actions.size):
         action = choose_alone(
-            levels, alpha, heuristic, index, degree, draws, epsilon, greedy, allowed, j
+            levels, alpha, weights, index, degree, draws, epsilon, greedy, allowed, j
         )
         actions[j] = action
         for c in range(index.shape[1]):
-            cell = index[j, c]
-            levels[cell, action] = _decayed(
-                levels[cell, action], local_decay * degree[j, c], tau0
+            _decay_pair(
+                levels, index[j, c], action, local_decay * degree[j, c], tau0, stale
             )
-            stale[cell] = True
 
 
 # Columns of the largest degrees on a pair: of the last ant, and of all ants.
@@ -208,7 +226,10 @@ def decay_late(
     tau0: float,
     levels: FloatArray,
 ) -> None:
-    """Decay all pairs once after a trial: once for each visitor (3.13), or once.
+    """Decay all pairs after a trial.
+
+    Once for each ant that visited a pair, the total local update, eq. (3.13), or once
+    for all ants together.
 
     Args:
         visits: as `note_visits` left it.
@@ -225,4 +246,4 @@ def decay_late(
         else:
             left = 1.0 - local_decay * visits[pair, _OF_ALL]
         cell, u = pair // n_actions, pair % n_actions
-        levels[cell, u] = left * (levels[cell, u] - tau0) + tau0
+        levels[cell, u] = _decayed(levels[cell, u], left, tau0)

@@ -1,4 +1,4 @@
-"""The update rules that a colony can be asked to follow by name.
+"""The named update rules.
 
 In the thesis all ants choose on the same pheromone, every visited pair decays at each
 visit, and ants deposit at the end of the trial (a decision). Algorithms 3.1 to 4.2 can
@@ -14,16 +14,16 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from acl_gym.colony.greedy import ALL
+from acl_gym.colony.greedy import ALL, NUMBERS_PER_ACTION
 from acl_gym.colony.pheromone import Pheromone
 from acl_gym.colony.solutions import Solutions
 from acl_gym.colony.update_kernels import (
     choose_and_decay,
     decay,
     decay_late,
-    lay,
     note_visits,
     reinforce,
+    sum_deposits,
 )
 from acl_gym.colony.update_rule import MissingRule, TrialResult, UpdateRule
 from acl_gym.partitions.kernels import written_out
@@ -40,7 +40,7 @@ class Reinforcement:
     """
 
     def __init__(self, n_pairs: int) -> None:
-        self._laid: FloatArray = np.zeros((n_pairs, 4))
+        self._summed: FloatArray = np.zeros((n_pairs, 4))
         self._touched: IntArray = np.empty(n_pairs + 1, dtype=np.int64)
         self._interrupted = False  # an update that did not end left the scratch dirty
 
@@ -62,11 +62,11 @@ class Reinforcement:
         """
         _check_deposits(deposits)
         if self._interrupted:
-            self._laid[:] = 0.0
+            self._summed[:] = 0.0
         self._interrupted = True
         n_touched = 0
         for block in solutions.blocks():
-            n_touched = lay(
+            n_touched = sum_deposits(
                 block.index,
                 block.degree,
                 written_out(block.index.shape[1]),
@@ -74,13 +74,15 @@ class Reinforcement:
                 block.ends,
                 block.ants.start,
                 deposits[block.ants],
-                self._laid,
+                self._summed,
                 self._touched,
                 n_touched,
                 pheromone.n_actions,
             )
         touched = self._touched[:n_touched]
-        reinforce(touched, self._laid, global_decay, pheromone.levels, pheromone.stale)
+        reinforce(
+            touched, self._summed, global_decay, pheromone.levels, pheromone.stale
+        )
         self._interrupted = False
 
 
@@ -96,8 +98,8 @@ def _check_deposits(deposits: FloatArray) -> None:
         )
 
 
-class _Thesis(UpdateRule):
-    """The global update of the thesis, eq. (4.15), which its readings share."""
+class _DepositAtEnd(UpdateRule):
+    """The deposit at the end of a trial, eq. (4.15), which the named rules share."""
 
     _reinforcement: Reinforcement | None = None
 
@@ -115,10 +117,10 @@ class _Thesis(UpdateRule):
 
 
 @dataclass
-class EachVisit(_Thesis):
+class EachVisit(_DepositAtEnd):
     """The thesis's rule: a pair decays at each visit, after all ants have chosen.
 
-    Several ants on one pair multiply their factors (4.18), in any order.
+    Several ants on one pair multiply their factors, eq. (4.18), in any order.
     """
 
     def local_update(
@@ -144,11 +146,12 @@ class EachVisit(_Thesis):
 
 
 @dataclass
-class InTurn(_Thesis):
+class InTurn(_DepositAtEnd):
     """Each ant in turn chooses and decays its pair before the next one chooses.
 
     Later ants of a step see what earlier ones have left, so the order of the ants
-    matters, and predictions, which change nothing, choose on the table as it is.
+    matters: the ants of a step are computed sequentially, which is slower than with
+    the other rules. Predictions, which change nothing, choose on the table as it is.
     """
 
     def choose(
@@ -168,10 +171,10 @@ class InTurn(_Thesis):
         choose_and_decay(
             pheromone.levels,
             pheromone.alpha,
-            pheromone.roots if greedy else pheromone.weights,
+            pheromone.greedy_weights if greedy else pheromone.weights,
             index,
             degree,
-            rng.random((2, index.shape[0])),
+            rng.random((NUMBERS_PER_ACTION, index.shape[0])),
             0.0 if selection == "boltzmann" else epsilon,
             greedy,
             ALL if allowed is None else allowed,
@@ -193,7 +196,7 @@ class InTurn(_Thesis):
         """Do nothing: the pairs decayed when the ants chose."""
 
 
-class _AtTheEnd(_Thesis):
+class _AtTheEnd(_DepositAtEnd):
     """Pairs decay at the end of the trial, before the deposit, not on the way."""
 
     _each_ant: ClassVar[bool]
@@ -245,7 +248,7 @@ class _AtTheEnd(_Thesis):
 
 @dataclass
 class OncePerAnt(_AtTheEnd):
-    """A pair decays once for each ant that visited it, the total update (3.13).
+    """A pair decays once for each ant that visited it, the total local update, eq. (3.13).
 
     An ant that visits a pair several times counts with its largest degree.
     """
@@ -260,13 +263,13 @@ class OncePerTrial(_AtTheEnd):
     _each_ant = False
 
 
-NAMED: dict[str, UpdateRule] = {
+UPDATE_RULES: dict[str, UpdateRule] = {
     "each_visit": EachVisit(),
     "in_turn": InTurn(),
     "once_per_ant": OncePerAnt(),
     "once_per_trial": OncePerTrial(),
 }
-"""The update rules that can be asked for by name."""
+"""The update rules by name."""
 
 
 def as_update(update: str | UpdateRule) -> UpdateRule:
@@ -277,20 +280,20 @@ def as_update(update: str | UpdateRule) -> UpdateRule:
         TypeError: it is neither a name nor an `UpdateRule`.
     """
     if isinstance(update, str):
-        update = NAMED[validation.one_of("update", update, NAMED)]
+        update = UPDATE_RULES[validation.one_of("update", update, UPDATE_RULES)]
     if not isinstance(update, UpdateRule):
         raise TypeError(
-            f"update must be one of {', '.join(map(repr, NAMED))} or an UpdateRule, "
+            f"update must be one of {', '.join(map(repr, UPDATE_RULES))} or an UpdateRule, "
             f"got {update!r}."
         )
     return copy.deepcopy(update)
 
 
 def update_to_settings(rule: UpdateRule) -> Any:
-    """What a file holds of a rule: its settings, or the name of a user's own class."""
+    """The saved form of a rule: its settings, or the name of a user's own class."""
     if isinstance(rule, MissingRule):
         return {"type": "function", "name": rule.name}
-    if type(rule) not in map(type, NAMED.values()):
+    if type(rule) not in map(type, UPDATE_RULES.values()):
         return {"type": "function", "name": type(rule).__qualname__}
     return to_settings(rule)
 
@@ -303,7 +306,9 @@ def update_from_settings(settings: Any) -> UpdateRule:
     """
     if isinstance(settings, dict) and settings.get("type") == "function":
         return MissingRule(str(settings.get("name")))
-    rule = from_settings("update", settings, [type(each) for each in NAMED.values()])
+    rule = from_settings(
+        "update", settings, [type(each) for each in UPDATE_RULES.values()]
+    )
     if not isinstance(rule, UpdateRule):
         raise ValueError(f"update must be an UpdateRule, got {settings!r:.200}.")
     return rule

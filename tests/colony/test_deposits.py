@@ -1,4 +1,4 @@
-"""What ants lay for a cost: against definitions, and what is refused."""
+"""What ants deposit for a cost: against definitions, and what is refused."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def test_a_cost_that_cannot_be_inverted_is_refused(cost: float) -> None:
 
 
 @given(Costs)
-def test_the_return_lays_more_than_tau0(costs: np.ndarray) -> None:
+def test_the_return_deposits_more_than_tau0(costs: np.ndarray) -> None:
     costs = -np.abs(costs)
     np.testing.assert_allclose(Return()(costs, 0.5), [0.5 - cost for cost in costs])
 

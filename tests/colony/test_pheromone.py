@@ -361,10 +361,10 @@ def test_kernels_agree_with_themselves_as_plain_python(trial: Trial) -> None:
         ("__call__", levels, stale),
         ("py_func", again, stale_again),
     ):
-        laid = np.zeros((table.size, 4))
+        summed = np.zeros((table.size, 4))
         touched = np.empty(table.size + 1, dtype=np.int64)
         n_touched.append(
-            getattr(update_kernels.lay, name)(
+            getattr(update_kernels.sum_deposits, name)(
                 block.index,
                 block.degree,
                 corners,
@@ -372,15 +372,15 @@ def test_kernels_agree_with_themselves_as_plain_python(trial: Trial) -> None:
                 block.ends,
                 0,
                 1.0 / trial.costs,
-                laid,
+                summed,
                 touched,
                 0,
                 table.shape[1],
             )
         )
         kernel = getattr(update_kernels.reinforce, name)
-        kernel(touched[: n_touched[-1]], laid, trial.rho, table, flags)
-        assert not laid[:, 1:].any()
+        kernel(touched[: n_touched[-1]], summed, trial.rho, table, flags)
+        assert not summed[:, 1:].any()
     assert n_touched[0] == n_touched[1]
     np.testing.assert_allclose(levels, again, rtol=1e-14)
     np.testing.assert_array_equal(stale, stale_again)

@@ -17,7 +17,7 @@ from acl_gym.colony.pheromone import Pheromone
 from acl_gym.colony.selection import RULES
 from acl_gym.colony.update_rule import TrialResult, UpdateRule
 from acl_gym.colony.update_rules import (
-    NAMED,
+    UPDATE_RULES,
     EachVisit,
     InTurn,
     OncePerAnt,
@@ -137,15 +137,15 @@ def test_in_turn_is_choosing_and_decaying_ant_by_ant(
 @pytest.mark.parametrize("kind", [Fuzzy, Crisp])
 def test_rules_differ_in_the_local_update_only(kind: type) -> None:
     """Without local decay all are one; with it no two are alike."""
-    for gamma, distinct in ((0.0, 1), (0.2, len(NAMED))):
+    for gamma, distinct in ((0.0, 1), (0.2, len(UPDATE_RULES))):
         tables = [
             pendulum_colony(kind, local_decay=gamma, update=name).learn(trials=3).table
-            for name in NAMED
+            for name in UPDATE_RULES
         ]
         assert len({np.round(table, 12).tobytes() for table in tables}) == distinct
 
 
-@pytest.mark.parametrize("update", NAMED)
+@pytest.mark.parametrize("update", UPDATE_RULES)
 @pytest.mark.parametrize("selection", RULES)
 def test_predictions_change_nothing(update: str, selection: str) -> None:
     """Predicting, evaluating and drawing softly leave the run as it would have been."""
@@ -167,12 +167,12 @@ def test_predictions_change_nothing(update: str, selection: str) -> None:
         np.testing.assert_array_equal(asked.table, quiet.table)
 
 
-@pytest.mark.parametrize("update", NAMED)
+@pytest.mark.parametrize("update", UPDATE_RULES)
 def test_a_rule_is_saved_by_its_name(update: str, tmp_path: Path) -> None:
     whole = pendulum_colony(update=update).learn(trials=4)
-    first = pendulum_colony(update=NAMED[update]).learn(trials=2)
+    first = pendulum_colony(update=UPDATE_RULES[update]).learn(trials=2)
     again = ACL.load(first.save(tmp_path / "colony"), first.env)
-    assert again.update == NAMED[update]
+    assert again.update == UPDATE_RULES[update]
     assert again.parameters() == whole.parameters()
     np.testing.assert_array_equal(again.learn(trials=2).table, whole.table)
 

@@ -87,13 +87,6 @@ class Solutions:
         self._state_shape: tuple[int, ...] = ()
         self._room: _Room | None = None
 
-    @property
-    def nbytes_per_step(self) -> int:
-        """Memory of one step of one ant, in bytes; known after the first `append`."""
-        rows = self._rows
-        seen = 0 if rows is None else rows.itemsize * rows.shape[1]
-        return self._action.itemsize + seen
-
     def clear(self) -> None:
         """Forget all solutions."""
         self.length[:] = 0

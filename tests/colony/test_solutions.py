@@ -113,7 +113,9 @@ def test_a_step_takes_few_bytes(
     seen = np.stack([state] * 2)
     actions = np.full(2, n_actions - 1)
     solutions.append(np.arange(2), seen, partition(seen)[0], actions)
-    assert solutions.nbytes_per_step == expected
+    rows = solutions._rows
+    assert rows is not None
+    assert rows.itemsize * rows.shape[1] + solutions._action.itemsize == expected
     (block,) = solutions.blocks()
     assert block.action.tolist() == actions.tolist()
 

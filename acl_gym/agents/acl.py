@@ -242,6 +242,10 @@ class ACL(TabularAgent):
         """The heuristic eta, `(n_cells, n_actions)`, fixed once the colony is made."""
         return self.pheromone.heuristic
 
+    @heuristic.setter
+    def heuristic(self, value: Heuristic | None) -> None:
+        raise fixed("heuristic", value)
+
     @property
     def cost(self) -> Cost | None:
         """The cost of a solution; None: the sum of its stage costs."""

@@ -17,6 +17,7 @@ from acl_gym.partitions import Partition, check_cells, partition_from_settings
 from acl_gym.partitions.automatic import automatic_partition
 from acl_gym.policies import PartitionPolicy, TablePolicy, random_ranks
 from acl_gym.utils import files, validation
+from acl_gym.utils.parameters import fixed
 from acl_gym.utils.typing import (
     BoolArray,
     CellArray,
@@ -157,6 +158,10 @@ class TabularAgent(PartitionPolicy):
     def max_steps(self) -> int:
         """T, the longest an episode may last; fixed once the agent is made."""
         return self._max_steps
+
+    @max_steps.setter
+    def max_steps(self, value: int) -> None:
+        raise fixed("max_steps", value)
 
     @property
     def n_actions(self) -> int:

@@ -21,7 +21,7 @@ from acl_gym.colony.greedy import (
 from acl_gym.evaluation.rollout import Rollout, Step
 from acl_gym.partitions import Partition
 from acl_gym.utils import validation
-from acl_gym.utils.parameters import Parameter
+from acl_gym.utils.parameters import Parameter, fixed
 from acl_gym.utils.typing import BoolArray, CellArray, FloatArray, IntArray
 
 TRACES = ("replacing", "accumulating")
@@ -183,6 +183,10 @@ class QLearning(TabularAgent):
     def traces(self) -> str:
         """The kind of traces; fixed once the agent is made."""
         return self._kind
+
+    @traces.setter
+    def traces(self, value: str) -> None:
+        raise fixed("traces", value)
 
     @property
     def _table(self) -> FloatArray:

@@ -14,6 +14,9 @@ class Parameter:
     Read on an instance it gives the number, read on the class itself it gives this
     declaration. The default stands in the signature of the class only.
 
+    Only agents declare their parameters in this way. Costs, deposits, schedules, update
+    rules and environments check the arguments of their constructors themselves.
+
     Args:
         meaning: one line, without a full stop.
         symbol: what the literature calls it, such as "rho".

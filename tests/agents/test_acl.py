@@ -345,6 +345,6 @@ def test_an_exponent_changed_later_counts() -> None:
 def test_what_is_fixed_cannot_be_changed_later(name: str, value: Any) -> None:
     colony = ACL(chains(2), ROW, seed=3)
     before = getattr(colony, name)
-    with pytest.raises(AttributeError):
+    with pytest.raises(AttributeError, match=f"make a new agent with {name}={value!r}"):
         setattr(colony, name, value)
     assert getattr(colony, name) == before

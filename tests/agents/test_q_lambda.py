@@ -416,8 +416,8 @@ def test_bad_trace_decay(value: float) -> None:
 def test_bad_traces() -> None:
     with pytest.raises(ValueError, match="traces must be one of 'replacing'"):
         QLearning(chains(2), ROW, traces="dutch")
-    with pytest.raises(AttributeError):
-        on_chain().traces = "accumulating"  # type: ignore[misc]
+    with pytest.raises(AttributeError, match="make a new agent with traces="):
+        on_chain().traces = "accumulating"
 
 
 # --- with and without traces, against dynamic programming ----------------------

@@ -11,7 +11,7 @@ from rich.console import Console
 
 from acl_gym.experiments import comparison, outcome, plots, thesis
 from acl_gym.experiments.outcome import Outcome, without_curves
-from acl_gym.experiments.provenance import ROOT, circumstances, hashed
+from acl_gym.experiments.provenance import ROOT, circumstances
 from acl_gym.experiments.report import write_claims, write_report
 from acl_gym.experiments.results import Results
 from acl_gym.experiments.runner import EXECUTORS, alone_in, list_jobs, run_studies
@@ -20,6 +20,7 @@ from acl_gym.experiments.study import Experiment
 from acl_gym.experiments.thesis import CLAIMS, RUNS
 from acl_gym.experiments.thesis.common import FEWER
 from acl_gym.utils.files import write_atomically
+from acl_gym.utils.hashing import hashed
 
 __all__ = ["EXECUTORS", "RUNS", "without_curves"]
 

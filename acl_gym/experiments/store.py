@@ -14,10 +14,11 @@ import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from acl_gym.experiments.provenance import code_of_runs, hashed, versions
+from acl_gym.experiments.provenance import code_of_runs, versions
 from acl_gym.experiments.results import Run
 from acl_gym.experiments.study import Study
 from acl_gym.utils.files import write_atomically
+from acl_gym.utils.hashing import hashed
 
 _METADATA = b"acl_gym"
 _TABLE = "table"

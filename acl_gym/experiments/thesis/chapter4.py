@@ -184,7 +184,7 @@ def _sensitivities(rule: str, results: Results) -> Tried:
         low = int(mean.argmin())
         lowest = f"lowest {mean[low]:.2f} after {low + 1} trials"
         found[kind] = f"{mean[0]:.2f} at first, {lowest}, {mean[-1]:.2f} at the end"
-    return Tried(f"the course of the sensitivity, {RULES[rule]}", listed(found, "; "))
+    return Tried(f"how the sensitivity changes, {RULES[rule]}", listed(found, "; "))
 
 
 def _cheapest(results: Results) -> Tried:

@@ -36,7 +36,7 @@ class Job:
 
     @property
     def name(self) -> str:
-        """Names its file."""
+        """The file name, without extension."""
         study = self.study
         system = study.task.short_name.lower()
         return f"{study.method}-{system}-{study.key}-{self.seed}"
@@ -95,7 +95,7 @@ class Store:
             return None
 
     def write(self, job: Job, run: Run, made: dict[str, Any]) -> None:
-        """Keep a run: afterwards all of it is there, or nothing."""
+        """Write a run atomically."""
         metadata = {
             "key": job.key,
             "study": job.study.inputs,

@@ -222,7 +222,7 @@ class Experiment:
         title: what it shows.
         section: of the thesis.
         studies: what is run, under the label that figures and tables give it.
-        references: what these are held against, such as dynamic programming.
+        references: what these are compared with, such as dynamic programming.
         plots: the figures, keys of `plots.PLOTS`.
         table: the table beside the figures, a key of `tables.TABLES`; "" for none.
         claims: the claims of the thesis that it decides.

@@ -82,8 +82,8 @@ def test_the_list() -> None:
 
 
 def test_bad_arguments() -> None:
-    assert "got 'fig9'" in refused(2, "reproduce", "fig9")
-    assert "--executor must be one of local, ray" in refused(
+    assert "Did you mean 'fig3.9'?" in refused(2, "reproduce", "fig39")
+    assert "--executor must be one of 'local', 'ray'" in refused(
         *(2, "reproduce", "fig3.9", "--executor", "slurm")
     )
     assert "there is no results.json in" in refused(2, "report", "/no/such/folder")

@@ -24,6 +24,7 @@ from acl_gym.experiments.thesis.common import (
     claim,
     experiment,
     fewer,
+    for_each,
     late_cost,
     listed,
 )
@@ -246,7 +247,7 @@ def _c9(results: Results) -> Iterator[Part]:
     yield Part(statement, f"{narrow:.3g} against {wide:.3g}", narrow < wide)
 
 
-@claim(*[partial(_sensitivities, rule) for rule in RULES])
+@claim(*for_each(RULES, _sensitivities))
 def _c10(results: Results) -> Iterator[Part]:
     ends = {}
     for kind in FUZZY_FIRST:

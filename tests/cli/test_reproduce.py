@@ -32,6 +32,10 @@ def test_a_figure_and_its_report(tmp_path: Path) -> None:
         "figures/fig3.9.png",
     ):
         assert (folder / name).is_file()
+    table = (folder / "claims.md").read_text()
+    assert "| C5 |" in table
+    assert "| C13 |" not in table, "none of its experiments was run"
+    assert not list(folder.glob("*.lock")), "the one lock is that of the runs"
     files = sorted((folder / "runs").glob("*.parquet"))
     assert len(files) == 6
     before = [path.stat().st_mtime_ns for path in files]

@@ -27,9 +27,10 @@ from acl_gym import ACL, Crisp, Fuzzy, PolicyEvaluation, QLearning, WaitingVecto
 from acl_gym.agents.acl import PheromoneBoundWarning
 from acl_gym.colony.episodes import Episode
 from acl_gym.evaluation import Predictor, evaluate_policy_cost
-from acl_gym.experiments.provenance import circumstances, code_of_runs, hashed, versions
+from acl_gym.experiments.provenance import circumstances, code_of_runs, versions
 from acl_gym.partitions.automatic import automatic_partition
 from acl_gym.utils.files import write_atomically
+from acl_gym.utils.hashing import hashed
 
 Run = dict[str, Any]
 

@@ -275,7 +275,7 @@ ENVIRONMENTS: dict[str, Environment] = {
     "FrozenLake-v1-slippery": Environment(
         "FrozenLake-v1",
         0.72,
-        "the optimum within 100 steps is 0.744; 500 episodes tell it to 0.02",
+        "the optimum within 100 steps is 0.744; 500 episodes estimate it to 0.02",
         episodes=500,
         choosing=100,
         candidates={

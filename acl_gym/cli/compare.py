@@ -1,4 +1,4 @@
-"""`acl-gym compare`, and the whole of benchmarks/compare_acl_rl.py."""
+"""`acl-gym compare`, which benchmarks/compare_acl_rl.py runs too."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from acl_gym.cli.common import (
-    BadArgumentError,
     Command,
     DebugOption,
     InterruptedRunError,
     JsonOption,
+    bad_arguments,
     console,
 )
 
@@ -134,11 +134,13 @@ def compare(
     """Compare; see `HELP`."""
     from acl_gym.experiments.comparison.compare import compare as run_comparison
     from acl_gym.experiments.comparison.tasks import BY_ENV_ID, PRESETS
+    from acl_gym.utils.validation import one_of
 
-    _check_choice("--preset", preset, list(PRESETS))
     default, *_ = BY_ENV_ID
     env = env or default
-    _check_choice("--env", env, list(BY_ENV_ID))
+    with bad_arguments():
+        one_of("--preset", preset, PRESETS)
+        one_of("--env", env, BY_ENV_ID)
     system = BY_ENV_ID[env]
     if out is None:
         name = "" if env == default else f"-{system.colony.task.short_name}"
@@ -146,10 +148,9 @@ def compare(
     names = list(system.agents)
     if agents is not None:
         wanted = [name.strip() for name in agents.split(",") if name.strip()]
-        if not wanted or not set(wanted) <= set(names):
-            raise BadArgumentError(
-                f"--agents must be among {', '.join(names)} for {env}, got {agents!r}."
-            )
+        with bad_arguments():
+            for name in wanted or [""]:
+                one_of(f"--agents for {env}", name, names)
         names = list(dict.fromkeys(wanted))
     terminal = console(stderr=as_json)
     try:
@@ -202,10 +203,3 @@ def _print_summary(experiment: Experiment, results: Results, terminal: Console) 
         table.add_row(*cells)
     terminal.print(table)
     terminal.print(experiment.text, style="dim", highlight=False)
-
-
-def _check_choice(option: str, value: str, choices: list[str]) -> None:
-    if value not in choices:
-        raise BadArgumentError(
-            f"{option}: invalid choice {value!r}, must be one of {', '.join(choices)}."
-        )

@@ -14,6 +14,7 @@ from acl_gym.cli.common import (
     DebugOption,
     InterruptedRunError,
     JsonOption,
+    bad_arguments,
     console,
 )
 
@@ -102,17 +103,12 @@ def reproduce(
 ) -> None:
     """Reproduce; see `HELP`."""
     from acl_gym.experiments import reproduce as engine
+    from acl_gym.utils.validation import one_of
 
     wanted = names or ["all"]
-    try:
+    with bad_arguments():
         experiments = engine.chosen(wanted)
-    except ValueError as error:
-        raise BadArgumentError(str(error)) from error
-    if executor not in engine.EXECUTORS:
-        raise BadArgumentError(
-            f"--executor must be one of {', '.join(engine.EXECUTORS)}, got "
-            f"{executor!r}."
-        )
+        one_of("--executor", executor, engine.EXECUTORS)
     if only_list:
         _list(experiments, as_json)
         return
@@ -146,12 +142,6 @@ def report(
     directory: Annotated[
         Path, typer.Argument(metavar="DIR", help="What `reproduce` has written.")
     ] = Path("results/reproduce"),
-    seed: Annotated[
-        int,
-        typer.Option(
-            min=0, metavar="N", help="Not used: nothing in a report is random."
-        ),
-    ] = 0,
     as_json: JsonOption = False,
     debug: DebugOption = False,
 ) -> None:
@@ -199,7 +189,7 @@ def _cannot_write(directory: Path, error: OSError) -> RuntimeError:
     return RuntimeError(
         f"results, figures or report cannot be written to {directory}: "
         f"{error.strerror or error}; runs that are finished are kept, give the same "
-        "command again when that is mended."
+        "command again when the cause is removed."
     )
 
 

@@ -1,7 +1,7 @@
 """What a claim of the thesis is, and how a verdict on it is reached.
 
-A claim is taken apart into statements that hold or do not, each with its threshold in
-its words: where all hold the claim holds, where some do it holds in part, where none
+A claim consists of statements that hold or do not, each with its threshold in its
+words: where all hold the claim holds, where some do it holds in part, where none
 does it does not hold. Where runs are missing it is undecided.
 """
 
@@ -56,7 +56,7 @@ class Claim:
         name: C1 .. C23.
         text: the claim in this project's words.
         section: of the thesis.
-        decide: takes it apart.
+        decide: returns its statements.
         tried: what is reported where it does not hold, or holds in part.
         understanding: what we make of it; "" if nothing.
     """
@@ -121,14 +121,3 @@ def settled_from(reached: BoolArray) -> FloatArray:
     from_end = np.logical_and.accumulate(reached[:, ::-1], axis=1)[:, ::-1]
     first = from_end.argmax(axis=1) + 1.0
     return np.where(from_end.any(axis=1), first, np.inf)
-
-
-def late_swing(costs: FloatArray, trials: int = 20) -> FloatArray:
-    """How far each run's policy cost swings at the end: (max - min) / median.
-
-    Args:
-        costs: `(runs, trials)`.
-        trials: how many trials count as the end.
-    """
-    late = costs[:, -trials:]
-    return np.asarray((late.max(axis=1) - late.min(axis=1)) / np.median(late, axis=1))

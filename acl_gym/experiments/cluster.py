@@ -6,7 +6,7 @@ import logging
 import platform
 from typing import Any
 
-from acl_gym.experiments.executors import Finished, RunFailedError, keep
+from acl_gym.experiments.executors import Finished, RunFailedError, write_run
 from acl_gym.experiments.methods import run as run_study
 from acl_gym.experiments.provenance import circumstances
 from acl_gym.experiments.results import Run
@@ -53,7 +53,7 @@ def in_ray(jobs: list[Job], store: Store) -> Finished:
                         f"{job.name} failed on the cluster: {reason}; what is finished "
                         "is kept, call again to go on."
                     ) from error
-                keep(job, found, store, made)
+                write_run(job, found, store, made)
                 yield job
     finally:
         for reference in under_way:

@@ -1,4 +1,4 @@
-"""Who makes runs: processes of this machine. A cluster does the same in `cluster`."""
+"""Executors: running jobs in local processes; `cluster` has the one for Ray."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ AHEAD = 4
 
 
 def in_processes(jobs: list[Job], store: Store, *, workers: int) -> Finished:
-    """Make runs in processes of this machine; an `Executor` with so many workers.
+    """Make runs in processes of this machine; an `Executor` with `workers` processes.
 
     Each process writes its own runs, so that none is lost when another one dies.
     """
@@ -50,7 +50,7 @@ def in_processes(jobs: list[Job], store: Store, *, workers: int) -> Finished:
         while True:
             # A few ahead: to watch thousands at once would keep this process busy.
             for job in islice(left, AHEAD * workers - len(under_way)):
-                under_way[pool.submit(_run_and_keep, job, store, made)] = job
+                under_way[pool.submit(_run_and_write, job, store, made)] = job
             if not under_way:
                 break
             done, _ = wait(under_way, return_when=FIRST_COMPLETED)
@@ -77,11 +77,11 @@ def _raise_failure(job: Job, future: Future[None]) -> None:
         raise RunFailedError(f"{job.name} failed: {error}") from error
 
 
-def _run_and_keep(job: Job, store: Store, made: dict[str, Any]) -> None:
-    keep(job, run_study(job.study, job.seed), store, made)
+def _run_and_write(job: Job, store: Store, made: dict[str, Any]) -> None:
+    write_run(job, run_study(job.study, job.seed), store, made)
 
 
-def keep(job: Job, run: Run, store: Store, made: dict[str, Any]) -> None:
+def write_run(job: Job, run: Run, store: Store, made: dict[str, Any]) -> None:
     """Write a run.
 
     Raises:
@@ -107,7 +107,7 @@ def _start_worker(parent: int) -> None:
 
 
 def _end_with(parent: int) -> None:
-    """End this process when its parent has been killed: nobody waits for its runs."""
+    """Exit if the parent process has died, because nobody waits for the runs."""
     while os.getppid() == parent:
         time.sleep(0.2)
     os._exit(1)

@@ -1,4 +1,4 @@
-"""How each method makes one run of a study. A method more is one entry in `METHODS`."""
+"""How each method makes one run of a study; to add a method, add one entry to `METHODS`."""
 
 from __future__ import annotations
 
@@ -28,16 +28,14 @@ from acl_gym.utils.typing import Row
 
 
 class Method(NamedTuple):
-    """A way to come to a policy.
+    """A way to come to a policy. Its label in figures is in `comparison.tasks.METHODS`.
 
     Attributes:
-        label: what it is called in tables and figures.
         run: makes one run of a study.
         restore: makes the last policy of a run again, for the system without
             perturbations.
     """
 
-    label: str
     run: Callable[[Study, int], Run]
     restore: Callable[[Study, Run], Predictor]
 
@@ -57,7 +55,7 @@ _WARM: set[tuple[Any, ...]] = set()
 
 
 def warm_up(study: Study) -> None:
-    """Compile the kernels of a study, so that no measured time holds a compilation."""
+    """Compile the kernels of a study, so that measured times exclude compilation."""
     if study.kernels not in _WARM:
         METHODS[study.method].run(study.brief(), 0)
         _WARM.add(study.kernels)
@@ -69,7 +67,7 @@ def restore_policy(study: Study, run: Run) -> Any:
 
 
 class Evaluation(Callback):
-    """Evaluates the policy after each trial, or ever more seldom.
+    """Evaluates the policy after each trial, or at growing intervals.
 
     Args:
         study: says how.
@@ -243,9 +241,9 @@ def _plan(study: Study, seed: int) -> Run:
 
 
 METHODS = {
-    "acl": Method("ACL", _learn_table, _restore_table),
-    "q-learning": Method("Q-learning", _learn_table, _restore_table),
-    "dqn": Method("DQN", _learn_dqn, _restore_dqn),
-    "planning": Method("dynamic programming", _plan, _restore_table),
+    "acl": Method(_learn_table, _restore_table),
+    "q-learning": Method(_learn_table, _restore_table),
+    "dqn": Method(_learn_dqn, _restore_dqn),
+    "planning": Method(_plan, _restore_table),
 }
 """The methods by name."""

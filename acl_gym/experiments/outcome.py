@@ -1,4 +1,4 @@
-"""What runs say, as JSON types: what results.json holds and a report is made from."""
+"""Summaries of results, as JSON types, for results.json and for reports."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ CURVES = ("policy_cost", "ants_cost", "policy_variation", "sensitivity")
 """The measures whose curves a report shows."""
 
 POINTS = 250
-"""How many points a curve has at most: one of `every` so many is kept."""
+"""How many points a curve has at most: one of `every` is kept."""
 
 
 def summary(

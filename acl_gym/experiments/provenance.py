@@ -5,11 +5,9 @@ from __future__ import annotations
 import ast
 import datetime
 import hashlib
-import json
 import os
 import platform
 import subprocess
-from collections.abc import Iterator
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
@@ -28,20 +26,14 @@ _PACKAGES = ("numpy", "numba", "scipy", "gymnasium", "stable-baselines3", "torch
 _SILENT = ("compiling", "rendering", "painter")
 
 
-def hashed(value: Any) -> str:
-    """The SHA-256 hash of JSON types."""
-    text = json.dumps(value, sort_keys=True)
-    return hashlib.sha256(text.encode()).hexdigest()
-
-
 @cache
 def code_of_runs(root: Path = ROOT) -> str:
     """A hash over the code that runs depend on.
 
     That is the module that makes them, what it imports from this package, directly or
-    not, and every environment with its maps, for environments are made by their ids. A
-    figure, a claim or a page is none of it; nor are comments, docstrings, and imports
-    for the type checker alone.
+    not, and every environment with its maps, for environments are made by their ids.
+    Figures, claims, comments and docstrings are excluded, and so is what only a type
+    checker reads.
 
     Args:
         root: where the package lies.
@@ -49,7 +41,7 @@ def code_of_runs(root: Path = ROOT) -> str:
     digest = hashlib.sha256()
     for name, path in sorted(sources_of(RUNS, root).items()):
         digest.update(name.encode())
-        digest.update(ast.dump(_without_docstrings(path)).encode())
+        digest.update(ast.dump(_executed_tree(path)).encode())
     for path in sorted(root.glob("envs/**/*.txt")):
         digest.update(path.name.encode())
         digest.update(path.read_bytes())
@@ -83,7 +75,7 @@ def _module_name(path: Path, root: Path) -> str:
 def _imported(path: Path, files: dict[str, Path]) -> list[str]:
     """The modules of this package that a file imports when it is run."""
     names = []
-    for node in _executed(ast.parse(path.read_bytes())):
+    for node in ast.walk(_executed_tree(path)):
         if isinstance(node, ast.Import):
             names += [each.name for each in node.names]
         elif isinstance(node, ast.ImportFrom) and node.module:
@@ -100,7 +92,7 @@ def _home(package: str, name: str, files: dict[str, Path]) -> str:
         return f"{package}.{name}"
     path = files.get(package)
     if path is not None and path.name == "__init__.py":
-        for node in _executed(ast.parse(path.read_bytes())):
+        for node in ast.walk(_executed_tree(path)):
             if isinstance(node, ast.ImportFrom) and node.module:
                 for each in node.names:
                     if (each.asname or each.name) == name:
@@ -108,29 +100,28 @@ def _home(package: str, name: str, files: dict[str, Path]) -> str:
     return package
 
 
-def _executed(node: ast.AST) -> Iterator[ast.AST]:
-    """All nodes of a tree, except those that only a type checker reads."""
-    for child in ast.iter_child_nodes(node):
-        if isinstance(child, ast.If) and "TYPE_CHECKING" in ast.dump(child.test):
-            continue
-        yield child
-        yield from _executed(child)
+class _Executed(ast.NodeTransformer):
+    """Removes docstrings, and what only a type checker reads."""
+
+    def visit_Expr(self, node: ast.Expr) -> ast.AST | None:
+        value = node.value
+        if isinstance(value, ast.Constant) and isinstance(value.value, str):
+            return None
+        return self.generic_visit(node)
+
+    def visit_If(self, node: ast.If) -> ast.AST | list[ast.AST]:
+        self.generic_visit(node)
+        name = getattr(node.test, "id", getattr(node.test, "attr", None))
+        return [*node.orelse] if name == "TYPE_CHECKING" else node
+
+    def visit_ImportFrom(self, node: ast.ImportFrom) -> ast.AST | None:
+        node.names = [each for each in node.names if each.name != "TYPE_CHECKING"]
+        return node if node.names else None
 
 
-def _without_docstrings(path: Path) -> ast.Module:
-    tree = ast.parse(path.read_bytes())
-    for node in [tree, *ast.walk(tree)]:
-        body = getattr(node, "body", None)
-        if isinstance(body, list):
-            node.body = [  # type: ignore[attr-defined]
-                each
-                for each in body
-                if not (
-                    isinstance(each, ast.Expr)
-                    and isinstance(each.value, ast.Constant)
-                    and isinstance(each.value.value, str)
-                )
-            ]
+def _executed_tree(path: Path) -> ast.Module:
+    """The syntax tree of what runs when a file is imported and its functions called."""
+    tree: ast.Module = _Executed().visit(ast.parse(path.read_bytes()))
     return tree
 
 

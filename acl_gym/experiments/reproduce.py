@@ -11,15 +11,17 @@ from rich.console import Console
 
 from acl_gym.experiments import comparison, outcome, plots, thesis
 from acl_gym.experiments.outcome import Outcome, without_curves
-from acl_gym.experiments.provenance import ROOT, circumstances, hashed
+from acl_gym.experiments.provenance import ROOT, circumstances
 from acl_gym.experiments.report import write_claims, write_report
 from acl_gym.experiments.results import Results
-from acl_gym.experiments.runner import EXECUTORS, alone_in, list_jobs, run_studies
+from acl_gym.experiments.runner import EXECUTORS, exclusive_lock, list_jobs, run_studies
 from acl_gym.experiments.store import Job, Store
 from acl_gym.experiments.study import Experiment
 from acl_gym.experiments.thesis import CLAIMS, RUNS
 from acl_gym.experiments.thesis.common import FEWER
 from acl_gym.utils.files import write_atomically
+from acl_gym.utils.hashing import hashed
+from acl_gym.utils.validation import one_of
 
 __all__ = ["EXECUTORS", "RUNS", "without_curves"]
 
@@ -46,12 +48,8 @@ def chosen(names: Sequence[str]) -> list[Experiment]:
         ValueError: there is no experiment of a name.
     """
     known = [experiment.name for experiment in EXPERIMENTS]
-    unknown = [name for name in names if name not in (*known, "all", "claims")]
-    if unknown:
-        raise ValueError(
-            f"experiments must be among all, claims, {', '.join(known)}, got "
-            f"{unknown[0]!r}."
-        )
+    for name in names:
+        one_of("experiments", name, ("all", "claims", *known))
     return [
         each
         for each in EXPERIMENTS
@@ -103,8 +101,8 @@ def reproduce(
         return found, True
     console = console or Console(quiet=True)
     workers = workers or os.cpu_count() or 1
-    directory.mkdir(parents=True, exist_ok=True)
-    with alone_in(directory):  # to the end: the report has to be that of these runs
+    # Held until the report is written, so that it is that of these runs.
+    with exclusive_lock(directory / _KEPT_RUNS):
         results = run_studies(
             *(studies, seeds, directory / _KEPT_RUNS),
             workers=workers,
@@ -130,7 +128,10 @@ def reproduce(
                 with console.status("Drawing the animation"):
                     plots.write_animation(directory / _FIGURES / ANIMATION)
             write_pages(directory)
-        files = [path.relative_to(directory).as_posix() for path in _made(directory)]
+        files = [
+            path.relative_to(directory).as_posix()
+            for path in _generated_files(directory)
+        ]
         finished = {"stamp": stamp, "files": files}
         write_atomically(directory / _FINISHED, json.dumps(finished).encode())
     return made, False
@@ -214,7 +215,12 @@ def write_pages(directory: Path) -> Path:
         "separately."
     )
     names = [each["name"] for each in found["experiments"]]
-    write_claims(directory / CLAIMS_TABLE, found["claims"], set(names), facts)
+    claims = [
+        each
+        for each in found["claims"]
+        if not set(names).isdisjoint(each["experiments"] + each["trials"])
+    ]
+    write_claims(directory / CLAIMS_TABLE, claims, set(names), facts)
     asked_for = "all" if len(names) == len(EXPERIMENTS) else " ".join(names)
     runs_made = {f"runs, {name}": each for name, each in found["runs_made"].items()}
     write_report(
@@ -223,7 +229,7 @@ def write_pages(directory: Path) -> Path:
         facts=facts,
         experiments=found["experiments"],
         figures=directory / _FIGURES,
-        claims=found["claims"],
+        claims=claims,
         animation=ANIMATION,
         command=f"acl-gym reproduce {asked_for} --runs {found['runs']} "
         f"--seed {found['first_seed']}",
@@ -261,17 +267,21 @@ def _stamp(jobs: Sequence[Job]) -> str:
 
 
 def _clear(directory: Path) -> None:
-    """Remove figures and reports, so that they do not stand beside other results.
+    """Remove figures and reports, so that stale ones are not mixed with new results.
 
     Runs stay, and pictures that are not of an experiment.
     """
-    old = [directory / _FINISHED, *_made(directory), *directory.rglob(".*.tmp")]
+    old = [
+        directory / _FINISHED,
+        *_generated_files(directory),
+        *directory.rglob(".*.tmp"),
+    ]
     for path in old:
         path.unlink(missing_ok=True)
 
 
-def _made(directory: Path) -> list[Path]:
-    """The files in a folder that come of results: rows, reports, and figures."""
+def _generated_files(directory: Path) -> list[Path]:
+    """The files of a folder generated from results: rows, reports, and figures."""
     names = {Path(ANIMATION).stem, *(experiment.name for experiment in EXPERIMENTS)}
     files = [directory / name for name in (ROWS, PAGE, CLAIMS_TABLE)]
     files += [p for p in (directory / _FIGURES).glob("*.*") if p.stem in names]

@@ -1,4 +1,4 @@
-"""The results of runs, and how figures, tables and claims ask for them."""
+"""Access to stored results, for figures, tables and claims."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ import numpy as np
 import pandas as pd
 
 from acl_gym.experiments.study import Study
-from acl_gym.utils.steps import held
+from acl_gym.utils.steps import hold_last_value
 from acl_gym.utils.typing import FloatArray
 
 
 @dataclass(frozen=True)
 class Run:
-    """What one run of a study with one seed left behind.
+    """The result of one run of a study with one seed.
 
     Attributes:
         rows: a row for each evaluation of the policy: `env_steps`, `seconds` (of
@@ -74,7 +74,9 @@ class Results:
         if points is None:
             return np.stack([run.rows[measure].to_numpy() for run in runs])
         rows = [run.rows for run in runs]
-        return np.stack([held(r["env_steps"], r[measure], points) for r in rows])
+        return np.stack(
+            [hold_last_value(r["env_steps"], r[measure], points) for r in rows]
+        )
 
     def last(self, study: Study, measure: str = "policy_cost") -> FloatArray:
         """A measure at the end of each run, `(runs,)`."""

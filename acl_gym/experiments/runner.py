@@ -1,4 +1,4 @@
-"""Runs studies in processes, keeps each run as soon as it is made, and makes none twice."""
+"""Run studies in processes, saving each run and reusing stored ones."""
 
 from __future__ import annotations
 
@@ -63,9 +63,8 @@ def run_studies(
     jobs = list_jobs(studies, seeds)
     workers = workers or os.cpu_count() or 1
     console = console or Console(quiet=True)
-    directory.mkdir(parents=True, exist_ok=True)
     store = Store(directory)
-    with alone_in(directory):
+    with exclusive_lock(directory):
         for half in directory.glob(".*.tmp"):
             half.unlink()  # of a runner that was killed while it wrote
         runs: dict[str, Run | None] = {job.name: store.read(job) for job in jobs}
@@ -115,17 +114,21 @@ def list_jobs(studies: Iterable[Study], seeds: Sequence[int]) -> list[Job]:
     return sorted(jobs, key=lambda job: job.study.method != "dqn")
 
 
-def alone_in(directory: Path) -> AbstractContextManager[Any]:
-    """Hold a lock that the system takes back when this process ends, however it does.
+def exclusive_lock(directory: Path) -> AbstractContextManager[Any]:
+    """Hold a lock that the operating system releases when this process exits.
+
+    Whoever holds it may take it again in the same thread.
 
     Args:
-        directory: on which this process alone is to work.
+        directory: in which this process alone is to work; made if it is not there.
 
     Raises:
-        FolderInUseError: another one does.
+        FolderInUseError: another one works there.
     """
+    directory.mkdir(parents=True, exist_ok=True)
+    lock = FileLock(directory / "running.lock", is_singleton=True)
     try:
-        return FileLock(directory / "running.lock").acquire(timeout=0)
+        return lock.acquire(timeout=0)
     except Timeout as error:
         raise FolderInUseError(
             f"another run works on {directory}; wait for its end, or take another "
@@ -134,7 +137,7 @@ def alone_in(directory: Path) -> AbstractContextManager[Any]:
 
 
 def _compile_kernels(jobs: list[Job], console: Console) -> None:
-    """Compile here once, not in every process: Numba's cache is no place for a race."""
+    """Compile here once, not in every process, to avoid races on Numba's cache."""
     kinds = {job.study.kernels: job for job in jobs if job.study.method != "dqn"}
     with console.status("Compiling the kernels (half a minute, the first time)"):
         for job in kinds.values():

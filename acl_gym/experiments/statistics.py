@@ -1,7 +1,7 @@
 """The statistics of all experiments: estimates over runs with bootstrap intervals.
 
-A run that never got somewhere counts as infinite, and so may an estimate or the end of
-its interval.
+A run that never reaches the target counts as infinite, and so may an estimate or the end
+of its interval.
 """
 
 from __future__ import annotations
@@ -121,7 +121,7 @@ def overlap(first: Estimate, second: Estimate) -> bool:
 
 
 def rank_correlation(x: ArrayLike, y: ArrayLike) -> float:
-    """Spearman's, from -1 to 1; 0 where one of both does not vary."""
+    """Spearman's, from -1 to 1; 0 if either is constant."""
     if np.ptp(x) == 0 or np.ptp(y) == 0:
         return 0.0
     return float(stats.spearmanr(x, y).statistic)

@@ -14,10 +14,11 @@ import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from acl_gym.experiments.provenance import code_of_runs, hashed, versions
+from acl_gym.experiments.provenance import code_of_runs, versions
 from acl_gym.experiments.results import Run
 from acl_gym.experiments.study import Study
 from acl_gym.utils.files import write_atomically
+from acl_gym.utils.hashing import hashed
 
 _METADATA = b"acl_gym"
 _TABLE = "table"
@@ -35,7 +36,7 @@ class Job:
 
     @property
     def name(self) -> str:
-        """Names its file."""
+        """The file name, without extension."""
         study = self.study
         system = study.task.short_name.lower()
         return f"{study.method}-{system}-{study.key}-{self.seed}"
@@ -94,7 +95,7 @@ class Store:
             return None
 
     def write(self, job: Job, run: Run, made: dict[str, Any]) -> None:
-        """Keep a run: afterwards all of it is there, or nothing."""
+        """Write a run atomically."""
         metadata = {
             "key": job.key,
             "study": job.study.inputs,

@@ -1,13 +1,11 @@
 """What is run, as data: a study is a method with its settings on a task, and a budget.
 
-All of a study is JSON types, so that it can be kept beside its results, compared, and
-sent to other processes. An experiment is a few studies and how they are shown.
+A study contains only JSON types, so that it can be kept beside its results, compared,
+and sent to other processes. An experiment is a few studies and how they are shown.
 """
 
 from __future__ import annotations
 
-import hashlib
-import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
@@ -21,8 +19,9 @@ from acl_gym.envs.control.environments import ControlVectorEnv
 from acl_gym.envs.wrappers.perturbations import perturbed
 from acl_gym.evaluation import control_env
 from acl_gym.experiments.episode_costs import EPISODE_COSTS
-from acl_gym.partitions import Crisp, Fuzzy, Partition
+from acl_gym.partitions import KINDS, Partition
 from acl_gym.partitions.automatic import thesis_partition
+from acl_gym.utils.hashing import hashed
 from acl_gym.utils.typing import FloatArray
 
 PENDULUM = "acl_gym/Pendulum-v0"
@@ -31,10 +30,8 @@ GRID_1D = "acl_gym/GridSearch1D-v0"
 GRID_2D = "acl_gym/GridSearch2D-v0"
 TWO_STATE = "acl_gym/TwoState-v0"
 
-KINDS = {"crisp": Crisp, "fuzzy": Fuzzy}
-
 CURVE_POINTS = 120
-"""Points of a curve whose policies are evaluated ever more seldom."""
+"""Points of a curve whose policies are evaluated at growing intervals."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -79,8 +76,7 @@ class Task:
             kind: "crisp" or "fuzzy"; not used where a state is a cell.
             cells: see `partitions.automatic.thesis_partition`.
         """
-        kinds = KINDS.get(kind, Fuzzy)
-        return thesis_partition(self.make_env(1), cells, kind=kinds)
+        return thesis_partition(self.make_env(1), cells, kind=KINDS[kind])
 
     def evaluation_states(self) -> FloatArray:
         """The initial states of an evaluation, `(n, state_size)`."""
@@ -96,7 +92,7 @@ class Task:
 
     @property
     def highest_cost(self) -> float:
-        """No policy costs more; this is the cost of a run that breaks down."""
+        """An upper bound on the cost of any policy; a run that breaks down has this cost."""
         if self.cost is not None:
             return EPISODE_COSTS[self.cost].ceiling
         system = self.make_system_env(1).system
@@ -152,8 +148,7 @@ class Study:
     @cached_property
     def key(self) -> str:
         """A short name that is a function of `inputs`."""
-        text = json.dumps(self.inputs, sort_keys=True)
-        return hashlib.sha256(text.encode()).hexdigest()[:12]
+        return hashed(self.inputs)[:12]
 
     @property
     def kernels(self) -> tuple[Any, ...]:
@@ -227,7 +222,7 @@ class Experiment:
         title: what it shows.
         section: of the thesis.
         studies: what is run, under the label that figures and tables give it.
-        references: what these are held against, such as dynamic programming.
+        references: what these are compared with, such as dynamic programming.
         plots: the figures, keys of `plots.PLOTS`.
         table: the table beside the figures, a key of `tables.TABLES`; "" for none.
         claims: the claims of the thesis that it decides.

@@ -1,4 +1,4 @@
-"""The tables beside the figures, and how ACL is held against another method.
+"""The tables beside the figures, and how ACL is compared with another method.
 
 ACL is compared with each rival by the ratio of interquartile means with its bootstrap
 interval. It wins or loses where the whole interval lies on one side of 1; otherwise these
@@ -327,7 +327,7 @@ _COLUMNS: dict[str, tuple[str, Callable[[Sequence[float]], float] | None]] = {
 
 
 def summary(experiment: Experiment, results: Results, *, brief: bool = False) -> Table:
-    """Medians over seeds, their intervals, and how many runs got somewhere.
+    """Medians over seeds, their intervals, and how many runs reached the target.
 
     Args:
         experiment: see `summarise`.

@@ -10,10 +10,11 @@ one (§4.3) k = 2^d. Equations written over `(index, degree)` therefore hold for
 
 from acl_gym.partitions.base import Partition, check_cells
 from acl_gym.partitions.discrete import Discrete
-from acl_gym.partitions.grid import Crisp, Fuzzy, Grid
+from acl_gym.partitions.grid import KINDS, Crisp, Fuzzy, Grid
 from acl_gym.partitions.settings import partition_from_settings
 
 __all__ = [
+    "KINDS",
     "Crisp",
     "Discrete",
     "Fuzzy",

@@ -324,3 +324,7 @@ def _regular_rate(edges: FloatArray) -> float:
     gaps = np.diff(edges)
     regular = np.allclose(gaps, gaps.mean(), rtol=1e-9, atol=0.0)
     return float(1.0 / gaps.mean()) if regular else 0.0
+
+
+KINDS: dict[str, type[Crisp | Fuzzy]] = {"crisp": Crisp, "fuzzy": Fuzzy}
+"""The partitions of continuous states by name."""

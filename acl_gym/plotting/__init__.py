@@ -1,4 +1,4 @@
-"""Drawing policies, what they do on the systems of this package, and how they came."""
+"""Drawing policies, what they do on the systems of this package, and how they were learned."""
 
 from __future__ import annotations
 

@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
 from acl_gym.plotting import style
-from acl_gym.utils.steps import held
+from acl_gym.utils.steps import hold_last_value
 from acl_gym.utils.typing import FloatArray
 
 AXES = {"env_steps": "interactions", "seconds": "seconds of learning"}
@@ -69,4 +69,6 @@ def steps_of(
         rows = [each.assign(policy_cost=each["policy_cost"].cummin()) for each in rows]
     at = np.unique(np.concatenate([each[x] for each in rows]))
     at = at[(at >= max(each[x].iloc[0] for each in rows)) & (at > 0)]  # for a log axis
-    return at, np.stack([held(each[x], each["policy_cost"], at) for each in rows])
+    return at, np.stack(
+        [hold_last_value(each[x], each["policy_cost"], at) for each in rows]
+    )

@@ -9,7 +9,7 @@ import numpy as np
 from acl_gym.utils.typing import FloatArray
 
 
-def held(x: Any, values: Any, points: Any) -> FloatArray:
+def hold_last_value(x: Any, values: Any, points: Any) -> FloatArray:
     """The values at some points; before the first place, the first value.
 
     Args:

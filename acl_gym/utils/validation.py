@@ -5,11 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Collection
 from dataclasses import dataclass
+from difflib import get_close_matches
 from numbers import Integral, Real
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+_MANY = 10
 
 
 @dataclass(frozen=True)
@@ -145,9 +148,15 @@ def one_of(name: str, value: Any, allowed: Collection[str]) -> str:
     """Return `value` if it is one of the `allowed` strings.
 
     Raises:
-        ValueError: it is not.
+        ValueError: it is not; the message suggests the most similar one, if any, and then does not
+            list the others where they are many.
     """
     if value not in allowed:
         choices = ", ".join(repr(choice) for choice in allowed)
-        raise ValueError(f"{name} must be one of {choices}, got {value!r}.")
+        message = f"{name} must be one of {choices}, got {value!r}."
+        if similar := get_close_matches(str(value), allowed, 1):
+            if len(allowed) > _MANY:
+                message = f"{name} has no {value!r}."
+            message += f" Did you mean {similar[0]!r}?"
+        raise ValueError(message)
     return str(value)

@@ -67,9 +67,12 @@ def test_an_interrupted_command_says_what_is_kept(
         (["evaluate", "/no/such/agent"], "no agent file at /no/such/agent.npz"),
         (["evaluate", str(ROOT / "README.md")], "is not an agent saved by acl-gym"),
         (["envs", "CartPole-v1"], "no environment 'CartPole-v1'; choose from"),
-        (["compare", "--preset", "huge"], "invalid choice 'huge'"),
-        (["compare", "--env", "CartPole-v1"], "invalid choice 'CartPole-v1'"),
-        (["compare", "--agents", "sarsa"], "must be among acl-fuzzy"),
+        (["compare", "--preset", "huge"], "--preset must be one of 'smoke'"),
+        (
+            ["compare", "--env", "CartPole-v1"],
+            "--env must be one of 'acl_gym/Pendulum-v0'",
+        ),
+        (["compare", "--agents", "sarsa"], "must be one of 'acl-fuzzy'"),
         (["compare", "--seeds", "0"], "whole number >= 1"),
     ],
 )

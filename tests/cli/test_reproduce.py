@@ -32,6 +32,10 @@ def test_a_figure_and_its_report(tmp_path: Path) -> None:
         "figures/fig3.9.png",
     ):
         assert (folder / name).is_file()
+    table = (folder / "claims.md").read_text()
+    assert "| C5 |" in table
+    assert "| C13 |" not in table, "none of its experiments was run"
+    assert not list(folder.glob("*.lock")), "the one lock is that of the runs"
     files = sorted((folder / "runs").glob("*.parquet"))
     assert len(files) == 6
     before = [path.stat().st_mtime_ns for path in files]
@@ -82,8 +86,8 @@ def test_the_list() -> None:
 
 
 def test_bad_arguments() -> None:
-    assert "got 'fig9'" in refused(2, "reproduce", "fig9")
-    assert "--executor must be one of local, ray" in refused(
+    assert "Did you mean 'fig3.9'?" in refused(2, "reproduce", "fig39")
+    assert "--executor must be one of 'local', 'ray'" in refused(
         *(2, "reproduce", "fig3.9", "--executor", "slurm")
     )
     assert "there is no results.json in" in refused(2, "report", "/no/such/folder")

@@ -15,12 +15,12 @@ from acl_gym.experiments.claims import (
     Claim,
     Part,
     Tried,
-    late_swing,
     settled_from,
     verdict,
 )
 from acl_gym.experiments.results import Results, Run
 from acl_gym.experiments.systems import grid_1d
+from acl_gym.experiments.thesis.common import late_swing
 
 NONE = Results({})
 

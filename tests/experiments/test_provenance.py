@@ -86,7 +86,12 @@ def changes(root: Path, file: str, addition: str) -> bool:
             "colony/pheromone.py",
             "\nfrom typing import TYPE_CHECKING\n"
             "if TYPE_CHECKING:\n    from acl_gym.cli.app import app\n",
-            True,  # the file itself is another one
+            False,
+        ),
+        (
+            "colony/pheromone.py",
+            "\nimport typing\nif typing.TYPE_CHECKING:\n    A = 1\nelse:\n    A = 2\n",
+            True,
         ),
     ],
 )
@@ -102,8 +107,12 @@ def test_imports_for_the_type_checker_are_not_followed(copied: Path) -> None:
         "if TYPE_CHECKING:\n    from acl_gym.callbacks import files\n"
     )
     assert "acl_gym.callbacks.files" not in sources_of(RUNS, copied)
-    path.write_text(f"{content}\nfrom acl_gym.callbacks import files\n")
-    assert "acl_gym.callbacks.files" in sources_of(RUNS, copied)
+    for executed in (
+        "from acl_gym.callbacks import files\n",
+        "if TYPE_CHECKING:\n    pass\nelse:\n    from acl_gym.callbacks import files\n",
+    ):
+        path.write_text(f"{content}\n{executed}")
+        assert "acl_gym.callbacks.files" in sources_of(RUNS, copied)
     path.write_text(content)
 
 

@@ -48,8 +48,12 @@ def test_names_are_chosen_in_the_order_of_the_thesis() -> None:
     claims = reproduce.chosen(["claims"])
     assert all(each.claims or each.explains for each in claims)
     assert {"fig5.4", "row-choices"} <= {each.name for each in claims}
-    with pytest.raises(ValueError, match=r"among all, claims, .*, got 'fig9'"):
-        reproduce.chosen(["fig5.4", "fig9"])
+    with pytest.raises(
+        ValueError, match=r"must be one of 'all', 'claims', .*, got 'x'"
+    ):
+        reproduce.chosen(["fig5.4", "x"])
+    with pytest.raises(ValueError, match=r"no 'fig3.66'\. Did you mean 'fig3.6'\?$"):
+        reproduce.chosen(["fig3.66"])
 
 
 def test_a_report_needs_results(tmp_path: Path) -> None:

@@ -23,7 +23,8 @@ _COLUMNS = ["agent", "seed", "env_steps", "seconds", "policy_cost", "success_rat
 _NOTES = (
     "The policy cost is the mean undiscounted cost from fixed initial states, an episode "
     "ending at the goal (3.47). Methods with a table are evaluated after every trial, DQN "
-    "every so many steps, which favours the former a little in best policies and times.",
+    "at fixed intervals of steps, which favours the former a little in best policies and "
+    "times.",
     "Dynamic programming knows the model: value iteration where a state is a cell, which "
     "is exact, else fuzzy Q-iteration. What it reaches on the cells that the methods have "
     "is no bound on what these cells allow.",

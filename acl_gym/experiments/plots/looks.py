@@ -1,4 +1,4 @@
-"""How methods look, in every figure alike; references and symbols.
+"""The line styles of methods, shared by all figures; references and symbols.
 
 A warm hue is a colony, a blue one Q-learning, a purple one Q(lambda). A crisp partition
 has a dashed line in the lighter shade.

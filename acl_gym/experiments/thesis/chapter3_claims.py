@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from functools import partial
 
 import numpy as np
 
 from acl_gym.experiments.claims import Part, Tried, settled_from
 from acl_gym.experiments.methods import restore_policy
 from acl_gym.experiments.results import Results
-from acl_gym.experiments.statistics import estimate, rank_correlation, ratio
+from acl_gym.experiments.statistics import estimate, median, rank_correlation, ratio
 from acl_gym.experiments.study import Study
 from acl_gym.experiments.systems import (
     GRID_STATES,
@@ -20,7 +19,14 @@ from acl_gym.experiments.systems import (
     grid_optimum,
 )
 from acl_gym.experiments.thesis import chapter3
-from acl_gym.experiments.thesis.common import LATE, centres, claim, listed, percentages
+from acl_gym.experiments.thesis.common import (
+    LATE,
+    centres,
+    claim,
+    for_each,
+    listed,
+    percentages,
+)
 from acl_gym.planning.model import TabularModel
 from acl_gym.planning.value_iteration import policy_value, value_iteration
 from acl_gym.utils.typing import BoolArray, FloatArray, IntArray
@@ -55,7 +61,7 @@ def agreement(actions: IntArray) -> float:
 def trials_to(results: Results, study: Study, share: float) -> FloatArray:
     """The trial at which the cost of a run first comes within a share of its end."""
     costs = results.values(study)
-    end = np.median(costs[:, -LATE:], axis=1, keepdims=True)
+    end = median(costs[:, -LATE:])[:, np.newaxis]
     return np.asarray((costs <= (1.0 + share) * end).argmax(axis=1) + 1.0)
 
 
@@ -71,7 +77,7 @@ def _read_as(reading: str, results: Results) -> Tried:
 def _first_trials(results: Results) -> Tried:
     studies = {gamma: grid_1d(local_decay=gamma) for gamma in (0.0, *chapter3.GAMMAS)}
     firsts = {g: settled_from(optimal(results, s)) for g, s in studies.items()}
-    found = {gamma: f"{np.median(first):g}" for gamma, first in firsts.items()}
+    found = {gamma: f"{median(first):g}" for gamma, first in firsts.items()}
     return Tried("the median trial from which on J = 5, by gamma", listed(found))
 
 
@@ -113,7 +119,7 @@ def _agreement_with(choice: str, results: Results) -> Tried:
 def _within(share: float, results: Results) -> Tried:
     studies = chapter3.COVERED
     trials = {each: trials_to(results, s, share) for each, s in studies.items()}
-    found = {f"{s}, {a:.0%}": f"{np.median(t):g}" for (s, a), t in trials.items()}
+    found = {f"{s}, {a:.0%}": f"{median(t):g}" for (s, a), t in trials.items()}
     return Tried(f"median trials until within {share:.0%} of the end", listed(found))
 
 
@@ -143,7 +149,7 @@ def _c3(results: Results) -> Iterator[Part]:
         yield Part(statement, f"{left:.0%}", bool(left >= 0.5))
 
 
-@claim(*[partial(_read_as, each) for each in chapter3.READ_AS], _first_trials)
+@claim(*for_each(chapter3.READ_AS, _read_as), _first_trials)
 def _c4(results: Results) -> Iterator[Part]:
     studies = {gamma: grid_1d(local_decay=gamma) for gamma in (0.0, *chapter3.GAMMAS)}
     # The mean over the trials is low where learning is both fast and good.
@@ -163,7 +169,7 @@ def _c4(results: Results) -> Iterator[Part]:
 @claim(_one_ant)
 def _c5(results: Results) -> Iterator[Part]:
     reached = [optimal(results, grid_1d(ants)) for ants in (1, 5, 9)]
-    first = [float(np.median(settled_from(each))) for each in reached]
+    first = [float(median(settled_from(each))) for each in reached]
     ends = [float(each[:, -1].mean()) for each in reached]
     statement = "the median trial from which on J = 5 falls from 1 to 5 to 9 ants"
     measured = ", ".join(f"{each:g}" for each in first)
@@ -172,7 +178,7 @@ def _c5(results: Results) -> Iterator[Part]:
     yield Part(statement, percentages(ends), min(ends) >= 0.95)
 
 
-@claim(_every_run, *[partial(_costs_with, choice) for choice in chapter3.CHOICES])
+@claim(_every_run, *for_each(chapter3.CHOICES, _costs_with))
 def _c6(results: Results) -> Iterator[Part]:
     shortest = grid_optimum(grid_2d())
     for p in chapter3.PROBABILITIES:
@@ -185,7 +191,7 @@ def _c6(results: Results) -> Iterator[Part]:
         )
 
 
-@claim(*[partial(_agreement_with, choice) for choice in chapter3.CHOICES])
+@claim(*for_each(chapter3.CHOICES, _agreement_with))
 def _c7(results: Results) -> Iterator[Part]:
     study = grid_2d()
     free = free_states(study)
@@ -202,7 +208,7 @@ def _c7(results: Results) -> Iterator[Part]:
     yield Part(statement, measured, between >= within - 0.05)
 
 
-@claim(partial(_within, 0.1), partial(_within, 0.25))
+@claim(*for_each((0.1, 0.25), _within))
 def _c8(results: Results) -> Iterator[Part]:
     trials = {each: trials_to(results, s, 0.05) for each, s in chapter3.COVERED.items()}
     for size in GRID_STATES:

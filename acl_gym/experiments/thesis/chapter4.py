@@ -24,6 +24,7 @@ from acl_gym.experiments.thesis.common import (
     claim,
     experiment,
     fewer,
+    for_each,
     late_cost,
     listed,
 )
@@ -184,7 +185,7 @@ def _sensitivities(rule: str, results: Results) -> Tried:
         low = int(mean.argmin())
         lowest = f"lowest {mean[low]:.2f} after {low + 1} trials"
         found[kind] = f"{mean[0]:.2f} at first, {lowest}, {mean[-1]:.2f} at the end"
-    return Tried(f"the course of the sensitivity, {RULES[rule]}", listed(found, "; "))
+    return Tried(f"how the sensitivity changes, {RULES[rule]}", listed(found, "; "))
 
 
 def _cheapest(results: Results) -> Tried:
@@ -246,7 +247,7 @@ def _c9(results: Results) -> Iterator[Part]:
     yield Part(statement, f"{narrow:.3g} against {wide:.3g}", narrow < wide)
 
 
-@claim(*[partial(_sensitivities, rule) for rule in RULES])
+@claim(*for_each(RULES, _sensitivities))
 def _c10(results: Results) -> Iterator[Part]:
     ends = {}
     for kind in FUZZY_FIRST:

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-import numpy as np
-
-from acl_gym.experiments.claims import Part, late_swing
+from acl_gym.experiments.claims import Part
 from acl_gym.experiments.results import Results
 from acl_gym.experiments.statistics import (
     estimate,
     interquartile_range,
+    median,
     rank_correlation,
     ratio,
 )
@@ -23,6 +22,7 @@ from acl_gym.experiments.thesis.common import (
     above_one,
     centres,
     claim,
+    late_swing,
     listed,
     number,
 )
@@ -123,12 +123,12 @@ def _c18(results: Results) -> Iterator[Part]:
         study = pendulum("fuzzy", local_decay=gamma)
         best = measures.best_swing_up(results, study)
         all_runs = measures.swing_ups(results, study)
-        median = np.median([each.seconds for each in all_runs])
+        typical = median([each.seconds for each in all_runs])
         turns.append(best.turns)
         yield Part(
             f"gamma = {gamma:g}: with the best fuzzy policy it stays within "
             f"{measures.UPRIGHT:g} rad of upright after at most {seconds + 0.5:g} s",
-            f"{best.seconds:.1f} s; the runs in the median {median:.1f} s",
+            f"{best.seconds:.1f} s; the runs in the median {typical:.1f} s",
             best.seconds <= seconds + 0.5,
         )
     for label, study in chapter5.CRISP_SWINGS.items():
@@ -154,7 +154,7 @@ def _c19(results: Results) -> Iterator[Part]:
     for coarse, fine in ((16, 32), (32, 64)):
         statement = f"fuzzy: N = {coarse} costs more than N = {fine}"
         yield above_one(statement, fuzzy[coarse], fuzzy[fine])
-    spread = interquartile_range(fuzzy[64]) / float(np.median(fuzzy[64]))
+    spread = interquartile_range(fuzzy[64]) / float(median(fuzzy[64]))
     statement = (
         "fuzzy, N = 64: the interquartile range of the runs is at most 5% of the median"
     )

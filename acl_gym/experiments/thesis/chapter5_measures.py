@@ -2,23 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from acl_gym.evaluation import record_trajectory
-from acl_gym.experiments.claims import Tried, late_swing
+from acl_gym.experiments.claims import Tried
 from acl_gym.experiments.methods import restore_policy
 from acl_gym.experiments.results import Results
-from acl_gym.experiments.statistics import estimate
+from acl_gym.experiments.statistics import estimate, median
 from acl_gym.experiments.study import Study
 from acl_gym.experiments.systems import PENDULUM_OPTIMUM, pendulum
 from acl_gym.experiments.thesis import chapter5, common
 from acl_gym.experiments.thesis.common import (
     KINDS,
-    Attempt,
+    LATE,
+    Attempts,
+    for_each,
+    late_swing,
     listed,
     percentages,
     sweep,
@@ -26,16 +29,16 @@ from acl_gym.experiments.thesis.common import (
 from acl_gym.utils.typing import FloatArray
 
 SETTLED = 0.25
-"""A run has settled if its cost swings by at most this share in the last 20 trials."""
+"""A run has settled if its cost swings by at most this share in the last `LATE` trials."""
 
 GOOD = 3.0
 """A run has learned something if its last policies cost at most this many times J*."""
 
 UPRIGHT = 0.5
-"""A pendulum within so many rad of upright has been swung up."""
+"""A pendulum within this many rad of upright has been swung up."""
 
 CONVERGES = (
-    f"in most runs the cost swings by at most {SETTLED:.0%} over the last 20 trials and "
+    f"in most runs the cost swings by at most {SETTLED:.0%} over the last {LATE} trials and "
     f"ends at {GOOD:g} J* or less"
 )
 
@@ -135,14 +138,14 @@ def _longer(kind: str, results: Results) -> Tried:
 def _spikes(kind: str, results: Results) -> Tried:
     found = {}
     for rho, costs in _by_rho(kind, results).items():
-        late = costs[:, -20:]
-        away = np.abs(late / np.median(late, axis=1, keepdims=True) - 1.0)
+        late = costs[:, -LATE:]
+        away = np.abs(late / median(late)[:, np.newaxis] - 1.0)
         steady = (away <= SETTLED / 2).mean(axis=1) >= 0.9
         found[rho] = f"{steady.mean():.0%}"
     return Tried(
         "without single trials (policies that hover beside the goal, docs/hovering.md): "
-        "the share of runs that keep within 12.5% of their median in 18 of the last 20 "
-        "trials",
+        "the share of runs that keep within 12.5% of their median in 18 of the last "
+        f"{LATE} trials",
         listed(found),
     )
 
@@ -184,7 +187,7 @@ def _all_turns(results: Results) -> Tried:
     found = {}
     for label, study in {**chapter5.CRISP_SWINGS, "fuzzy": pendulum("fuzzy")}.items():
         turns = [each.turns for each in swing_ups(results, study)]
-        found[label] = f"{np.median(turns):g} [{min(turns)}, {max(turns)}]"
+        found[label] = f"{median(turns):g} [{min(turns)}, {max(turns)}]"
     what = "turns of all runs instead of the best one: median and range"
     return Tried(what, listed(found))
 
@@ -197,7 +200,7 @@ def _more_ants(results: Results) -> Tried:
 
 def _median_trials(results: Results) -> Tried:
     found = {
-        f"{kind}, N = {n}": estimate(np.median(results.values(s)[:, -10:], axis=1))
+        f"{kind}, N = {n}": estimate(median(results.values(s)[:, -10:]))
         for kind in KINDS
         for n, s in chapter5.partitions(kind).items()
     }
@@ -231,18 +234,14 @@ def _coasting(results: Results) -> Tried:
     )
 
 
-def _for(kind: str, *functions: Callable[[str, Results], Tried]) -> tuple[Attempt, ...]:
-    return tuple(partial(function, kind) for function in functions)
+def _gammas_of(kind: str) -> Attempts:
+    return for_each(chapter5.CHANGED, partial(_gammas, kind))
 
 
-def _for_each_change(function: Callable[..., Tried], *kind: str) -> tuple[Attempt, ...]:
-    return tuple(partial(function, *kind, name) for name in chapter5.CHANGED)
-
-
-TRIED_C13 = _for("crisp", _longer, _first_below, _spikes)
-TRIED_C14 = _for("fuzzy", _spikes, _longer, _first_below)
-TRIED_C15 = (*_for_each_change(_gammas, "crisp"), *_for("crisp", _best_of_run))
-TRIED_C16 = (*_for_each_change(_gammas, "fuzzy"), *_for("fuzzy", _best_of_run))
-TRIED_C18 = (*_for_each_change(_swung_with), _all_turns)
+TRIED_C13 = for_each(("crisp",), _longer, _first_below, _spikes)
+TRIED_C14 = for_each(("fuzzy",), _spikes, _longer, _first_below)
+TRIED_C15 = (*_gammas_of("crisp"), *for_each(("crisp",), _best_of_run))
+TRIED_C16 = (*_gammas_of("fuzzy"), *for_each(("fuzzy",), _best_of_run))
+TRIED_C18 = (*for_each(chapter5.CHANGED, _swung_with), _all_turns)
 TRIED_C19 = (_more_ants, _median_trials)
 TRIED_C20 = (_structures, _coasting)

@@ -5,12 +5,15 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
 
+import numpy as np
+
 from acl_gym.experiments.claims import Claim, Part, Tried
 from acl_gym.experiments.results import Results
-from acl_gym.experiments.statistics import estimate, ratio
+from acl_gym.experiments.statistics import estimate, median, ratio
 from acl_gym.experiments.study import Experiment, Study
 from acl_gym.utils.text import digits
 from acl_gym.utils.typing import FloatArray
@@ -20,6 +23,7 @@ T = TypeVar("T")
 _WORDS = tomllib.loads(Path(__file__).with_name("claims.toml").read_text())
 
 Attempt = Callable[[Results], Tried]
+Attempts = tuple[Attempt, ...]
 Decide = Callable[[Results], Iterator[Part]]
 
 NEARLY_ONE = 0.999999
@@ -88,6 +92,17 @@ def late_cost(results: Results, study: Study, trials: int = LATE) -> FloatArray:
     return late
 
 
+def late_swing(costs: FloatArray, trials: int = LATE) -> FloatArray:
+    """How far each run's policy cost swings at the end: (max - min) / median.
+
+    Args:
+        costs: `(runs, trials)`.
+        trials: how many trials count as the end.
+    """
+    late = costs[:, -trials:]
+    return np.asarray((late.max(axis=1) - late.min(axis=1)) / median(late))
+
+
 def centres(values: Mapping[Any, FloatArray]) -> dict[Any, float]:
     """The interquartile mean over the runs, for each value of a parameter."""
     return {key: estimate(each).value for key, each in values.items()}
@@ -119,6 +134,11 @@ def above_one(statement: str, first: FloatArray, second: FloatArray) -> Part:
     found = ratio(first, second)
     statement += ": the interval of the ratio lies above 1"
     return Part(statement, str(found), found.low > 1)
+
+
+def for_each(values: Iterable[T], *attempts: Callable[[T, Results], Tried]) -> Attempts:
+    """Attempts with each value as their first argument."""
+    return tuple(partial(each, value) for value in values for each in attempts)
 
 
 def claim(*tried: Attempt) -> Callable[[Decide], Claim]:

@@ -115,13 +115,13 @@ def test_a_fresh_call_makes_every_run_anew(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["--preset", "huge"], "invalid choice"),
-        (["--agents", "acl-fuzzy,sarsa"], "must be among"),
+        (["--preset", "huge"], "--preset must be one of"),
+        (["--agents", "acl-fuzzy,sarsa"], "must be one of"),
         (["--seeds", "0"], "whole number >= 1"),
-        (["--env", "CartPole-v1"], "invalid choice"),
+        (["--env", "CartPole-v1"], "--env must be one of"),
         (
             ["--env", "acl_gym/GridSearch1D-v0", "--agents", "acl-fuzzy"],
-            "must be among acl-crisp, q-crisp, q-lambda-crisp, dqn for",
+            "must be one of 'acl-crisp', 'q-crisp', 'q-lambda-crisp', 'dqn', got",
         ),
     ],
 )

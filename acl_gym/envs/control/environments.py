@@ -125,7 +125,7 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
                 - `"reset_mask"`: bool array `(num_envs,)`, the slots to reset, the
                   others are left as they are;
                 - `"finished"`: `"wait"`, in any autoreset mode: from now to the next
-                  full reset a slot that finishes stands still. Its finish is
+                  full reset a slot that has finished is not stepped. Its finish is
                   reported once; after that its action is ignored, its observation
                   stays, its reward is 0 and its flags are False. This is a
                   synchronous trial of a colony; idle slots cost nothing.

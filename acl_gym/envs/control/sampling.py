@@ -17,7 +17,7 @@ def sample_outside(
     """Draw states, each one again until it lies outside a region.
 
     Args:
-        draw: returns so many random states, `(state_size, m)`.
+        draw: returns m random states, `(state_size, m)`, for a given m.
         inside: whether each of `(state_size, m)` states lies in the region, `(m,)`.
         count: how many states, >= 0.
 

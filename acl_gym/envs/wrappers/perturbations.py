@@ -208,7 +208,7 @@ class HiddenVariables(VectorObservationWrapper[FloatArray, Any, Any, Any]):
 class ReversedSlots(VectorWrapper[Any, Any, Any, Any]):
     """The slots of an environment in reverse order.
 
-    With `ReversedLuck` in the agent, each ant draws the same random numbers as in the
+    With `ReversedDraws` in the agent, each ant draws the same random numbers as in the
     original order: only the order changes in which the ants' experience is merged.
 
     Args:
@@ -231,7 +231,7 @@ class ReversedSlots(VectorWrapper[Any, Any, Any, Any]):
         return observations, rewards, terminated, truncated, infos
 
 
-class ReversedLuck:
+class ReversedDraws:
     """A generator whose random numbers are in reverse order along their last axis.
 
     It has the two methods of `numpy.random.Generator` that an agent uses.

@@ -1,4 +1,4 @@
-"""Grids over real variables: crisp bins (4.2) and triangular memberships (4.7)."""
+"""Grids over real variables: crisp bins, eq. (4.2), and fuzzy cells, eq. (4.7)."""
 
 from __future__ import annotations
 

@@ -115,7 +115,7 @@ class GridSearch(NumberedSystem):
     # The base has class attributes here; in the grids they follow from parameters.
     @property
     def draws_per_step(self) -> int:  # type: ignore[override]
-        """1, whether the move succeeds; 0 if it always does."""
+        """1 number decides whether a move succeeds; 0 if moves never fail."""
         return int(self.transition_probability < 1.0)
 
     @property

@@ -43,7 +43,7 @@ class Navigation(BlockSystem):
         b = base_damping + sum_i h_i exp(-sum_j (c_j - m_ji)^2 / sigma_ji^2).
 
     Attributes:
-        mass: kg, > 0. The thesis has 1; that it divides the damping is a decision.
+        mass: kg, > 0. The thesis has 1; it also divides the damping, a decision.
         base_damping: b_0, kg / s, >= 0.
         peaks: the Gaussians of the damping, none or more, each as (h, m_1, m_2,
             sigma_1, sigma_2): height, kg / s, >= 0; centre, m; widths, m, > 0.
@@ -56,9 +56,9 @@ class Navigation(BlockSystem):
             as the pendulum with 1 (a decision).
         position_max: m, > 0. Both positions are clipped to it after each step.
         velocity_max: m / s, > 0. Both velocities are clipped to it after each step.
-            A wall stops the position only: the velocity towards it is kept until a
-            force or the damping ends it (a decision).
-        cost: "quadratic", (3.2) with the error taken after the step, or "time", 1 a
+            At a wall only the position stops; the velocity changes only by the force
+            and the damping (a decision).
+        cost: "quadratic", (3.2) with the error taken after the step, or "time", 1 per
             step (§4.5.3).
         goal_rule: "bounds", each variable within `goal_bounds` (§4.5.1), or
             "membership", degree of the goal's membership function > 0.5 (§4.4).

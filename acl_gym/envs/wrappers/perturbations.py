@@ -67,12 +67,12 @@ def perturbed(
 
 
 def _generator(seed: int) -> np.random.Generator:
-    """A stream apart from that of the environment, which gets the same seed."""
+    """A generator independent of that of the environment, which gets the same seed."""
     return np.random.default_rng([seed, 1])
 
 
 class ActionNoise(VectorActionWrapper[Any, Any, Any, Any]):
-    """Replaces actions at random by one drawn uniformly from all of them.
+    """Replaces actions at random by actions drawn uniformly from all.
 
     Gymnasium has no such wrapper: its `StickyAction` repeats the previous action.
 
@@ -149,8 +149,8 @@ class ObservationNoise(VectorObservationWrapper[FloatArray, Any, Any, Any]):
 class RoundedObservation(VectorObservationWrapper[FloatArray, Any, Any, Any]):
     """Rounds variables to the nearest of a few evenly spaced values.
 
-    Gymnasium's `DiscretizeObservation` returns numbers of bins of single environments;
-    here variables keep their units and the space stays as it is.
+    Gymnasium's `DiscretizeObservation` returns bin numbers and is for single
+    environments; here variables keep their units and the space is unchanged.
 
     Args:
         env: whose observations are a bounded box of one axis.

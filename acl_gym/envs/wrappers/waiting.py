@@ -14,7 +14,7 @@ from acl_gym.utils import validation
 
 
 class WaitingVectorEnv(SyncVectorEnv):
-    """A `SyncVectorEnv` that steps only the slots whose episodes go on.
+    """A `SyncVectorEnv` that steps only the slots that have not finished.
 
     In a trial, ants wait until the last of them has finished. Meanwhile a
     `SyncVectorEnv` goes on stepping and resetting finished slots; where episodes differ

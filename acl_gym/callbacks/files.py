@@ -21,7 +21,7 @@ class Checkpoint(Callback):
 
     `ACL.load(directory / "trial_000010.npz", env).learn(trials=10)` gives bit for bit
     the result of an uninterrupted run. Place it after the callbacks that add measures,
-    so that the file contains these.
+    so that the files contain those measures.
 
     Args:
         directory: receives `trial_000010.npz` and so on; made if missing. Use one

@@ -57,7 +57,7 @@ class TensorBoardLog(Callback):
         return True
 
     def on_training_end(self, agent: Agent) -> None:
-        """Write measures added to the last row since, and close the file."""
+        """Write measures that were added to the last row later, and close the file."""
         if agent.history:
             row = agent.history[-1]
             self._write(

@@ -1,6 +1,6 @@
 """The control systems that ants walk through, as Gymnasium environments.
 
-One table of every environment id, registered when `acl_gym` is imported.
+The table of all environment ids, which are registered when `acl_gym` is imported.
 """
 
 from __future__ import annotations

@@ -256,7 +256,7 @@ class Rollout:
     def _last_seen(
         self, stopped: IntArray, observation: NDArray[Any], infos: dict[str, Any]
     ) -> NDArray[Any]:
-        """Observations, with the last ones of the episodes that have just ended."""
+        """Observations; where an episode has just ended, its final observation."""
         observation = observation.copy()
         for slot in stopped:
             observation[slot] = infos["final_obs"][slot]

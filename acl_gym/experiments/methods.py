@@ -16,7 +16,7 @@ from acl_gym.agents.acl import ACL, PheromoneBoundWarning
 from acl_gym.agents.base import TabularAgent
 from acl_gym.agents.q_learning import QLearning
 from acl_gym.callbacks.base import Callback
-from acl_gym.envs.wrappers.perturbations import ReversedLuck, ReversedSlots
+from acl_gym.envs.wrappers.perturbations import ReversedDraws, ReversedSlots
 from acl_gym.evaluation import Predictor, evaluate_policy_cost
 from acl_gym.experiments.episode_costs import EPISODE_COSTS
 from acl_gym.experiments.results import Run
@@ -130,7 +130,7 @@ def make_agent(study: Study, seed: int) -> TabularAgent:
         warnings.simplefilter("ignore", PheromoneBoundWarning)
         agent = kind(env, study.make_partition(), seed=seed, **settings)
     if study.reversed_slots:
-        agent.rng = ReversedLuck(agent.rng)  # type: ignore[assignment]
+        agent.rng = ReversedDraws(agent.rng)  # type: ignore[assignment]
     return agent
 
 

@@ -5,7 +5,7 @@ sum to 1. Plain discrete states (§3.2) and a crisp partition (§4.2) have k = 1
 one (§4.3) k = 2^d. Equations written over `(index, degree)` therefore hold for all.
 
 `base` defines what a partition is, `discrete` and `grid` hold the kinds of them, and
-`automatic` builds one for an environment: that of the thesis, or one of its own choice.
+`automatic` builds one for an environment: that of the thesis, or a general one.
 """
 
 from acl_gym.partitions.base import Partition, check_cells

@@ -208,7 +208,7 @@ def _shown_variables(env: Any, system: ControlSystem) -> list[int]:
 
 
 def _are_centres(cells: Any) -> bool:
-    """Whether `cells` are sequences of centres, not numbers of them or a name."""
+    """Whether `cells` are sequences of centres rather than their numbers or a name."""
 
     def is_list(value: Any) -> bool:
         return isinstance(value, Sequence | np.ndarray) and not isinstance(value, str)

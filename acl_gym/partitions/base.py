@@ -1,4 +1,4 @@
-"""What a partition is: a batch of states becomes `(index, degree)`."""
+"""The interface of partitions, which map a batch of states to `(index, degree)`."""
 
 from __future__ import annotations
 

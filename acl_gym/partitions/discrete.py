@@ -1,4 +1,4 @@
-"""States that are cells already: `Discrete`, `MultiDiscrete` and `MultiBinary`."""
+"""States that are already cells: `Discrete`, `MultiDiscrete` and `MultiBinary`."""
 
 from __future__ import annotations
 

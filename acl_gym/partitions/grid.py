@@ -1,4 +1,4 @@
-"""Grids over real variables: crisp bins (4.2) and triangular memberships (4.7)."""
+"""Grids over real variables: crisp bins, eq. (4.2), and fuzzy cells, eq. (4.7)."""
 
 from __future__ import annotations
 
@@ -229,7 +229,7 @@ class Grid(Partition):
 
 
 class Crisp(Grid):
-    """Crisp bins: a state belongs entirely to the nearest centre, (4.2).
+    """Crisp bins: a state belongs entirely to the nearest centre, eq. (4.2).
 
     A state halfway between two centres belongs to the upper one. See `from_box` for
     evenly spread centres.
@@ -243,7 +243,7 @@ class Crisp(Grid):
 
 
 class Fuzzy(Grid):
-    """Triangular membership functions around the centres, (4.7)-(4.9).
+    """Fuzzy cells: triangular membership functions, eqs. (4.7)-(4.9).
 
     The degree of a cell is the product of the memberships of the variables; a state
     beyond the outermost centres belongs entirely to the outermost. See `from_box` for

@@ -59,7 +59,7 @@ def locate_on_axis(
 
     x lies between centres `low` and `low` + 1, and the membership (4.7) is 1 -
     `fraction` to the former, `fraction` to the latter. Outside the centres the
-    fraction saturates at 0 or 1. Short loops one after the other: all but the
+    fraction saturates at 0 or 1. The loops are short and separate, so that all but the
     look-up of centres are vectorised.
 
     Args:

@@ -12,13 +12,12 @@ from typing import Any
 import numpy as np
 from gymnasium.vector import VectorEnv
 from numba import njit
-from tqdm.auto import tqdm
 
 from acl_gym.colony.greedy import ALL, best_value
 from acl_gym.envs.control.environments import ControlVectorEnv
 from acl_gym.partitions import Partition
+from acl_gym.planning.sweeps import checked_settings, sweep_until_converged
 from acl_gym.policies import TablePolicy
-from acl_gym.utils import validation
 from acl_gym.utils.typing import BoolArray, CellArray, FloatArray
 
 _SLOTS = 65_536  # states simulated at once
@@ -70,7 +69,7 @@ def fuzzy_q_iteration(
         partition: the cells.
         discount: gamma_rl, in [0, 1]; 1 means undiscounted.
         tolerance: stop when no value changes by more than this, > 0.
-        max_iterations: stop after so many sweeps, >= 1. Not reaching the tolerance
+        max_iterations: stop after this many sweeps, >= 1. Not reaching the tolerance
             is reported in the result: without a discount, cells from which the goal
             cannot be reached cost more with each sweep.
         progress_bar: show a progress bar.
@@ -85,28 +84,20 @@ def fuzzy_q_iteration(
             "env must be a deterministic vector environment of acl_gym, which can "
             f"start from any state, got {type(base).__name__}."
         )
-    discount = validation.number("discount", discount, at_least=0, at_most=1)
-    tolerance = validation.number("tolerance", tolerance, above=0)
-    max_iterations = validation.integer("max_iterations", max_iterations, at_least=1)
+    discount, tolerance, max_iterations = checked_settings(
+        discount, tolerance, max_iterations
+    )
 
     model = _try_all(base, partition)
     values = np.zeros(model.reward.shape)
-    change, iterations = np.inf, 0
-    with tqdm(
-        total=max_iterations, disable=not progress_bar, desc="Q-iteration"
-    ) as bar:
-        while change > tolerance and iterations < max_iterations:
-            change = _sweep(
-                model.reward,
-                model.terminated,
-                model.index,
-                model.degree,
-                discount,
-                values,
-            )
-            iterations += 1
-            bar.update()
-    return QIterationResult(TablePolicy(partition, values), iterations, float(change))
+    arrays = (model.reward, model.terminated, model.index, model.degree)
+    iterations, change = sweep_until_converged(
+        lambda: _sweep(*arrays, discount, values),
+        tolerance,
+        max_iterations,
+        "Q-iteration" if progress_bar else None,
+    )
+    return QIterationResult(TablePolicy(partition, values), iterations, change)
 
 
 def _try_all(env: ControlVectorEnv, partition: Partition) -> _Model:

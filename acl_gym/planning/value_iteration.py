@@ -18,12 +18,15 @@ from numpy.typing import ArrayLike
 from scipy import sparse
 from scipy.sparse import csgraph
 from scipy.sparse.linalg import spsolve
-from tqdm.auto import tqdm
 
 from acl_gym.partitions import Discrete
 from acl_gym.planning.model import TabularModel
+from acl_gym.planning.sweeps import (
+    checked_discount,
+    checked_settings,
+    sweep_until_converged,
+)
 from acl_gym.policies import TablePolicy
-from acl_gym.utils import validation
 from acl_gym.utils.typing import BoolArray, FloatArray, IntArray
 
 
@@ -90,7 +93,7 @@ def value_iteration(
         model: the model, or an environment for `TabularModel.from_env`.
         discount: gamma_rl, in [0, 1].
         tolerance: stop when no value changes by more than this, > 0.
-        max_iterations: stop after so many sweeps, >= 1. Not reaching the tolerance is
+        max_iterations: stop after this many sweeps, >= 1. Not reaching the tolerance is
             reported in the result: without a discount, states from which no end can be
             reached cost more with each sweep.
         progress_bar: show a progress bar.
@@ -101,20 +104,18 @@ def value_iteration(
     """
     if not isinstance(model, TabularModel):
         model = TabularModel.from_env(model)
-    discount = validation.number("discount", discount, at_least=0, at_most=1)
-    tolerance = validation.number("tolerance", tolerance, above=0)
-    max_iterations = validation.integer("max_iterations", max_iterations, at_least=1)
+    discount, tolerance, max_iterations = checked_settings(
+        discount, tolerance, max_iterations
+    )
 
     arrays = (model.probability, model.next_state, model.reward, model.terminated)
     values = np.zeros(model.n_states)
-    change, iterations = np.inf, 0
-    with tqdm(
-        total=max_iterations, disable=not progress_bar, desc="Value iteration"
-    ) as bar:
-        while change > tolerance and iterations < max_iterations:
-            change = _sweep(*arrays, discount, values)
-            iterations += 1
-            bar.update()
+    iterations, change = sweep_until_converged(
+        lambda: _sweep(*arrays, discount, values),
+        tolerance,
+        max_iterations,
+        "Value iteration" if progress_bar else None,
+    )
     action_values = _action_values(*arrays, discount, values)
     if not (np.isfinite(values).all() and np.isfinite(action_values).all()):
         raise ValueError(
@@ -127,7 +128,7 @@ def value_iteration(
         model.probability, model.next_state, model.terminated, tied
     )
     return ValueIterationResult(
-        values, action_values, actions, iterations, float(change), model
+        values, action_values, actions, iterations, change, model
     )
 
 
@@ -159,7 +160,7 @@ def policy_value(
     """
     if not isinstance(model, TabularModel):
         model = TabularModel.from_env(model)
-    discount = validation.number("discount", discount, at_least=0, at_most=1)
+    discount = checked_discount(discount)
     actions = np.asarray(policy_actions)
     n = model.n_states
     if actions.shape != (n,) or actions.dtype.kind not in "iu":

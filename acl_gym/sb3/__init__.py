@@ -1,1 +1,1 @@
-"""Stable-Baselines3: its interface for our environments, and its DQN."""
+"""Stable-Baselines3: an adapter for vector environments, and its DQN."""

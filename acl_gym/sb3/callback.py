@@ -17,7 +17,7 @@ from acl_gym.utils.typing import Row
 
 
 class PolicyCostCallback(BaseCallback):
-    """Evaluates the policy every so many steps and keeps the best parameters.
+    """Evaluates the policy at regular intervals and keeps the best parameters.
 
     It evaluates between updates, without exploration and in an environment of its own,
     and draws no random numbers, so that learning is the same with it as without it.

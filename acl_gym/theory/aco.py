@@ -49,7 +49,7 @@ def least_probability(
 def trials_to_find(
     probability: ArrayLike, length: ArrayLike, failure: ArrayLike
 ) -> FloatArray:
-    """K of Theorem 2.4: trials until an optimum is found, except with chance `failure`.
+    """K of Theorem 2.4: trials until an optimum is found with chance 1 - `failure`.
 
     Args:
         probability: p_min, in (0, 1].

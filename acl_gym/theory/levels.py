@@ -121,7 +121,7 @@ def pair_probability_bound(
 
 
 def tau0_bound(max_cost: ArrayLike, global_decay: ArrayLike) -> FloatArray:
-    """rho / J_max: largest tau0 below which no level falls (Proposition 3.4).
+    """rho / J_max: the largest tau0 that no level falls below (Proposition 3.4).
 
     The proof needs less: the level after an update is at least
     (1 - rho) tau0 + rho / J_max, so that tau0 <= 1 / J_max suffices.

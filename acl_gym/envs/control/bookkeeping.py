@@ -131,7 +131,7 @@ def checked_reset_mask(mask: Any, num_envs: int, *, begun: bool) -> BoolArray | 
 def final_infos(
     observations: NDArray[Any], finished: BoolArray, infos: dict[str, Any]
 ) -> dict[str, Any]:
-    """Return the final observations and infos of slots that a step ends and resets.
+    """Return the final observations and infos of finished slots that are reset.
 
     Args:
         observations: of the last states, `(num_envs, ...)`.

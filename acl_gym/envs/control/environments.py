@@ -1,8 +1,8 @@
 """The native vector environment over a control system.
 
-A system (`ControlSystem`) says how states move. This module says when a slot starts,
-how long its episode may last, what happens when it has finished, and which arrays are
-handed out. Every array that `reset` or `step` returns is a new one. The single
+A system (`ControlSystem`) defines how states change. This module determines when a slot
+starts, how long its episode may last, what happens when it has finished, and which
+arrays are returned. Every array that `reset` or `step` returns is a new one. The single
 environment over the same systems is in `single`.
 """
 
@@ -41,7 +41,7 @@ StepResult = tuple[Observation, FloatArray, BoolArray, BoolArray, dict[str, Any]
 
 
 class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
-    """Native vector environment over a control system: one kernel call a step.
+    """Native vector environment over a control system: one kernel call per step.
 
     Args:
         num_envs: number of slots, >= 1.
@@ -125,7 +125,7 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
                 - `"reset_mask"`: bool array `(num_envs,)`, the slots to reset, the
                   others are left as they are;
                 - `"finished"`: `"wait"`, in any autoreset mode: from now to the next
-                  full reset a slot that finishes stands still. Its finish is
+                  full reset a slot that has finished is not stepped. Its finish is
                   reported once; after that its action is ignored, its observation
                   stays, its reward is 0 and its flags are False. This is a
                   synchronous trial of a colony; idle slots cost nothing.
@@ -245,7 +245,7 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
         self._renderer.show_table(table)
 
     def with_slots(self, num_envs: int) -> Self:
-        """Make a new environment that differs in its number of slots only."""
+        """Make a new environment that differs only in the number of slots."""
         return type(self)(
             num_envs,
             max_episode_steps=self.max_episode_steps,

@@ -20,7 +20,8 @@ def sine(x: float) -> float:
     """Sine without branches, so that LLVM vectorises the loop it is called in.
 
     The argument is reduced to [-pi/2, pi/2], where the Taylor series through r^19
-    leaves 3e-16. Valid for |x| < 1e5; a test holds it to 1e-15 there for |x| < 100.
+    leaves 3e-16. Valid for |x| < 1e5; a test checks that the error is at most 1e-15 for
+    |x| < 100.
     """
     # Numba's math.floor returns an integer, a conversion that is not vectorised.
     turns: float = np.floor(x * (1.0 / math.pi) + 0.5)
@@ -49,13 +50,13 @@ _LOWEST_EXPONENT = -708.0  # exp of less is not a normal float
 
 
 def _power_of_two(rounded: float) -> float:
-    """2^n of n + _ROUNDING, |n| < 1022; compiled, it is two integer operations."""
+    """2^n from n + _ROUNDING, for |n| < 1022; compiles to two integer operations."""
     return math.ldexp(1.0, int(rounded - _ROUNDING))
 
 
 @intrinsic
 def _move_to_exponent(_: Any, rounded: Any) -> Any:
-    """Make the low bits of `rounded`, and 1023, the exponent of a float."""
+    """Return the float whose exponent bits are the low bits of `rounded` plus 1023."""
 
     def code(context: Any, builder: Any, _signature: Any, args: Any) -> Any:
         bits = builder.bitcast(args[0], context.get_value_type(types.int64))
@@ -80,7 +81,7 @@ def exponential(x: float) -> float:
 
     exp(x) = 2^n exp(r), where |r| <= log(2) / 2 and the Taylor series through r^13
     leaves 4e-18. Valid for x <= 708, also for -inf; 0 below -708, where it is less
-    than 4e-308. A test holds the relative error to 1e-15.
+    than 4e-308. A test checks that the relative error is at most 1e-15.
     """
     bounded = max(x, _LOWEST_EXPONENT)
     rounded = bounded * _LOG2_E + _ROUNDING

@@ -48,7 +48,7 @@ def real_states(states: Any, variables: Sequence[str]) -> FloatArray:
         variables: their names.
 
     Raises:
-        ValueError: the shape is another one, or a state is not finite.
+        ValueError: the shape is wrong, or a state is not finite.
     """
     array = validation.real_array("states", states, finite=False)
     if array.ndim != 2 or array.shape[1] != len(variables):
@@ -73,7 +73,7 @@ def numbered_states(states: Any, n_states: int, hint: str) -> FloatArray:
         hint: what the error message adds about the numbers.
 
     Raises:
-        ValueError: the shape is another one, or a state is no such integer.
+        ValueError: the shape is wrong, or a state is not such an integer.
     """
     array = validation.real_array("states", states, finite=False)
     if array.shape not in ((array.size,), (array.size, 1)):

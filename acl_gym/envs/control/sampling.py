@@ -17,7 +17,7 @@ def sample_outside(
     """Draw states, each one again until it lies outside a region.
 
     Args:
-        draw: returns so many random states, `(state_size, m)`.
+        draw: returns m random states, `(state_size, m)`, for a given m.
         inside: whether each of `(state_size, m)` states lies in the region, `(m,)`.
         count: how many states, >= 0.
 
@@ -34,7 +34,7 @@ def halton_points(count: int) -> FloatArray:
     """The points 1 to `count` of Halton's sequence in four dimensions, `(count, 4)`.
 
     Coordinate j of point i consists of the digits of i in the j-th prime base, in
-    reverse order behind the point. They fill [0, 1)^4 evenly, without randomness.
+    reverse order after the radix point. They fill [0, 1)^4 evenly, without randomness.
     SciPy has the sequence too, but its import takes longer than all of this package.
     """
     points = np.zeros((count, 4))

@@ -1,4 +1,4 @@
-"""A step of the slots whose episodes go on, while the others are idle."""
+"""A step of the active slots, while those that have finished are idle."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ RESTORE_ABOVE = 0.75
 class PartialStep:
     """Gathers some slots side by side, advances them, and puts them back.
 
-    Idle slots cost nothing, and nothing is allocated. If most slots walk, all are
+    Idle slots cost nothing, and nothing is allocated. If most slots are active, all are
     advanced in place and the idle ones restored; the results are the same.
 
     Args:
@@ -100,7 +100,7 @@ class PartialStep:
     def _scratch_for(
         self, slots: IntArray, states: FloatArray
     ) -> tuple[FloatArray, IntArray, FloatArray, BoolArray]:
-        """Return scratch arrays, those of the last step if as many slots walk."""
+        """Return scratch arrays: those of the last step if they have the right size."""
         size, m = len(states), slots.size
         scratch = self._scratch
         if scratch is None or scratch[0].shape != (size, m):

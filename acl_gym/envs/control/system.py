@@ -66,8 +66,8 @@ class ControlSystem(ABC):
     def checked_states(self, states: Any) -> FloatArray:
         """Return `states`, shape `(n, state_size)`, validated and in canonical form.
 
-        A state of one variable may come without its axis, states of shape `(n,)`.
-        Goal states are allowed: the first step is taken from them like from any other.
+        States of one variable may also have the shape `(n,)`. Goal states are allowed:
+        the first step is taken from them as from any other state.
 
         Returns:
             Array of shape `(n, state_size)`.
@@ -103,12 +103,12 @@ class ControlSystem(ABC):
         """The centres that the thesis gives each state variable, for a partition.
 
         Args:
-            cells: which of them, where the thesis has several or a formula; see the
+            cells: which centres, if the thesis has several sets or a formula; see the
                 system. None takes its default.
 
         Returns:
             For each variable its centres, increasing, in the unit of the variable;
-            None if the thesis has none, as where a state is a cell already.
+            None if the thesis has none, for instance because each state is a cell.
 
         Raises:
             ValueError: there are no such centres.

@@ -30,7 +30,7 @@ class GridSearch1DEnv(ControlEnv):
     `Discrete(10)`: the number of the state, from 0 in the west to 9, the goal.
 
     ## Rewards
-    -1 a step, also if the move was blocked or failed. The return is -J.
+    -1 per step, even if the move was blocked or failed. The return is -J.
 
     ## Starting State
     Uniform over the states without the goal.
@@ -93,7 +93,7 @@ class GridSearch2DEnv(ControlEnv):
     states, 31x31 has 641.
 
     ## Rewards
-    -1 a step, also if the move was blocked or failed. The return is -J.
+    -1 per step, even if the move was blocked or failed. The return is -J.
 
     ## Starting State
     Uniform over the free cells without the goals.

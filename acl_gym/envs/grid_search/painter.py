@@ -77,7 +77,7 @@ class GridSearchPainter(Painter[GridSearch]):
 
 
 class _Layout:
-    """Where the cells are on a canvas: square, as large as fits, centred."""
+    """The places of the cells on a canvas: square, centred, as large as possible."""
 
     def __init__(self, canvas: Any, shape: tuple[int, ...]) -> None:
         size = int(canvas.get_width())
@@ -145,7 +145,7 @@ def draw_arrows(
     table: FloatArray,
     directions: tuple[Direction, ...],
 ) -> None:
-    """Draw an arrow for each action of each cell, long and dark as its share is large.
+    """Draw an arrow for each action of each cell, as large and dark as its share.
 
     Args:
         pygame: the module.
@@ -185,7 +185,7 @@ def _pixels(
     aside: FloatArray,
     side: int,
 ) -> FloatArray:
-    """Pixels of points seen from the centre of a cell in the direction of an action.
+    """Pixels of points relative to the centre of a cell and the direction of an action.
 
     Args:
         centres: pixels, `(n, 1, 2)`.

@@ -6,14 +6,13 @@ import math
 from abc import abstractmethod
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, ClassVar, NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from acl_gym.envs.control import parameters
-from acl_gym.envs.control.system import ControlSystem
+from acl_gym.envs.control.families import NumberedSystem
 from acl_gym.envs.grid_search import kernels
 from acl_gym.envs.grid_search.maps import FREE, GOAL, MAPS, WALL, checked_map, load_map
 from acl_gym.utils import validation
@@ -41,7 +40,7 @@ class Outcomes(NamedTuple):
     terminated: BoolArray
 
 
-class GridSearch(ControlSystem):
+class GridSearch(NumberedSystem):
     """What the grids share: cells, moves and their outcomes.
 
     A state is the index of a cell that is no obstacle, counted from 0 row by row from
@@ -49,6 +48,7 @@ class GridSearch(ControlSystem):
     or the border, and a move that fails, leave the ant where it is and cost a step.
     """
 
+    state_hint: ClassVar[str] = "`cells` lists the cell of each state"
     directions: ClassVar[tuple[tuple[int, int], ...]]
     """Of each action: how many rows and columns it moves by."""
 
@@ -115,7 +115,7 @@ class GridSearch(ControlSystem):
     # The base has class attributes here; in the grids they follow from parameters.
     @property
     def draws_per_step(self) -> int:  # type: ignore[override]
-        """1, whether the move succeeds; 0 if it always does."""
+        """1 number decides whether a move succeeds; 0 if moves never fail."""
         return int(self.transition_probability < 1.0)
 
     @property
@@ -150,19 +150,6 @@ class GridSearch(ControlSystem):
         drawn = starts[rng.integers(starts.size, size=(1, count))]
         return drawn.astype(np.float64)
 
-    def checked_states(self, states: Any) -> FloatArray:
-        """Return states given as `(n,)` or `(n, 1)` in the shape `(n, 1)`.
-
-        Raises:
-            ValueError: wrong shape, or a state is not an integer of 0..n_states - 1.
-        """
-        hint = "`cells` lists the cell of each state"
-        return parameters.numbered_states(states, self.n_states, hint)
-
-    def observe(self, states: FloatArray) -> IntArray:
-        """Return the states `(1, n)` as int64 `(n,)`."""
-        return np.asarray(states[0].astype(np.int64))
-
     def advance(
         self,
         states: FloatArray,
@@ -173,7 +160,7 @@ class GridSearch(ControlSystem):
     ) -> None:
         """One move of each ant; see `ControlSystem.advance`.
 
-        A goal is left like any other state.
+        Moves from a goal state behave like any other move.
         """
         if uniforms is None:
             kernels.move(

@@ -184,6 +184,7 @@ def advance_in_parallel(
     reached: BoolArray,
 ) -> None:
     """Do what `advance` does, its blocks shared among threads."""
+    # Numba takes no tuple within a tuple into a parallel loop.
     push, base, peaks, step, substeps = dynamics
     x_max, v_max, weight, action_costs, product, goal_x, goal_v = goal_and_cost
     for block in prange((actions.size + BLOCK - 1) // BLOCK):

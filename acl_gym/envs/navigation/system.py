@@ -13,11 +13,11 @@ from gymnasium import spaces
 from numpy.typing import ArrayLike
 
 from acl_gym.envs.control import parameters, sampling
-from acl_gym.envs.control.system import ControlSystem
+from acl_gym.envs.control.families import BlockSystem
 from acl_gym.envs.navigation import kernels
 from acl_gym.envs.navigation.kernels import Peak, Row
-from acl_gym.utils import threads, validation
-from acl_gym.utils.typing import BoolArray, FloatArray, IntArray
+from acl_gym.utils import validation
+from acl_gym.utils.typing import BoolArray, FloatArray
 
 _VELOCITY = (-2.0, 0.0, 2.0)
 _REGULAR = (-5.0, -2.0, -0.3, -0.1, 0.0, 0.1, 0.3, 2.0, 5.0)
@@ -34,7 +34,7 @@ THESIS_CENTRES = {
 
 
 @dataclass(frozen=True, kw_only=True)
-class Navigation(ControlSystem):
+class Navigation(BlockSystem):
     """Parameters and dynamics of the vehicle of §4.5.1.
 
     The state is x = [c1 v1 c2 v2]: position and velocity along two axes. In each,
@@ -43,7 +43,7 @@ class Navigation(ControlSystem):
         b = base_damping + sum_i h_i exp(-sum_j (c_j - m_ji)^2 / sigma_ji^2).
 
     Attributes:
-        mass: kg, > 0. The thesis has 1; that it divides the damping is a decision.
+        mass: kg, > 0. The thesis has 1; it also divides the damping, a decision.
         base_damping: b_0, kg / s, >= 0.
         peaks: the Gaussians of the damping, none or more, each as (h, m_1, m_2,
             sigma_1, sigma_2): height, kg / s, >= 0; centre, m; widths, m, > 0.
@@ -56,9 +56,9 @@ class Navigation(ControlSystem):
             as the pendulum with 1 (a decision).
         position_max: m, > 0. Both positions are clipped to it after each step.
         velocity_max: m / s, > 0. Both velocities are clipped to it after each step.
-            A wall stops the position only: the velocity towards it is kept until a
-            force or the damping ends it (a decision).
-        cost: "quadratic", (3.2) with the error taken after the step, or "time", 1 a
+            At a wall only the position stops; the velocity changes only by the force
+            and the damping (a decision).
+        cost: "quadratic", (3.2) with the error taken after the step, or "time", 1 per
             step (§4.5.3).
         goal_rule: "bounds", each variable within `goal_bounds` (§4.5.1), or
             "membership", degree of the goal's membership function > 0.5 (§4.4).
@@ -73,6 +73,7 @@ class Navigation(ControlSystem):
     """
 
     evaluation_steps: ClassVar[int] = 150  # T of Table 4.1
+    block_kernels = (kernels.advance, kernels.advance_in_parallel)
 
     mass: float = 1.0
     base_damping: float = 0.5
@@ -236,20 +237,6 @@ class Navigation(ControlSystem):
                 f"set {setting} to allow more."
             )
         return array
-
-    def advance(
-        self,
-        states: FloatArray,
-        actions: IntArray,
-        uniforms: FloatArray | None,
-        rewards: FloatArray,
-        reached: BoolArray,
-    ) -> None:
-        """One sampling time of §4.5.1; see `ControlSystem.advance`."""
-        move = kernels.advance
-        if threads.worth_it(actions.size):
-            move = kernels.advance_in_parallel
-        move(states, actions, self._dynamics, self._goal_and_cost, rewards, reached)
 
     def evaluation_states(self) -> FloatArray:
         """Return the Halton points 1 to 100 in bases 2, 3, 5 and 7, scaled to X.

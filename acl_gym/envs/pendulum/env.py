@@ -12,8 +12,8 @@ class PendulumEnv(ControlEnv):
 
     ## Description
     A pole hangs from a pivot on which a motor exerts a limited torque (§5.2). The
-    torque cannot lift it in one movement: it must swing to and fro first, and must be
-    slowed in time to stop upright.
+    torque cannot lift it in one movement: it must swing back and forth first, and must
+    be slowed in time to stop upright.
 
     ## Action Space
     `Discrete(3)`, the torque u held for one sampling time.

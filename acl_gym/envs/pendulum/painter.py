@@ -48,7 +48,7 @@ class PendulumPainter(Painter[Pendulum]):
             self._draw_torque(pygame, canvas, torque, size)
 
     def _draw_torque(self, pygame: Any, canvas: Any, torque: float, size: int) -> None:
-        """Draw an arc over the pivot, with a head; its length is that of the torque."""
+        """Draw an arrow along an arc over the pivot, whose length shows the torque."""
         share = torque / max(abs(u) for u in self.system.torques)
         radius, thickness = 0.1 * size, max(2, round(0.012 * size))
         angles = math.pi / 2 * np.linspace(0.0, 1.0, 25) * share

@@ -12,15 +12,15 @@ import numpy as np
 from gymnasium import spaces
 
 from acl_gym.envs.control import parameters, sampling
-from acl_gym.envs.control.system import ControlSystem
+from acl_gym.envs.control.families import BlockSystem
 from acl_gym.envs.pendulum import kernels
 from acl_gym.envs.pendulum.kernels import TWO_PI
-from acl_gym.utils import threads, validation
-from acl_gym.utils.typing import BoolArray, FloatArray, IntArray
+from acl_gym.utils import validation
+from acl_gym.utils.typing import BoolArray, FloatArray
 
 
 @dataclass(frozen=True, kw_only=True)
-class Pendulum(ControlSystem):
+class Pendulum(BlockSystem):
     """Parameters (Table 5.1) and dynamics (5.1) of the pendulum.
 
     The state is x = [theta omega]: theta = 0 hangs down, theta = pi stands upright.
@@ -47,6 +47,7 @@ class Pendulum(ControlSystem):
     """
 
     circular: ClassVar[tuple[int, ...]] = (0,)
+    block_kernels = (kernels.advance, kernels.advance_in_parallel)
 
     inertia: float = 0.005
     motor_gain: float = 0.1
@@ -156,20 +157,6 @@ class Pendulum(ControlSystem):
         array[:, 0] = np.mod(array[:, 0], TWO_PI)
         array[array[:, 0] >= TWO_PI, 0] = 0.0
         return array
-
-    def advance(
-        self,
-        states: FloatArray,
-        actions: IntArray,
-        uniforms: FloatArray | None,
-        rewards: FloatArray,
-        reached: BoolArray,
-    ) -> None:
-        """One sampling time of (5.1); see `ControlSystem.advance`."""
-        move = kernels.advance
-        if threads.worth_it(actions.size):
-            move = kernels.advance_in_parallel
-        move(states, actions, self._dynamics, self._goal_and_cost, rewards, reached)
 
     def evaluation_states(self) -> FloatArray:
         """Return 100 states: theta_i = 2 pi i / 10 + 0.01, 10 even values of omega.

@@ -8,7 +8,7 @@ from acl_gym.envs.two_state.system import TwoState
 
 
 class TwoStateEnv(ControlEnv):
-    """The smallest system with a choice: one state without a choice, then one with it.
+    """The smallest system with a choice: after a single action, one of several.
 
     ## Description
     Figure 3.2: every ant starts in q, where a single action leads to q'. There it

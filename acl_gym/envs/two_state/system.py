@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 from gymnasium import spaces
 
-from acl_gym.envs.control import parameters
-from acl_gym.envs.control.system import ControlSystem
+from acl_gym.envs.control.families import NumberedSystem
 from acl_gym.envs.two_state import kernels
 from acl_gym.envs.two_state.kernels import FIRST
 from acl_gym.utils import validation
@@ -18,7 +17,7 @@ from acl_gym.utils.typing import BoolArray, FloatArray, IntArray
 
 
 @dataclass(frozen=True, kw_only=True)
-class TwoState(ControlSystem):
+class TwoState(NumberedSystem):
     """From q one action leads to q', from there N actions to the goal.
 
     Attributes:
@@ -28,6 +27,7 @@ class TwoState(ControlSystem):
     """
 
     evaluation_steps: ClassVar[int] = 2
+    state_hint: ClassVar[str] = "0 is q, 1 is q', 2 is the goal"
 
     costs: tuple[float, ...] = (1.0, 2.0, 4.0)
 
@@ -62,18 +62,6 @@ class TwoState(ControlSystem):
     def sample_states(self, rng: np.random.Generator, count: int) -> FloatArray:
         """Return q for all ants, shape `(1, count)`; nothing is drawn at random."""
         return np.full((1, count), float(FIRST))
-
-    def checked_states(self, states: Any) -> FloatArray:
-        """Return states given as `(n,)` or `(n, 1)` in the shape `(n, 1)`.
-
-        Raises:
-            ValueError: wrong shape, or a state is none of 0, 1, 2.
-        """
-        return parameters.numbered_states(states, 3, "0 is q, 1 is q', 2 is the goal")
-
-    def observe(self, states: FloatArray) -> IntArray:
-        """Return the states `(1, n)` as int64 `(n,)`."""
-        return np.asarray(states[0].astype(np.int64))
 
     def advance(
         self,

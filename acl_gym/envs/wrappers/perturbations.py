@@ -67,12 +67,12 @@ def perturbed(
 
 
 def _generator(seed: int) -> np.random.Generator:
-    """A stream apart from that of the environment, which gets the same seed."""
+    """A generator independent of that of the environment, which gets the same seed."""
     return np.random.default_rng([seed, 1])
 
 
 class ActionNoise(VectorActionWrapper[Any, Any, Any, Any]):
-    """Replaces actions at random by one drawn uniformly from all of them.
+    """Replaces actions at random by actions drawn uniformly from all.
 
     Gymnasium has no such wrapper: its `StickyAction` repeats the previous action.
 
@@ -149,8 +149,8 @@ class ObservationNoise(VectorObservationWrapper[FloatArray, Any, Any, Any]):
 class RoundedObservation(VectorObservationWrapper[FloatArray, Any, Any, Any]):
     """Rounds variables to the nearest of a few evenly spaced values.
 
-    Gymnasium's `DiscretizeObservation` returns numbers of bins of single environments;
-    here variables keep their units and the space stays as it is.
+    Gymnasium's `DiscretizeObservation` returns bin numbers and is for single
+    environments; here variables keep their units and the space is unchanged.
 
     Args:
         env: whose observations are a bounded box of one axis.
@@ -208,7 +208,7 @@ class HiddenVariables(VectorObservationWrapper[FloatArray, Any, Any, Any]):
 class ReversedSlots(VectorWrapper[Any, Any, Any, Any]):
     """The slots of an environment in reverse order.
 
-    With `ReversedLuck` in the agent, each ant draws the same random numbers as in the
+    With `ReversedDraws` in the agent, each ant draws the same random numbers as in the
     original order: only the order changes in which the ants' experience is merged.
 
     Args:
@@ -231,7 +231,7 @@ class ReversedSlots(VectorWrapper[Any, Any, Any, Any]):
         return observations, rewards, terminated, truncated, infos
 
 
-class ReversedLuck:
+class ReversedDraws:
     """A generator whose random numbers are in reverse order along their last axis.
 
     It has the two methods of `numpy.random.Generator` that an agent uses.

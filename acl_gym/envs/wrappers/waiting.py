@@ -14,11 +14,11 @@ from acl_gym.utils import validation
 
 
 class WaitingVectorEnv(SyncVectorEnv):
-    """A `SyncVectorEnv` that steps only the slots whose episodes go on.
+    """A `SyncVectorEnv` that steps only the slots that have not finished.
 
     In a trial, ants wait until the last of them has finished. Meanwhile a
     `SyncVectorEnv` goes on stepping and resetting finished slots; where episodes differ
-    much in length, this is most of its work. Here a finished slot stands still until it
+    much in length, this is most of its work. Here a finished slot is not stepped until it
     is reset: its observation stays as it is, its reward is 0 and both its flags are
     False. An agent learns the same with either.
 

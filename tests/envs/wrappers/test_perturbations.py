@@ -13,7 +13,7 @@ from acl_gym.envs.wrappers.perturbations import (
     ActionNoise,
     HiddenVariables,
     ObservationNoise,
-    ReversedLuck,
+    ReversedDraws,
     ReversedSlots,
     RoundedObservation,
     perturbed,
@@ -128,7 +128,7 @@ def test_reversed_slots_give_each_slot_what_it_had() -> None:
     assert np.array_equal(env.unwrapped.states, states)  # type: ignore[attr-defined]
 
 
-def test_reversed_luck_is_that_of_the_generator() -> None:
-    luck, plain = ReversedLuck(np.random.default_rng(5)), np.random.default_rng(5)
-    assert np.array_equal(luck.random((2, 4))[:, ::-1], plain.random((2, 4)))
-    assert luck.integers(1_000) == plain.integers(1_000)
+def test_reversed_draws_are_those_of_the_generator() -> None:
+    reverse, plain = ReversedDraws(np.random.default_rng(5)), np.random.default_rng(5)
+    assert np.array_equal(reverse.random((2, 4))[:, ::-1], plain.random((2, 4)))
+    assert reverse.integers(1_000) == plain.integers(1_000)

@@ -49,7 +49,7 @@ def chosen(names: Sequence[str]) -> list[Experiment]:
     """
     known = [experiment.name for experiment in EXPERIMENTS]
     for name in names:
-        one_of("experiments", name, ("all", "claims", *known))
+        one_of("experiment", name, ("all", "claims", *known))
     return [
         each
         for each in EXPERIMENTS

@@ -156,7 +156,7 @@ def one_of(name: str, value: Any, allowed: Collection[str]) -> str:
         message = f"{name} must be one of {choices}, got {value!r}."
         if similar := get_close_matches(str(value), allowed, 1):
             if len(allowed) > _MANY:
-                message = f"{name} has no {value!r}."
+                message = f"{name} must be one of {len(allowed)} names, got {value!r}."
             message += f" Did you mean {similar[0]!r}?"
         raise ValueError(message)
     return str(value)

@@ -52,7 +52,7 @@ def test_names_are_chosen_in_the_order_of_the_thesis() -> None:
         ValueError, match=r"must be one of 'all', 'claims', .*, got 'x'"
     ):
         reproduce.chosen(["fig5.4", "x"])
-    with pytest.raises(ValueError, match=r"no 'fig3.66'\. Did you mean 'fig3.6'\?$"):
+    with pytest.raises(ValueError, match=r"got 'fig3.66'\. Did you mean 'fig3.6'\?$"):
         reproduce.chosen(["fig3.66"])
 
 

@@ -63,7 +63,8 @@ def draw_intervals(
         line: what connects them, nothing by default; and their color.
     """
     value, low, high = np.array(estimates).T
-    ends = np.nan_to_num([value - low, high - value])
+    # Where all runs are equal, an end may lie a rounding error beyond the value.
+    ends = np.maximum(np.nan_to_num([value - low, high - value]), 0.0)
     line = {"linestyle": "", "linewidth": 1.2, **line}
     ax.errorbar(x, value, ends, marker=marker, **line)
 

@@ -15,7 +15,7 @@ from matplotlib.colors import to_hex
 from acl_gym.partitions import Fuzzy
 from acl_gym.partitions.automatic import thesis_partition
 from acl_gym.plotting import Shown, draw_policies, draw_trajectories, pendulum, style
-from acl_gym.plotting.intervals import Interval, draw_pairs
+from acl_gym.plotting.intervals import Interval, draw_intervals, draw_pairs
 from acl_gym.plotting.learning import draw_learning_curves, steps_of
 from acl_gym.plotting.style import as_pi
 from acl_gym.policies import TablePolicy
@@ -91,3 +91,14 @@ def test_an_axis_within_one_power_of_ten_has_labels() -> None:
 )
 def test_as_pi(halves: int, text: str) -> None:
     assert as_pi(halves * math.pi / 2) == text
+
+
+def test_an_end_that_rounding_has_put_beyond_the_value_is_drawn() -> None:
+    """Equal runs: the sums of the bootstrap differ from that of the value by an ulp."""
+    ax = style.new_figure(2.0).subplots()
+    above = float(np.nextafter(10.28, 11.0))
+    draw_intervals(ax, [0.0, 1.0], [(10.28, above, above), (2.0, 1.0, 4.0)], "o")
+    (bars,) = ax.collections
+    drawn = [segment[:, 1].tolist() for segment in bars.get_segments()]
+    assert drawn[0] == pytest.approx([10.28, 10.28])
+    assert drawn[1] == [1.0, 4.0]

@@ -122,17 +122,18 @@ def test_evaluations_of_a_random_environment_use_the_same_random_numbers() -> No
     def model_and_callback(seed: int | None) -> PolicyCostCallback:
         env = acl_gym.WaitingVectorEnv.make("CartPole-v1", 2)
         callback = PolicyCostCallback(
-            acl_gym.WaitingVectorEnv.make("CartPole-v1", 5), every=20, seed=seed
+            acl_gym.WaitingVectorEnv.make("CartPole-v1", 50), every=20, seed=seed
         )
         # It never learns, so that only the starts can differ.
         model = DQN(
             "MlpPolicy", acl_gym.VectorEnvAdapter(env), learning_starts=1_000, seed=0
         )
-        model.learn(60, callback=callback)
+        model.learn(120, callback=callback)
         return callback
 
     same = {row["policy_cost"] for row in model_and_callback(3).history}
     assert len(same) == 1
+    # Six means of fifty episodes: chance alone hardly ever makes all of them equal.
     others = {row["policy_cost"] for row in model_and_callback(None).history}
     assert len(others) > 1
     with pytest.raises(ValueError, match="seed"):

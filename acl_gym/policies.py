@@ -6,7 +6,6 @@ from abc import ABC, abstractmethod
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from acl_gym.colony.greedy import NUMBERS_PER_ACTION, greedy_actions
@@ -14,6 +13,7 @@ from acl_gym.colony.pheromone import Pheromone
 from acl_gym.colony.selection import choose_actions
 from acl_gym.partitions import Partition
 from acl_gym.utils import validation
+from acl_gym.utils.compiling import njit
 from acl_gym.utils.typing import BoolArray, CellArray, FloatArray, IntArray, RankArray
 
 
@@ -276,7 +276,7 @@ class SoftPolicy(PartitionPolicy):
         return np.random.Generator(np.random.PCG64(self._seeds).advance(drawn))
 
 
-@njit(cache=True)
+@njit
 def _best_actions(table: FloatArray, ranks: RankArray) -> IntArray:
     best = np.zeros(table.shape[0], dtype=np.int64)
     for cell in range(table.shape[0]):

@@ -6,7 +6,6 @@ from typing import Any, Self
 
 import numpy as np
 from gymnasium.vector import VectorEnv
-from numba import njit
 from numpy.typing import ArrayLike
 
 from acl_gym.agents.base import TabularAgent
@@ -21,6 +20,7 @@ from acl_gym.colony.greedy import (
 from acl_gym.evaluation.rollout import Rollout, Step
 from acl_gym.partitions import Partition
 from acl_gym.utils import validation
+from acl_gym.utils.compiling import njit
 from acl_gym.utils.parameters import Parameter, fixed
 from acl_gym.utils.typing import BoolArray, CellArray, FloatArray, IntArray
 
@@ -279,7 +279,7 @@ def _next_allowed(rollout: Rollout, step: Step) -> BoolArray:
     return allowed
 
 
-@njit(cache=True, inline="always")
+@njit(inline="always")
 def _error(
     values: FloatArray,
     index: CellArray,
@@ -303,7 +303,7 @@ def _error(
     return error
 
 
-@njit(cache=True)
+@njit
 def _update(
     values: FloatArray,
     index: CellArray,
@@ -341,7 +341,7 @@ def _update(
             values[index[j, c], u] += learning_rate * degree[j, c] * error
 
 
-@njit(cache=True)
+@njit
 def _update_traced(
     values: FloatArray,
     index: CellArray,

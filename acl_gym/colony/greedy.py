@@ -6,8 +6,8 @@ For tables of any kind: levels of pheromone, action values, costs to go.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from acl_gym.utils.compiling import njit
 from acl_gym.utils.typing import BoolArray, CellArray, FloatArray, IntArray, RankArray
 
 ALL: BoolArray = np.empty((0, 0), dtype=np.bool_)
@@ -64,7 +64,7 @@ def greedy_actions(
     return actions
 
 
-@njit(cache=True, inline="always")
+@njit(inline="always")
 def best_value(
     table: FloatArray, index: CellArray, degree: FloatArray, j: int, allowed: BoolArray
 ) -> float:
@@ -91,7 +91,7 @@ def best_value(
     return best
 
 
-@njit(cache=True)
+@njit
 def mark_greedy(
     table: FloatArray,
     index: CellArray,
@@ -109,7 +109,7 @@ def mark_greedy(
         greedy[j] = value >= best_value(table, index, degree, j, allowed)
 
 
-@njit(cache=True, inline="always")
+@njit(inline="always")
 def _value(table: FloatArray, cells: CellArray, degrees: FloatArray, u: int) -> float:
     """The sum over a state's cells of degree times table entry."""
     total = 0.0
@@ -118,7 +118,7 @@ def _value(table: FloatArray, cells: CellArray, degrees: FloatArray, u: int) -> 
     return total
 
 
-@njit(cache=True)
+@njit
 def _values(
     table: FloatArray,
     weights: FloatArray | None,
@@ -144,7 +144,7 @@ def _values(
                 values[u] += degrees[c] * table[cell, u] * weight
 
 
-@njit(cache=True)
+@njit
 def best_action(
     table: FloatArray,
     weights: FloatArray | None,
@@ -187,7 +187,7 @@ def best_action(
     return 0
 
 
-@njit(cache=True)
+@njit
 def any_action(choice: float, j: int, n_actions: int, allowed: BoolArray) -> int:
     """One of the actions that ant j may take, all equally likely; choice in [0, 1)."""
     if allowed.size == 0:
@@ -204,7 +204,7 @@ def any_action(choice: float, j: int, n_actions: int, allowed: BoolArray) -> int
     return 0
 
 
-@njit(cache=True)
+@njit
 def _epsilon_greedy(
     levels: FloatArray,
     weights: FloatArray | None,
@@ -224,7 +224,7 @@ def _epsilon_greedy(
             )
 
 
-@njit(cache=True)
+@njit
 def _greedy(
     table: FloatArray,
     ranks: RankArray,

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from acl_gym.partitions.kernels import written_out
+from acl_gym.utils.compiling import njit
 from acl_gym.utils.typing import BoolArray, CellArray, FloatArray, IntArray
 
 
@@ -129,7 +129,7 @@ class Pheromone:
         )
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _repair(
     levels: FloatArray,
     alpha: float,
@@ -181,7 +181,7 @@ def _repair(
                 probabilities[cell, u] /= total
 
 
-@njit(cache=True)
+@njit
 def mean_sensitivity(levels: FloatArray, policy: IntArray, alpha: float) -> float:
     """How near the second-best action comes to the policy's (3.48), mean over cells.
 

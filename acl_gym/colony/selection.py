@@ -7,7 +7,7 @@ rules. Ants weigh tau^alpha eta^beta, where eta is a heuristic; without one, eta
 from __future__ import annotations
 
 import numpy as np
-from numba import njit, prange
+from numba import prange
 
 from acl_gym.colony.greedy import (
     ALL,
@@ -19,6 +19,7 @@ from acl_gym.colony.greedy import (
 from acl_gym.colony.pheromone import Pheromone
 from acl_gym.partitions.kernels import written_out
 from acl_gym.utils import threads
+from acl_gym.utils.compiling import njit
 from acl_gym.utils.typing import BoolArray, CellArray, FloatArray, IntArray
 
 RULES = ("boltzmann", "epsilon_greedy", "max_boltzmann")
@@ -96,7 +97,7 @@ def choose_actions(
     return actions
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _boltzmann_allowed(
     levels: FloatArray,
     alpha: float,
@@ -146,7 +147,7 @@ def _boltzmann_allowed(
     return action
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@njit(error_model="numpy", inline="always")
 def _draw_action(
     levels: FloatArray,
     alpha: float,
@@ -185,7 +186,7 @@ def _draw_action(
     return explored if coin < epsilon else action
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _boltzmann(
     levels: FloatArray,
     alpha: float,
@@ -217,7 +218,8 @@ def _boltzmann(
         )
 
 
-@njit(cache=True, parallel=True, error_model="numpy")
+@threads.shared_among_threads
+@njit(parallel=True, error_model="numpy")
 def _boltzmann_in_parallel(
     levels: FloatArray,
     alpha: float,
@@ -250,7 +252,7 @@ def _boltzmann_in_parallel(
         )
 
 
-@njit(cache=True)
+@njit
 def choose_alone(
     levels: FloatArray,
     alpha: float,

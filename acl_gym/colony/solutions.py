@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from acl_gym.partitions import Partition
 from acl_gym.partitions.base import check_cells
+from acl_gym.utils.compiling import njit
 from acl_gym.utils.typing import ActionArray, BoolArray, CellArray, FloatArray, IntArray
 
 ROWS_PER_BLOCK = 4_096
@@ -211,7 +211,7 @@ class Solutions:
         return room
 
 
-@njit(cache=True, inline="always")
+@njit(inline="always")
 def _place(t: int, ant: int, n_ants: int) -> np.uint64:
     """Where step t of an ant lies, see `RUN`.
 
@@ -221,7 +221,7 @@ def _place(t: int, ant: int, n_ants: int) -> np.uint64:
     return (run * np.uint64(n_ants) + np.uint64(ant)) * np.uint64(RUN) + step
 
 
-@njit(cache=True)
+@njit
 def _append(
     ants: IntArray,
     seen: NDArray[Any],
@@ -242,7 +242,7 @@ def _append(
         length[ant] += 1
 
 
-@njit(cache=True)
+@njit
 def _collect(
     first: int,
     last: int,
@@ -261,7 +261,7 @@ def _collect(
             row += np.uint64(1)
 
 
-@njit(cache=True)
+@njit
 def _strike_tried(
     ants: IntArray,
     index: CellArray,

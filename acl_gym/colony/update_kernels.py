@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from acl_gym.colony.selection import choose_alone
+from acl_gym.utils.compiling import njit
 from acl_gym.utils.typing import ActionArray, BoolArray, CellArray, FloatArray, IntArray
 
 
-@njit(cache=True, inline="always")
+@njit(inline="always")
 def _decayed(level: float, kept: float, tau0: float) -> float:
     """Decay towards tau0, eq. (4.17), where the fraction `kept` of the excess stays.
 
@@ -19,7 +19,7 @@ def _decayed(level: float, kept: float, tau0: float) -> float:
     return tau0 + kept * excess
 
 
-@njit(cache=True, inline="always")
+@njit(inline="always")
 def _decay_pair(
     levels: FloatArray,
     cell: int | np.uint64,
@@ -33,7 +33,7 @@ def _decay_pair(
     stale[cell] = True
 
 
-@njit(cache=True)
+@njit
 def decay(
     index: CellArray,
     degree: FloatArray,
@@ -59,7 +59,7 @@ def decay(
 _LAST, _DUE, _TOTAL, _LARGEST = range(4)
 
 
-@njit(cache=True)
+@njit
 def sum_deposits(
     index: CellArray,
     degree: FloatArray,
@@ -121,7 +121,7 @@ def sum_deposits(
     return int(count)
 
 
-@njit(cache=True)
+@njit
 def reinforce(
     touched: IntArray,
     summed: FloatArray,
@@ -143,7 +143,7 @@ def reinforce(
         summed[pair, 1:] = 0.0
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def choose_and_decay(
     levels: FloatArray,
     alpha: float,
@@ -175,7 +175,7 @@ def choose_and_decay(
 _OF_ANT, _OF_ALL = 1, 2
 
 
-@njit(cache=True)
+@njit
 def note_visits(
     index: CellArray,
     degree: FloatArray,
@@ -217,7 +217,7 @@ def note_visits(
             row += 1
 
 
-@njit(cache=True)
+@njit
 def decay_late(
     visits: FloatArray,
     kept: FloatArray,

@@ -14,13 +14,13 @@ import gymnasium as gym
 import numpy as np
 from gymnasium import spaces
 from gymnasium.vector import AutoresetMode, VectorEnv
-from numba import njit
 from numpy.typing import NDArray
 
 from acl_gym.colony.episodes import Episodes
 from acl_gym.envs.control.environments import ControlVectorEnv
 from acl_gym.envs.wrappers.waiting import WaitingVectorEnv
 from acl_gym.utils import validation
+from acl_gym.utils.compiling import njit
 from acl_gym.utils.typing import BoolArray, FloatArray, IntArray
 
 
@@ -283,7 +283,7 @@ def require_vector_env(env: Any) -> None:
         )
 
 
-@njit(cache=True)
+@njit
 def _spread(
     ants: IntArray, actions: IntArray, first_action: int, all_actions: IntArray
 ) -> None:
@@ -292,7 +292,7 @@ def _spread(
         all_actions[np.uint64(ants[j])] = actions[j] + first_action
 
 
-@njit(cache=True)
+@njit
 def _account(
     ants: IntArray,
     reward: FloatArray,

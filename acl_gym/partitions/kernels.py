@@ -5,10 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit, prange
+from numba import prange
 from numpy.typing import NDArray
 
-from acl_gym.utils import compiling as _compiling  # noqa: F401 - it says what the wait is for
+from acl_gym.utils.compiling import njit
+from acl_gym.utils.threads import shared_among_threads
 from acl_gym.utils.typing import CellArray, FloatArray, IntArray
 
 BLOCK = 256
@@ -44,7 +45,7 @@ def written_out(size: int) -> tuple[int, ...]:
     return (0,) * size if size <= MOST_WRITTEN_OUT else ()
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def locate_on_axis(
     x: FloatArray,
     edges: FloatArray,
@@ -119,7 +120,7 @@ def locate_on_axis(
         fraction[i] = (x[i] - edges[interval]) / width
 
 
-@njit(cache=True)
+@njit
 def _first_not_finite(states: FloatArray, slots: IntArray) -> int:
     for slot in slots:
         if not np.isfinite(states[slot]).all():
@@ -127,14 +128,14 @@ def _first_not_finite(states: FloatArray, slots: IntArray) -> int:
     return -1
 
 
-@njit(cache=True)
+@njit
 def scratch_for(dimensions: int) -> tuple[CellArray, FloatArray]:
     """Return the scratch of `locate_block`, for states with this many variables."""
     ends = np.empty((2 * dimensions, BLOCK), np.int32)
     return ends, np.empty((3 + dimensions, BLOCK))
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def locate_block(
     states: FloatArray,
     slots: IntArray,
@@ -190,7 +191,7 @@ def locate_block(
     return -1
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@njit(error_model="numpy", inline="always")
 def _corners(
     low: CellArray,
     high: CellArray,
@@ -234,7 +235,7 @@ def _corners(
             corners *= 2
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def locate(
     states: FloatArray,
     slots: IntArray,
@@ -259,7 +260,8 @@ def locate(
     return -1
 
 
-@njit(cache=True, parallel=True, error_model="numpy")
+@shared_among_threads
+@njit(parallel=True, error_model="numpy")
 def locate_in_parallel(
     states: FloatArray,
     slots: IntArray,
@@ -286,7 +288,7 @@ def locate_in_parallel(
     return -1
 
 
-@njit(cache=True)
+@njit
 def locate_discrete(
     states: NDArray[Any],
     slots: IntArray,

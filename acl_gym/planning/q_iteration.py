@@ -11,13 +11,13 @@ from typing import Any
 
 import numpy as np
 from gymnasium.vector import VectorEnv
-from numba import njit
 
 from acl_gym.colony.greedy import ALL, best_value
 from acl_gym.envs.control.environments import ControlVectorEnv
 from acl_gym.partitions import Partition
 from acl_gym.planning.sweeps import checked_settings, sweep_until_converged
 from acl_gym.policies import TablePolicy
+from acl_gym.utils.compiling import njit
 from acl_gym.utils.typing import BoolArray, CellArray, FloatArray
 
 _SLOTS = 65_536  # states simulated at once
@@ -125,7 +125,7 @@ def _try_all(env: ControlVectorEnv, partition: Partition) -> _Model:
     return model
 
 
-@njit(cache=True)
+@njit
 def _sweep(
     reward: FloatArray,
     terminated: BoolArray,

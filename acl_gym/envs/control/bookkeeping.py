@@ -8,11 +8,11 @@ import gymnasium as gym
 import numpy as np
 from gymnasium.error import ResetNeeded
 from gymnasium.vector import AutoresetMode
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from acl_gym.envs.control.system import ControlSystem
 from acl_gym.utils import validation
+from acl_gym.utils.compiling import njit
 from acl_gym.utils.typing import BoolArray, FloatArray, IntArray
 
 
@@ -29,7 +29,7 @@ def checked_options(
     return dict(options or {})
 
 
-@njit(cache=True)
+@njit
 def count_step(
     limit: int, steps: IntArray, terminated: BoolArray, truncated: BoolArray
 ) -> int:
@@ -42,7 +42,7 @@ def count_step(
     return n_finished
 
 
-@njit(cache=True)
+@njit
 def finish(
     terminated: BoolArray, truncated: BoolArray, finished: BoolArray, walking: IntArray
 ) -> int:
@@ -55,7 +55,7 @@ def finish(
     return n_walking
 
 
-@njit(cache=True)
+@njit
 def copy_if_below(actions: IntArray, n_actions: int, copied: IntArray) -> bool:
     """Copy actions; return whether all are in 0..n_actions - 1, vectorised."""
     good = True

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from acl_gym.envs.control.system import ControlSystem
+from acl_gym.utils.compiling import njit
 from acl_gym.utils.typing import BoolArray, FloatArray, IntArray
 
 RESTORE_ABOVE = 0.75
@@ -112,7 +112,7 @@ class PartialStep:
         return scratch
 
 
-@njit(cache=True)
+@njit
 def gather_slots(
     slots: IntArray,
     states: FloatArray,
@@ -128,7 +128,7 @@ def gather_slots(
             part[row, j] = states[row, slot]
 
 
-@njit(cache=True)
+@njit
 def put_slots_back(
     slots: IntArray,
     part: FloatArray,
@@ -158,7 +158,7 @@ def put_slots_back(
     return n_finished
 
 
-@njit(cache=True)
+@njit
 def put_idle_back(
     idle: BoolArray,
     before: FloatArray,

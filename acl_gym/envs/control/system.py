@@ -7,10 +7,9 @@ from typing import Any, ClassVar
 
 import numpy as np
 from gymnasium import spaces
-from numba import njit
 from numpy.typing import NDArray
 
-from acl_gym.utils import compiling as _compiling  # noqa: F401 - it says what the wait is for
+from acl_gym.utils.compiling import njit
 from acl_gym.utils.typing import BoolArray, FloatArray, IntArray
 
 BLOCK = 512
@@ -139,7 +138,7 @@ class ControlSystem(ABC):
         return None
 
 
-@njit(cache=True)
+@njit
 def _transpose(states: FloatArray, observations: FloatArray) -> None:
     """Copy the transpose, several times as fast as NumPy if it has few columns."""
     for row in range(states.shape[0]):

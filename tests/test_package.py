@@ -9,6 +9,7 @@ import pytest
 
 import acl_gym
 
+CITATION = Path(__file__).resolve().parents[1] / "CITATION.cff"
 HEAVY = ("matplotlib", "numba", "pygame", "stable_baselines3", "torch")
 
 
@@ -77,3 +78,10 @@ print(observation.shape)
 env.close()
 """
     assert run_python(code, tmp_path) == str(shape)
+
+
+@pytest.mark.skipif(not CITATION.exists(), reason="not in the checkout")
+def test_the_citation_names_this_version_and_the_thesis() -> None:
+    text = CITATION.read_text()
+    assert f"version: {acl_gym.__version__}\n" in text
+    assert "Ant Colony Optimization for Control" in text

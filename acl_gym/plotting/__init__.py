@@ -11,7 +11,8 @@ from acl_gym.envs.navigation.system import Navigation
 from acl_gym.envs.pendulum.system import Pendulum
 from acl_gym.plotting import grid_search, navigation, pendulum
 from acl_gym.plotting.animation import animate
-from acl_gym.plotting.learning import draw_learning_curves
+from acl_gym.plotting.learning import draw_learning_curves, plot_learning_curve
+from acl_gym.plotting.maps import plot_pheromone, plot_policy
 from acl_gym.plotting.shown import Shown
 
 __all__ = [
@@ -20,6 +21,9 @@ __all__ = [
     "draw_learning_curves",
     "draw_policies",
     "draw_trajectories",
+    "plot_learning_curve",
+    "plot_pheromone",
+    "plot_policy",
 ]
 
 _SYSTEMS: dict[type, ModuleType] = {

@@ -93,7 +93,7 @@ def _background(
     )
     middle.grid(visible=False)
     middle.set_title("strongest pheromone")
-    pendulum.multiples_of_pi(middle.xaxis)
+    style.multiples_of_pi(middle.xaxis)
     for ax in (left, middle):
         ax.set_xlabel(pendulum.THETA)
     figure.colorbar(shades, ax=middle, pad=0.02)

@@ -14,6 +14,7 @@ from acl_gym.plotting.animation import animate
 from acl_gym.plotting.learning import draw_learning_curves, plot_learning_curve
 from acl_gym.plotting.maps import plot_pheromone, plot_policy
 from acl_gym.plotting.shown import Shown
+from acl_gym.plotting.trajectories import plot_trajectory
 
 __all__ = [
     "Shown",
@@ -24,6 +25,7 @@ __all__ = [
     "plot_learning_curve",
     "plot_pheromone",
     "plot_policy",
+    "plot_trajectory",
 ]
 
 _SYSTEMS: dict[type, ModuleType] = {

@@ -117,6 +117,7 @@ def plot_levels(
     shape: Any,
     column: int | None,
     name: str,
+    limits: tuple[float, float] | None,
     colorbar: bool,
 ) -> Axes:
     """See `acl_gym.plotting.plot_pheromone`."""
@@ -125,9 +126,9 @@ def plot_levels(
     levels = subject.levels(states)
     values = levels.max(axis=1) if column is None else levels[:, column]
     shown = ~layout.ends()
-    norm = palettes.norm_of(values[shown] if shown.any() else values)
+    norm = palettes.norm_of(values[shown] if shown.any() else values, limits)
     with style.axes_or_new(ax, *_size(layout)) as ax:
-        mappable = ScalarMappable(norm, palettes.LEVELS)
+        mappable = palettes.levels(norm)
         _draw_cells(ax, layout, np.where(shown, values, np.nan), mappable.cmap, norm)
         _draw_map(ax, layout)
         if colorbar:
@@ -139,6 +140,23 @@ def plot_levels(
             subject,
             f"{name.split(maxsplit=1)[0].capitalize()}, {subject.title}",
         )
+    return ax
+
+
+def plot_path(
+    subject: Subject, states: FloatArray, ax: Axes | None, title: str
+) -> Axes:
+    """A line through the cells of some states, from a circle to a dot."""
+    layout = layout_of(subject, None)
+    visited = layout.places[states.astype(np.int64) - subject.first_state]
+    y, x = visited.T.astype(np.float64)
+    with style.axes_or_new(ax, *_size(layout)) as ax:
+        _draw_map(ax, layout)
+        line: dict[str, Any] = {"color": style.BLUE, "linewidth": 2.0, "zorder": 3}
+        ax.plot(x, y, **line)
+        ax.plot(x[0], y[0], marker="o", markerfacecolor="white", markersize=7, **line)
+        ax.plot(x[-1], y[-1], marker="o", markersize=7, **line)
+        _finish(ax, layout, subject, title)
     return ax
 
 

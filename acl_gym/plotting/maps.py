@@ -94,6 +94,7 @@ def plot_pheromone(
     ax: Axes | None = None,
     *,
     action: int | str | None = None,
+    limits: tuple[float, float] | None = None,
     env: Any = None,
     axes: Sequence[Key] | None = None,
     slice: Mapping[Key, float] | None = None,
@@ -112,6 +113,8 @@ def plot_pheromone(
         ax: where to draw; None makes a figure, see `plot_policy`.
         action: whose level is drawn, by name or number; None draws that of the best
             action of each state, and over one state variable those of all actions.
+        limits: the lowest and the highest level of the scale, to compare pictures;
+            None takes those in the picture.
         env: see `plot_policy`.
         axes: see `plot_policy`.
         slice: see `plot_policy`.
@@ -131,7 +134,7 @@ def plot_pheromone(
     column = None if action is None else _column(subject, action)
     name = level_name(subject, column)
     if not subject.variables:
-        return cells.plot_levels(subject, ax, shape, column, name, colorbar)
+        return cells.plot_levels(subject, ax, shape, column, name, limits, colorbar)
     cells.refuse_shape(shape)
     plane = plane_of(subject, axes, slice)
     levels = subject.levels(plane.states(subject))
@@ -139,7 +142,8 @@ def plot_pheromone(
         return _level_curves(subject, plane, levels, column, ax)
     with style.axes_or_new(ax, 5.2 if colorbar else 4.0, 3.7) as ax:
         values = levels.max(axis=1) if column is None else levels[:, column]
-        mesh = draw_levels(ax, plane, values)
+        norm = palettes.norm_of(values, limits)
+        mesh = draw_map(ax, plane, values, palettes.LEVELS, norm)
         if colorbar:
             palettes.add_level_bar(ax, mesh, name)
         _set_title(ax, _kind(subject), subject, plane)
@@ -153,15 +157,7 @@ def draw_actions(
     columns = subject.columns(plane.states(subject))
     cmap, norm = colours.mapping()
     places = np.asarray(colours.place)[columns]
-    return draw_map(ax, plane, places.reshape(plane.shape()), cmap, norm)
-
-
-def draw_levels(
-    ax: Axes, plane: Plane, values: FloatArray, norm: Normalize | None = None
-) -> Any:
-    """A map of levels `(n,)`; what it returns is the mesh."""
-    norm = palettes.norm_of(values) if norm is None else norm
-    return draw_map(ax, plane, values.reshape(plane.shape()), palettes.LEVELS, norm)
+    return draw_map(ax, plane, places, cmap, norm)
 
 
 def draw_map(
@@ -169,7 +165,7 @@ def draw_map(
 ) -> Any:
     """Colours over the pieces of a plane."""
     mesh = ax.pcolormesh(
-        *(axis.edges for axis in plane.axes), values, cmap=cmap, norm=norm,
+        *(axis.edges for axis in plane.axes), values.reshape(plane.shape()), cmap=cmap, norm=norm,
         rasterized=True,
     )  # fmt: skip
     ax.grid(visible=False)

@@ -15,6 +15,7 @@ from matplotlib.ticker import LogLocator, MaxNLocator
 
 from acl_gym.plotting import style
 from acl_gym.plotting.subject import Subject
+from acl_gym.utils import validation
 from acl_gym.utils.pictures import action_colours, direction_colours, rgb
 from acl_gym.utils.text import digits
 from acl_gym.utils.typing import FloatArray
@@ -86,16 +87,41 @@ def of_inputs(subject: Subject) -> Palette:
     return Palette(np.arange(count), colours, labels, title)
 
 
-def norm_of(values: FloatArray) -> Normalize:
-    """Logarithmic where all levels are positive."""
+def norm_of(values: FloatArray, limits: tuple[float, float] | None = None) -> Normalize:
+    """The scale of levels: logarithmic where all are positive.
+
+    Raises:
+        ValueError: `limits` are not two increasing numbers.
+    """
     low, high = float(values.min()), float(values.max())
+    if limits is not None:
+        given = validation.real_array("limits", limits, ndim=1)
+        if given.size != 2 or not given[0] < given[1]:
+            raise ValueError(
+                f"limits must be the lowest and the highest level, got {limits!r}."
+            )
+        low, high = given.tolist()
     if low > 0.0:
         return LogNorm(low, high if high > low else 10.0 * low)
     return Normalize(low, high if high > low else low + 1.0)
 
 
-def add_bar(ax: Axes, colours: Palette, *, below: bool = False) -> None:
-    """A bar beside `ax` with a name beside each colour; below it, patches."""
+def levels(norm: Normalize) -> ScalarMappable:
+    """Colours of levels on a scale."""
+    return ScalarMappable(norm, LEVELS)
+
+
+def add_bar(
+    ax: Axes, colours: Palette, *, below: bool = False, slim: bool = False
+) -> None:
+    """A bar beside `ax` with a name beside each colour; below it, patches.
+
+    Args:
+        ax: the picture.
+        colours: what is explained.
+        below: whether patches stand below the figure instead.
+        slim: whether the name of the bar stands above it.
+    """
     if below:
         handles = [
             Patch(color=colour, label=name)
@@ -108,7 +134,9 @@ def add_bar(ax: Axes, colours: Palette, *, below: bool = False) -> None:
     count = len(colours.colours)
     height = min(1.0, 0.2 + 0.1 * count)
     place = (1.03, 0.5 * (1.0 - height), 0.045, height)
-    bar = _bar(ax, ScalarMappable(norm, cmap), colours.title, place)
+    bar = _bar(ax, ScalarMappable(norm, cmap), "" if slim else colours.title, place)
+    if slim:
+        bar.ax.set_title(colours.title.replace(" (", "\n("), size="small")
     bar.set_ticks(np.arange(count), labels=colours.names)
     bar.ax.tick_params(length=0)
 

@@ -51,9 +51,9 @@ SCREEN_DPI = 150
 _MINUS = "\N{MINUS SIGN}"
 
 
-def new_figure(height: float, width: float = WIDTH) -> Figure:
+def new_figure(height: float, width: float = WIDTH, dpi: float | None = None) -> Figure:
     """An empty figure, in inches, with a canvas."""
-    figure = Figure(figsize=(width, height))
+    figure = Figure(figsize=(width, height), dpi=dpi)
     FigureCanvasAgg(figure)
     return figure
 
@@ -84,8 +84,7 @@ def axes_or_new(ax: Any, width: float = 4.6, height: float = 3.5) -> Iterator[Ax
         yield checked_axes(ax)
         return
     with in_style():
-        figure = Figure(figsize=(width, height), dpi=SCREEN_DPI)
-        FigureCanvasAgg(figure)
+        figure = new_figure(height, width, SCREEN_DPI)
         yield figure.subplots(subplot_kw={"axes_class": ShownAxes})
         keep_style(figure)
 

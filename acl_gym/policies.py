@@ -236,6 +236,13 @@ class SoftPolicy(PartitionPolicy):
         self._by_hand = self._stream(0)
 
     @property
+    def table(self) -> FloatArray:
+        """The levels, `(n_cells, n_actions)`, read-only."""
+        view = self._pheromone.levels.view()
+        view.flags.writeable = False
+        return view
+
+    @property
     def n_actions(self) -> int:
         """See `PartitionPolicy.n_actions`."""
         return int(self._pheromone.levels.shape[1])

@@ -91,4 +91,4 @@ def save(
 def write_animation(path: Path, trials: tuple[int, ...] = SHOWN) -> None:
     """Write how 250 ants learn the fuzzy pendulum of Table 5.2, see `animate`."""
     study = systems.pendulum("fuzzy")
-    animate(path, make_agent(study, seed=0), study.task.make_system_env(1), trials)
+    animate(make_agent(study, seed=0), path, trials=trials)

@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 
 from acl_gym.callbacks.base import Agent, Callback
 from acl_gym.evaluation import PolicyCost, evaluate_policy_cost, with_slots_for
-from acl_gym.evaluation.rollout import require_vector_env
 from acl_gym.policies import TablePolicy
 from acl_gym.utils import files, validation
 from acl_gym.utils.typing import Predictor, Row
+from acl_gym.utils.vector_envs import require_vector_env
 
 
 class PolicyEvaluation(Callback):

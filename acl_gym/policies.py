@@ -27,6 +27,18 @@ def random_ranks(n_cells: int, n_actions: int, rng: np.random.Generator) -> Rank
     return np.asarray(rng.permuted(ranks, axis=1), dtype=np.int32)
 
 
+class Action(np.ndarray[tuple[()], np.dtype[np.int64]]):
+    """One action: an array without axes, as Stable-Baselines3 gives it, with a hash.
+
+    The environments of `gymnasium.envs.toy_text` look actions up in a dict, where a
+    plain array without axes is refused.
+    """
+
+    def __hash__(self) -> int:  # type: ignore[override]
+        """That of the number, to which it is equal."""
+        return hash(self.item())
+
+
 class PartitionPolicy(ABC):
     """A policy that sees cells and degrees, with Stable-Baselines3's `predict`.
 
@@ -81,19 +93,26 @@ class PartitionPolicy(ABC):
         deterministic: bool = True,
         action_masks: ArrayLike | None = None,
     ) -> tuple[NDArray[np.int64], Any]:
-        """Choose actions, with the signature of Stable-Baselines3.
+        """Choose actions, as in Stable-Baselines3 but for the default of `deterministic`.
+
+        There it is False, since its agents learn policies that draw their actions. Here
+        the policy is a function of the observation, and random actions belong to
+        learning; who asks for an action gets that of the policy.
 
         Args:
-            observation: one observation or a batch of them.
+            observation: one observation or a batch of them, an array or lists, of any
+                real dtype.
             state: returned as it is, except by a `SoftPolicy`; a table has no memory.
             episode_start: only used by a `SoftPolicy`.
-            deterministic: True follows the policy; False explores as in learning, if
-                the policy is that of an agent.
+            deterministic: True follows the policy; False makes an agent explore as it
+                does in learning. A policy that is not an agent does not explore and
+                follows itself in both cases.
             action_masks: which actions may be chosen, `(n_actions,)` or
                 `(n, n_actions)`, such as `info["action_mask"]`; None: all.
 
         Returns:
-            `(actions, state)`; the action of a single observation has no axis.
+            `(actions, state)`, the actions as an int64 array `(n,)`, for a single
+            observation `()`, ready for `env.step`.
 
         Raises:
             ValueError: an observation is not finite or has the wrong shape, or a mask
@@ -107,7 +126,7 @@ class PartitionPolicy(ABC):
             state, episode_start, index, degree, deterministic, allowed
         )
         actions = columns + self.first_action
-        return (actions[0] if single else actions), state
+        return (actions.reshape(()).view(Action) if single else actions), state
 
     def _checked_masks(self, masks: ArrayLike | None, count: int) -> BoolArray | None:
         if masks is None:

@@ -195,8 +195,15 @@ class ACL(TabularAgent):
             trials: K, how many trials to make; None sets no such limit. Without
                 either limit, 100.
             callback: a `Callback`, a function of `(agent, row)`, or a list of those.
+                In place of Stable-Baselines3's `EvalCallback` take
+                `PolicyEvaluation(env)`, which evaluates between trials and keeps the
+                best policy (`save_best="best"` writes it to a file); of
+                `StopTrainingOnRewardThreshold`, `EarlyStop` after it; of
+                `CheckpointCallback`, `Checkpoint("checkpoints")`; of
+                `tensorboard_log="log"`, `TensorBoardLog("log")`, or `CSVLog("log.csv")`
+                for a table.
             log_interval: print a line every `log_interval` trials; None prints nothing.
-            progress_bar: show a bar.
+            progress_bar: show a bar (of tqdm).
 
         Returns:
             The agent itself.

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from acl_gym.callbacks.base import Callbacks
 from acl_gym.colony.greedy import greedy_actions
 from acl_gym.envs.control.environments import ControlVectorEnv
-from acl_gym.evaluation.rollout import Rollout, require_vector_env
+from acl_gym.evaluation.rollout import Rollout
 from acl_gym.partitions import Partition, check_cells, partition_from_settings
 from acl_gym.partitions.automatic import automatic_partition
 from acl_gym.policies import PartitionPolicy, TablePolicy, random_ranks
@@ -27,6 +27,7 @@ from acl_gym.utils.typing import (
     RankArray,
     Row,
 )
+from acl_gym.utils.vector_envs import require_vector_env
 
 DEFAULT_MAX_STEPS = 300
 """T of Table 5.2, used if neither agent nor environment sets a limit."""
@@ -70,12 +71,13 @@ class TabularAgent(PartitionPolicy):
         seed: int | None,
         n_actions: int | None = None,
     ) -> None:
+        if env is not None:
+            require_vector_env(env)
         if partition is None:
             if env is None:
                 raise ValueError(
                     "an agent needs a partition, or env to choose one for; got neither."
                 )
-            require_vector_env(env)
             partition = automatic_partition(env)
         if not isinstance(partition, Partition):
             raise TypeError(

@@ -122,7 +122,24 @@ class QLearning(TabularAgent):
         log_interval: int | None = None,
         progress_bar: bool = False,
     ) -> Self:
-        """Learn; a trial is one episode in every slot. Arguments as in `ACL.learn`.
+        """Learn; a trial is one episode in every slot.
+
+        Called again, it continues from the values as they are.
+
+        Args:
+            total_timesteps: stop after the trial that reaches this many steps of all
+                slots together; None sets no such limit.
+            trials: how many trials to make; None sets no such limit. Without either
+                limit, 100.
+            callback: as in `ACL.learn`, which names the equivalents of
+                Stable-Baselines3's callbacks: `PolicyEvaluation` for `EvalCallback`,
+                `Checkpoint` for `CheckpointCallback`, `TensorBoardLog` for
+                `tensorboard_log`.
+            log_interval: print a line every `log_interval` trials; None prints nothing.
+            progress_bar: show a bar (of tqdm).
+
+        Returns:
+            The agent itself.
 
         Raises:
             ValueError: the action values have overflowed.

@@ -18,10 +18,10 @@ from acl_gym.evaluation import (
     policy_measures,
     with_slots_for,
 )
-from acl_gym.evaluation.rollout import require_vector_env
 from acl_gym.policies import TablePolicy
 from acl_gym.utils import files, validation
 from acl_gym.utils.typing import Predictor, Row
+from acl_gym.utils.vector_envs import require_vector_env
 
 
 class PolicyEvaluation(Callback):

@@ -15,9 +15,10 @@ from acl_gym.colony.costs import Cost, as_cost, solution_costs
 from acl_gym.colony.episodes import Episode
 from acl_gym.envs.control.environments import ControlVectorEnv
 from acl_gym.envs.control.single import ControlEnv
-from acl_gym.evaluation.rollout import Rollout, require_vector_env
+from acl_gym.evaluation.rollout import Rollout
 from acl_gym.policies import PartitionPolicy
 from acl_gym.utils.typing import FloatArray, Predictor, Row
+from acl_gym.utils.vector_envs import require_vector_env
 
 
 @dataclass(frozen=True)
@@ -323,8 +324,9 @@ def control_env(env: VectorEnv[Any, Any, Any]) -> ControlVectorEnv:
     """The environment of this package that `env` is or wraps.
 
     Raises:
-        TypeError: it is of another package.
+        TypeError: it is no vector environment, or of another package.
     """
+    require_vector_env(env)
     base = env.unwrapped
     if not isinstance(base, ControlVectorEnv):
         raise TypeError(

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-import gymnasium as gym
 import numpy as np
 from gymnasium import spaces
 from gymnasium.vector import AutoresetMode, VectorEnv
@@ -23,6 +22,7 @@ from acl_gym.envs.wrappers.waiting import WaitingVectorEnv
 from acl_gym.utils import validation
 from acl_gym.utils.compiling import njit
 from acl_gym.utils.typing import BoolArray, FloatArray, IntArray
+from acl_gym.utils.vector_envs import require_vector_env
 
 
 class Step(NamedTuple):
@@ -304,22 +304,6 @@ class Rollout:
             final = infos.get("final_info", {}).get("action_mask")
             self.action_mask[stopped] = True if final is None else final[stopped] != 0
         return observation
-
-
-def require_vector_env(env: Any) -> None:
-    """Check that `env` is a vector environment.
-
-    Raises:
-        TypeError: `env` is not a `gymnasium.vector.VectorEnv`.
-    """
-    if not isinstance(env, VectorEnv):
-        remedy = "make it with gym.make_vec(id, num_envs=...)"
-        if isinstance(env, gym.Env):
-            remedy += " or wrap it in gym.vector.SyncVectorEnv([lambda: env])"
-        raise TypeError(
-            "env must be a gymnasium.vector.VectorEnv, got "
-            f"{type(env).__name__}; {remedy}."
-        )
 
 
 @njit

@@ -9,9 +9,14 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 from gymnasium import spaces
-from gymnasium.vector import AutoresetMode, SyncVectorEnv, VectorEnv, VectorWrapper
+from gymnasium.vector import (
+    AsyncVectorEnv,
+    AutoresetMode,
+    SyncVectorEnv,
+    VectorEnv,
+    VectorWrapper,
+)
 from numpy.typing import NDArray
-from stable_baselines3.common.env_util import is_wrapped
 from stable_baselines3.common.vec_env import VecEnv
 from stable_baselines3.common.vec_env.base_vec_env import (
     VecEnvIndices,
@@ -19,7 +24,10 @@ from stable_baselines3.common.vec_env.base_vec_env import (
     VecEnvStepReturn,
 )
 
+from acl_gym.envs.control.environments import ControlVectorEnv
 from acl_gym.envs.wrappers.partial_reset import reset_slots
+from acl_gym.sb3.slots import SlotEnvs, slot_envs
+from acl_gym.utils.vector_envs import require_vector_env
 
 _SUPPORTED_MODES = (AutoresetMode.DISABLED, AutoresetMode.SAME_STEP)
 _FINAL_KEYS = ("final_obs", "_final_obs", "final_info", "_final_info")
@@ -48,7 +56,9 @@ class VectorEnvAdapter(VecEnv):
 
     Args:
         env: a vector environment whose autoreset mode is DISABLED (preferred, because
-            observation wrappers work with it) or SAME_STEP.
+            observation wrappers work with it) or SAME_STEP. An environment of this
+            package that is not wrapped yet may have any mode: NEXT_STEP, the default of
+            `gym.make_vec`, is changed to DISABLED.
 
     Attributes:
         env: the vector environment.
@@ -64,7 +74,6 @@ class VectorEnvAdapter(VecEnv):
         >>> env = gym.make_vec(
         ...     "acl_gym/Pendulum-v0",
         ...     num_envs=8,
-        ...     autoreset_mode="Disabled",
         ...     max_episode_steps=300,
         ... )
         >>> vec_env = VecMonitor(acl_gym.VectorEnvAdapter(env))
@@ -73,24 +82,12 @@ class VectorEnvAdapter(VecEnv):
     """
 
     def __init__(self, env: VectorEnv[Any, Any, Any]) -> None:
-        if not isinstance(env, VectorEnv):
-            raise TypeError(
-                "env must be a gymnasium.vector.VectorEnv, got "
-                f"{type(env).__name__}; make it with gym.make_vec(id, num_envs=...)."
-            )
-        mode = env.metadata.get("autoreset_mode", AutoresetMode.NEXT_STEP)
-        if mode not in _SUPPORTED_MODES:
-            raise ValueError(
-                f"env must have autoreset mode DISABLED or SAME_STEP, got {mode.name}, "
-                "which inserts a meaningless step between two episodes; make it with "
-                'gym.make_vec(id, autoreset_mode="Disabled"), or if the vector '
-                "environment is built from single ones, with "
-                'vector_kwargs={"autoreset_mode": AutoresetMode.DISABLED}.'
-            )
+        require_vector_env(env)
         _check_observation_space(env.single_observation_space)
-        _check_start("actions", env.single_action_space)
+        _check_action_space(env.single_action_space)
         self.env = env
-        self._resets_itself = mode is AutoresetMode.SAME_STEP
+        self._resets_itself = _settle_mode(env) is AutoresetMode.SAME_STEP
+        self._slot_envs = slot_envs(env)
         self._actions: NDArray[Any] | None = None
         self._returns = np.zeros(env.num_envs)
         self._lengths = np.zeros(env.num_envs, dtype=np.int64)
@@ -215,13 +212,15 @@ class VectorEnvAdapter(VecEnv):
         """The attribute for each slot; `set_attr` explains where it is looked up.
 
         Raises:
-            AttributeError: no environment or wrapper has it.
+            AttributeError: no environment or wrapper has it, or only some of the
+                slots have it.
         """
-        slots = self._get_indices(indices)
+        slots = list(self._get_indices(indices))
         if attr_name in ("observation_space", "action_space"):
             return [getattr(self, attr_name) for _ in slots]
-        if envs := self._single_envs_with(attr_name):
-            return [envs[slot].get_wrapper_attr(attr_name) for slot in slots]
+        envs = self._slots_with(attr_name, slots)
+        if envs is not None:
+            return envs.get(attr_name, slots)
         value = getattr(self._layer_with(attr_name), attr_name)
         return [value for _ in slots]
 
@@ -230,18 +229,21 @@ class VectorEnvAdapter(VecEnv):
     ) -> None:
         """Set an existing attribute.
 
-        In a `SyncVectorEnv` it is the attribute of the slots' single environments. In
-        any other vector environment, or if those do not have it, it is that of the
-        outermost wrapper or vector environment that has it, shared by all slots.
+        In a `SyncVectorEnv` or `AsyncVectorEnv` it is the attribute of the slots'
+        single environments. In any other vector environment, or if those do not have
+        it, it is that of the outermost wrapper or vector environment that has it, shared
+        by all slots.
 
         Raises:
-            AttributeError: no environment or wrapper has it.
-            ValueError: it is shared by all slots, but `indices` selects only some.
+            AttributeError: no environment or wrapper has it, or only some of the
+                slots have it.
+            ValueError: `indices` selects some slots only, but it is shared by all, or
+                belongs to the workers of an `AsyncVectorEnv`, which are set together.
         """
         slots = list(self._get_indices(indices))
-        if envs := self._single_envs_with(attr_name):
-            for slot in slots:
-                envs[slot].set_wrapper_attr(attr_name, value)
+        envs = self._slots_with(attr_name, slots)
+        if envs is not None:
+            envs.set(attr_name, value, slots)
             return
         layer = self._layer_with(attr_name)
         self._check_all(attr_name, slots)
@@ -261,15 +263,14 @@ class VectorEnvAdapter(VecEnv):
             once, and its result is returned for every slot.
 
         Raises:
-            AttributeError: no environment or wrapper has it.
+            AttributeError: no environment or wrapper has it, or only some of the
+                slots have it.
             ValueError: it acts on all slots, but `indices` selects only some.
         """
         slots = list(self._get_indices(indices))
-        if envs := self._single_envs_with(method_name):
-            return [
-                envs[slot].get_wrapper_attr(method_name)(*method_args, **method_kwargs)
-                for slot in slots
-            ]
+        envs = self._slots_with(method_name, slots)
+        if envs is not None:
+            return envs.call(method_name, method_args, method_kwargs, slots)
         layer = self._layer_with(method_name)
         self._check_all(method_name, slots)
         result = getattr(layer, method_name)(*method_args, **method_kwargs)
@@ -280,13 +281,17 @@ class VectorEnvAdapter(VecEnv):
         wrapper_class: type[gym.Wrapper[Any, Any, Any, Any]],
         indices: VecEnvIndices = None,
     ) -> list[bool]:
-        """Whether each slot, or the vector environment, is wrapped in this class."""
+        """Whether each slot, or the vector environment, is wrapped in this class.
+
+        Raises:
+            TypeError: the workers of an `AsyncVectorEnv` have a wrapper of a class that
+                this process does not know.
+        """
         slots = list(self._get_indices(indices))
         if any(isinstance(layer, wrapper_class) for layer in self._layers()):
             return [True for _ in slots]
-        base = self.env.unwrapped
-        if isinstance(base, SyncVectorEnv):
-            return [is_wrapped(base.envs[slot], wrapper_class) for slot in slots]
+        if self._slot_envs is not None:
+            return self._slot_envs.wrapped_in(wrapper_class, slots)
         return [False for _ in slots]
 
     def _layers(self) -> Iterator[VectorEnv[Any, Any, Any]]:
@@ -303,21 +308,79 @@ class VectorEnvAdapter(VecEnv):
                 return layer
         raise AttributeError(f"neither {self.env} nor what it wraps has {name!r}.")
 
-    def _single_envs_with(self, name: str) -> Sequence[gym.Env[Any, Any]]:
-        """The slots' single environments if they are accessible and have `name`."""
-        base = self.env.unwrapped
-        if isinstance(base, SyncVectorEnv) and all(
-            env.has_wrapper_attr(name) for env in base.envs
-        ):
-            return base.envs
-        return ()
+    def _slots_with(self, name: str, slots: list[int]) -> SlotEnvs | None:
+        """The single environments if those asked have `name`, None if none of them has.
 
-    def _check_all(self, name: str, slots: Iterable[int]) -> None:
+        Raises:
+            AttributeError: only some have it.
+        """
+        if self._slot_envs is None:
+            return None
+        has = self._slot_envs.has(name)
+        reached = self._slot_envs.reached(slots)
+        missing = [slot for slot in reached if not has[slot]]
+        if missing and len(missing) < len(reached):
+            raise AttributeError(
+                f"each of the slots {list(reached)[:10]} must have {name!r}, but slots "
+                f"{missing[:10]} do not; name those that have it by indices, in a "
+                "SyncVectorEnv."
+            )
+        return None if missing else self._slot_envs
+
+    def _check_all(self, name: str, slots: Sequence[int]) -> None:
         if set(slots) != set(range(self.num_envs)):
             raise ValueError(
                 f"{name!r} is shared by all {self.num_envs} slots, got indices "
                 f"{list(slots)}; leave indices out."
             )
+
+
+def _settle_mode(env: VectorEnv[Any, Any, Any]) -> AutoresetMode:
+    """The autoreset mode of `env`; an environment of this package is given one that fits.
+
+    Raises:
+        ValueError: a `VecEnv` does not support the mode, and it cannot be changed.
+    """
+    mode = AutoresetMode(env.metadata.get("autoreset_mode", AutoresetMode.NEXT_STEP))
+    if mode in _SUPPORTED_MODES:
+        return mode
+    # Not below wrappers, which may have read the mode already.
+    if isinstance(env, ControlVectorEnv):
+        env.set_autoreset_mode(AutoresetMode.DISABLED)
+        return AutoresetMode.DISABLED
+    raise ValueError(
+        f"env must have autoreset mode DISABLED or SAME_STEP, got {mode.name}, which "
+        "inserts a meaningless step between two episodes; make it with "
+        f"{_with_autoreset_disabled(env)}{'' if env.unwrapped is env else ', then wrap'}."
+    )
+
+
+def _with_autoreset_disabled(env: VectorEnv[Any, Any, Any]) -> str:
+    """The line of code that makes what `env` wraps, with autoreset disabled."""
+    base = env.unwrapped
+    mode, count = '"Disabled"', env.num_envs
+    env_id = "id" if base.spec is None else f'"{base.spec.id}"'
+    if isinstance(base, ControlVectorEnv):
+        return f"gym.make_vec({env_id}, num_envs={count}, autoreset_mode={mode})"
+    if isinstance(base, (SyncVectorEnv, AsyncVectorEnv)) and base.spec is None:
+        return f"{type(base).__name__}(env_fns, autoreset_mode={mode})"
+    how = "async" if isinstance(base, AsyncVectorEnv) else "sync"
+    return (
+        f'gym.make_vec({env_id}, num_envs={count}, vectorization_mode="{how}", '
+        f'vector_kwargs={{"autoreset_mode": {mode}}})'
+    )
+
+
+def _check_action_space(space: spaces.Space[Any]) -> None:
+    """Refuse what cannot be an array with one row for each slot."""
+    if not isinstance(space, _ARRAY_SPACES):
+        raise ValueError(
+            "actions must be a Box, Discrete, MultiDiscrete or MultiBinary, since a "
+            f"VecEnv takes them as one array with a row for each slot, got {space}; "
+            "rearrange them in each single environment with gymnasium's "
+            "TransformAction."
+        )
+    _check_start("actions", space)
 
 
 def _check_observation_space(space: spaces.Space[Any]) -> None:

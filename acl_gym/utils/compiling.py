@@ -41,7 +41,6 @@ def njit(function: Any = None, /, **options: Any) -> Any:
         function: the kernel, where the decorator stands without options.
         **options: those of `numba.njit`.
     """
-
     if function is None:
         return functools.partial(_compiled, **options)
     return _compiled(function)

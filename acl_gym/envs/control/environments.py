@@ -83,8 +83,7 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
         self.num_envs = validation.integer("num_envs", num_envs, at_least=1)
         self._trial_steps: int | None = None  # T of the trial under way
         self.max_episode_steps = max_episode_steps
-        self.autoreset_mode = checked_autoreset_mode(autoreset_mode)
-        self.metadata = {**self.metadata, "autoreset_mode": self.autoreset_mode}
+        self.set_autoreset_mode(autoreset_mode)
         self.render_mode = checked_render_mode(render_mode, self.metadata)
         self.parameters = copy.deepcopy(parameters)  # the caller may change a list
         self.system = self.system_type(**parameters)
@@ -265,6 +264,20 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
     def show_table(self, table: FloatArray | None) -> None:
         """Draw a table over the frames from now on; see `ControlEnv.show_table`."""
         self._renderer.show_table(table)
+
+    def set_autoreset_mode(self, mode: str | AutoresetMode) -> None:
+        """Change what happens to a slot that finishes from now on.
+
+        Wrappers around the environment keep the mode that they found.
+
+        Args:
+            mode: see `autoreset_mode` of the constructor.
+
+        Raises:
+            ValueError: there is no such mode.
+        """
+        self.autoreset_mode = checked_autoreset_mode(mode)
+        self.metadata = {**self.metadata, "autoreset_mode": self.autoreset_mode}
 
     def with_slots(self, num_envs: int) -> Self:
         """Make a new environment that differs only in the number of slots.

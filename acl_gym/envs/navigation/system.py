@@ -73,7 +73,12 @@ class Navigation(BlockSystem):
     """
 
     evaluation_steps: ClassVar[int] = 150  # T of Table 4.1
-    state_names: ClassVar[tuple[str, ...]] = ("c1 (m)", "v1 (m/s)", "c2 (m)", "v2 (m/s)")
+    state_names: ClassVar[tuple[str, ...]] = (
+        "c1 (m)",
+        "v1 (m/s)",
+        "c2 (m)",
+        "v2 (m/s)",
+    )
     input_names: ClassVar[tuple[str, ...]] = ("u1 (N)", "u2 (N)")
     block_kernels = (kernels.advance, kernels.advance_in_parallel)
 

@@ -10,8 +10,7 @@ import numpy as np
 from gymnasium import spaces
 from gymnasium.vector import VectorWrapper
 
-from acl_gym.envs.control.environments import ControlVectorEnv
-from acl_gym.envs.control.single import ControlEnv
+from acl_gym.envs.control.lookup import system_of
 from acl_gym.envs.control.system import ControlSystem
 from acl_gym.envs.wrappers.perturbations import HiddenVariables
 from acl_gym.partitions.base import Partition
@@ -174,16 +173,6 @@ def _centres(dimensions: int) -> int:
             "each variable that does not matter."
         )
     return CENTRES[dimensions]
-
-
-def system_of(env: Any) -> ControlSystem | None:
-    """The system of an environment of this package, None for any other."""
-    base = env.unwrapped
-    if isinstance(base, gym.vector.SyncVectorEnv):
-        base = base.envs[0].unwrapped
-    if not isinstance(base, (ControlEnv, ControlVectorEnv)):
-        return None
-    return base.system
 
 
 def _shown_variables(env: Any, system: ControlSystem) -> list[int]:

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from acl_gym.agents.base import TabularAgent
 from acl_gym.envs.control.environments import ControlVectorEnv
+from acl_gym.envs.control.lookup import system_of
 from acl_gym.envs.control.system import ControlSystem
 from acl_gym.partitions import Discrete, Grid, Partition
-from acl_gym.partitions.automatic import system_of
 from acl_gym.policies import PartitionPolicy, SoftPolicy, TablePolicy
 from acl_gym.utils.typing import FloatArray, IntArray
 

@@ -9,6 +9,7 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from acl_gym.envs.control.signals import Signals
 from acl_gym.utils.compiling import njit
 from acl_gym.utils.typing import BoolArray, FloatArray, IntArray
 
@@ -61,6 +62,15 @@ class ControlSystem(ABC):
     def inputs(self) -> FloatArray | None:
         """The physical input of each action, `(n_actions, m)`; None: it is no number."""
         return None
+
+    @property
+    def signals(self) -> Signals | None:
+        """Names of observations and inputs, and the inputs of each action, if known."""
+        inputs = self.inputs
+        if inputs is None:
+            return None
+        rows = tuple(map(tuple, inputs.tolist()))
+        return Signals(self.state_names, self.input_names, rows)
 
     @property
     @abstractmethod

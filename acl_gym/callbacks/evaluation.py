@@ -63,8 +63,7 @@ class PolicyEvaluation(Callback):
         save_best: str | Path | None = None,
     ) -> None:
         require_vector_env(env)
-        if seed is not None:
-            seed = validation.integer("seed", seed, at_least=0)
+        seed = validation.seed(seed)
         if policy is not None and not callable(policy):
             raise TypeError(
                 "policy must be a function of the agent that returns what to evaluate, "

@@ -54,8 +54,7 @@ class PolicyCostCallback(BaseCallback):
         self.states = states
         self.every = validation.integer("every", every, at_least=1)
         self.max_steps = max_steps
-        if seed is not None:
-            seed = validation.integer("seed", seed, at_least=0)
+        seed = validation.seed(seed)
         self.seed = seed
         self.history: list[Row] = []
         self.best: PolicyCost | None = None

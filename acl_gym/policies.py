@@ -14,9 +14,10 @@ from acl_gym.colony.pheromone import Pheromone
 from acl_gym.colony.selection import choose_actions
 from acl_gym.envs.control.signals import Signals
 from acl_gym.export import Source, write_c_header, write_numpy_file
-from acl_gym.partitions import Partition
+from acl_gym.partitions import Partition, checked_partition, locate_all
 from acl_gym.utils import validation
 from acl_gym.utils.compiling import njit
+from acl_gym.utils.parameters import Fixed
 from acl_gym.utils.typing import BoolArray, CellArray, FloatArray, IntArray, RankArray
 
 
@@ -42,7 +43,7 @@ class Action(np.ndarray[tuple[()], np.dtype[np.int64]]):
         return hash(self.item())
 
 
-class PartitionPolicy(ABC):
+class PartitionPolicy(Fixed, ABC):
     """A policy that sees cells and degrees, with Stable-Baselines3's `predict`.
 
     Attributes:
@@ -59,14 +60,21 @@ class PartitionPolicy(ABC):
     def n_actions(self) -> int:
         """The number of actions, the columns of the table."""
 
+    @property
+    @abstractmethod
+    def _n_cells(self) -> int:
+        """The rows of the table, to which cells are held."""
+
     @staticmethod
     def _check_fits(name: str, table: FloatArray, partition: Partition) -> None:
         """Refuse a table that has not one row per cell: kernels do not check indices.
 
         Raises:
+            TypeError: the partition is none.
             ValueError: the table does not fit the partition.
         """
-        if table.ndim != 2 or len(table) != partition.n_cells:
+        checked_partition(partition)
+        if table.ndim != 2 or len(table) != partition.n_cells or not table.size:
             raise ValueError(
                 f"{name} must have shape ({partition.n_cells}, n_actions), a row for "
                 f"each cell of the partition, got shape {table.shape}."
@@ -121,9 +129,16 @@ class PartitionPolicy(ABC):
             ValueError: an observation is not finite or has the wrong shape, or a mask
                 has the wrong shape or allows nothing.
         """
-        batch = np.asarray(observation)
+        batch = validation.as_array(observation)
+        if batch is None or batch.dtype == object:
+            raise ValueError(
+                "observation must be an array of numbers, got "
+                f"{validation.shown(observation)}; pass one observation or a batch."
+            )
         single = batch.ndim == self.partition.state_ndim
-        index, degree = self.partition(batch[None] if single else batch)
+        if single:
+            batch = batch[None]
+        index, degree = locate_all(self.partition, batch, self._n_cells)
         allowed = self._checked_masks(action_masks, len(index))
         columns, state = self._act_in_state(
             state, episode_start, index, degree, deterministic, allowed
@@ -232,16 +247,21 @@ class PartitionPolicy(ABC):
     def _checked_masks(self, masks: ArrayLike | None, count: int) -> BoolArray | None:
         if masks is None:
             return None
-        allowed = np.asarray(masks) != 0
-        if allowed.ndim == 1:
-            allowed = allowed[None]
-        shape = (count, self.n_actions)
-        if allowed.shape != shape or not allowed.any(axis=1).all():
+        given, shape = validation.as_array(masks), (count, self.n_actions)
+        if given is not None and given.ndim == 1:
+            given = given[None]
+        if (
+            given is None
+            or given.shape != shape
+            or given.dtype.kind not in "biuf"
+            or not ((given == 0) | (given == 1)).all()
+            or not (given == 1).any(axis=1).all()
+        ):
             raise ValueError(
-                f"action_masks must have shape {shape} and allow an action in each "
-                f"row, got {np.asarray(masks).tolist()!r:.200}."
+                f"action_masks must have shape {shape}, hold 0 and 1, and allow an "
+                f"action in each row, got {validation.shown(masks)}."
             )
-        return np.ascontiguousarray(allowed)
+        return np.ascontiguousarray(given == 1)
 
 
 class TablePolicy(PartitionPolicy):
@@ -257,8 +277,12 @@ class TablePolicy(PartitionPolicy):
             unknown.
 
     Raises:
-        ValueError: `table` or `ranks` do not fit the partition.
+        TypeError: `partition` is no partition, or `first_action` not an integer.
+        ValueError: `table` or `ranks` do not fit the partition, or an entry is not
+            finite.
     """
+
+    _fixed = ("partition", "table", "ranks", "first_action")
 
     def __init__(
         self,
@@ -268,27 +292,44 @@ class TablePolicy(PartitionPolicy):
         first_action: int = 0,
         signals: Signals | None = None,
     ) -> None:
-        if table.dtype != np.float64:
-            raise ValueError(f"table must be float64, got {table.dtype}.")
+        if not isinstance(table, np.ndarray) or table.dtype != np.float64:
+            got = getattr(table, "dtype", type(table).__name__)
+            raise ValueError(f"table must be an array of float64, got {got}.")
         self._check_fits("table", table, partition)
+        if not np.isfinite(table).all():
+            cell = int(np.argmin(np.isfinite(table).all(axis=1)))
+            raise ValueError(
+                f"table must be finite, got {validation.shown(table[cell].tolist())} in "
+                f"cell {cell}."
+            )
         n_cells, n_actions = table.shape
         if ranks is None:
             ranks = random_ranks(n_cells, n_actions, np.random.default_rng(0))
-        if ranks.shape != table.shape:
+        if (
+            not isinstance(ranks, np.ndarray)
+            or ranks.shape != table.shape
+            or ranks.dtype.kind not in "iu"
+        ):
             raise ValueError(
-                f"ranks must have the shape of the table, {table.shape}, got "
-                f"{ranks.shape}."
+                f"ranks must be integers in the shape of the table, {table.shape}, got "
+                f"{validation.shown(ranks)}."
             )
+        if ranks.dtype != np.int32:
+            ranks = ranks.astype(np.int32)
         self.partition = partition
         self.table = table
         self.ranks = ranks
-        self.first_action = first_action
+        self.first_action = _checked_first(first_action)
         self.signals = signals
 
     @property
     def n_actions(self) -> int:
         """See `PartitionPolicy.n_actions`."""
         return int(self.table.shape[1])
+
+    @property
+    def _n_cells(self) -> int:
+        return len(self.table)
 
     def _act(
         self,
@@ -350,6 +391,8 @@ class SoftPolicy(PartitionPolicy):
             `exponent` is not > 0 and finite, or `seed` is negative.
     """
 
+    _fixed = ("partition", "first_action", "_pheromone")
+
     def __init__(
         self,
         partition: Partition,
@@ -365,7 +408,7 @@ class SoftPolicy(PartitionPolicy):
         exponent = validation.number("exponent", exponent, above=0)
         seed = validation.seed(seed)
         self.partition = partition
-        self.first_action = first_action
+        self.first_action = _checked_first(first_action)
         n_cells, n_actions = levels.shape
         self._pheromone = Pheromone(n_cells, n_actions, 1.0, exponent)
         self._pheromone.set_levels(levels)
@@ -384,6 +427,10 @@ class SoftPolicy(PartitionPolicy):
         """See `PartitionPolicy.n_actions`."""
         return int(self._pheromone.levels.shape[1])
 
+    @property
+    def _n_cells(self) -> int:
+        return len(self._pheromone.levels)
+
     def _act(
         self,
         index: CellArray,
@@ -399,7 +446,7 @@ class SoftPolicy(PartitionPolicy):
         if episode_start is None:
             return super()._act_in_state(state, episode_start, *situation)
         index, degree, _, allowed = situation
-        drawn = 0 if state is None else int(state[0])
+        drawn = _drawn(state)
         columns = self._draw(self._stream(drawn), index, degree, allowed)
         return columns, (np.array(drawn + NUMBERS_PER_ACTION * len(columns)),)
 
@@ -417,6 +464,27 @@ class SoftPolicy(PartitionPolicy):
     def _stream(self, drawn: int) -> np.random.Generator:
         """The generator of the seed, advanced by `drawn` numbers."""
         return np.random.Generator(np.random.PCG64(self._seeds).advance(drawn))
+
+
+def _checked_first(first_action: Any) -> int:
+    """`Discrete.start`: any integer to which the actions can be added."""
+    least = -(2**62)
+    return validation.integer(
+        "first_action", first_action, at_least=least, at_most=-least
+    )
+
+
+def _drawn(state: Any) -> int:
+    """How many numbers an evaluation has drawn, from the state of `SoftPolicy`."""
+    if state is None:
+        return 0
+    if not isinstance(state, tuple) or len(state) != 1 or np.ndim(state[0]) != 0:
+        raise ValueError(
+            "state must be None at first, and then what predict returned, got "
+            f"{validation.shown(state)}."
+        )
+    value = state[0].item() if isinstance(state[0], np.ndarray) else state[0]
+    return validation.integer("the number in state", value, at_least=0)
 
 
 @njit

@@ -17,6 +17,7 @@ from acl_gym.colony.costs import Cost, as_cost, cost_from_settings, solution_cos
 from acl_gym.colony.deposits import (
     Deposit,
     as_deposit,
+    checked_deposits,
     deposit_from_settings,
 )
 from acl_gym.colony.episodes import Episode
@@ -30,6 +31,7 @@ from acl_gym.colony.update_rules import (
     as_update,
     update_from_settings,
     update_to_settings,
+    watched,
 )
 from acl_gym.evaluation.rollout import Rollout
 from acl_gym.partitions import Partition
@@ -175,6 +177,7 @@ class ACL(TabularAgent):
             self._now("beta"),
         )
         self._solutions: Solutions | None = None
+        self._rule = self._update  # of the trial under way; see `watched`
         self._check_tau0()
 
     def learn(
@@ -217,7 +220,8 @@ class ACL(TabularAgent):
             while training.next_trial():  # 2, 22: repeat until k = K
                 # 3-6: every ant begins in a random state with an empty solution
                 rollout, solutions = self.rollout, self._empty_solutions()
-                rule, record = self.update, self._needs_episodes()
+                rule = self._rule = watched(self.update, self.n_actions)
+                record = self._needs_episodes()
                 epsilon = self._set_exponents()
                 observation = rollout.start(seed=self._next_seed(), record=record)
                 rule.start_trial(pheromone, self.trials)
@@ -241,6 +245,7 @@ class ACL(TabularAgent):
                 rule.global_update(
                     pheromone, result, self.local_decay, self.global_decay
                 )
+                pheromone.check_levels()
                 training.end_trial(result.costs)  # 21: k <- k + 1
         return self
 
@@ -423,7 +428,7 @@ class ACL(TabularAgent):
         costs = rollout.cost
         if self.cost is not None and episodes is not None:
             costs = solution_costs(self.cost, episodes)
-        deposits = self._deposit(costs, self.tau0)
+        deposits = checked_deposits(self._deposit(costs, self.tau0), costs.size)
         return TrialResult(solutions, costs, deposits, rollout.terminated, episodes)
 
     def _allowed(
@@ -445,7 +450,7 @@ class ACL(TabularAgent):
         allowed: BoolArray | None,
     ) -> IntArray:
         """Choose the actions of the walking ants, as the update rule says."""
-        return self.update.choose(
+        return self._rule.choose(
             self.selection,
             self.pheromone,
             index,

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
+from gymnasium import spaces
 from gymnasium.vector import VectorEnv
 from numpy.typing import ArrayLike, NDArray
 
@@ -16,7 +17,12 @@ from acl_gym.envs.control.environments import ControlVectorEnv
 from acl_gym.envs.control.lookup import signals_of
 from acl_gym.evaluation.rollout import Rollout
 from acl_gym.export import Source
-from acl_gym.partitions import Partition, check_cells, partition_from_settings
+from acl_gym.partitions import (
+    Partition,
+    checked_partition,
+    locate_checked,
+    partition_from_settings,
+)
 from acl_gym.partitions.automatic import automatic_partition
 from acl_gym.policies import PartitionPolicy, TablePolicy, random_ranks
 from acl_gym.utils import files, validation
@@ -30,6 +36,9 @@ from acl_gym.utils.typing import (
     Row,
 )
 from acl_gym.utils.vector_envs import require_vector_env
+
+BYTES_PER_PAIR = 20
+"""Memory of an entry of a table at least: value, probability and rank."""
 
 DEFAULT_MAX_STEPS = 300
 """T of Table 5.2, used if neither agent nor environment sets a limit."""
@@ -60,6 +69,7 @@ class TabularAgent(PartitionPolicy):
             `ants_success_rate` and `success_rate`.
         in_trial: whether a trial is under way, or was interrupted by an exception; the
             table is then not that after a complete trial.
+        busy: whether a trial is under way now, so that `set_env` and `learn` are refused.
         metadata: your own notes, JSON values under string keys, empty at first; saved
             and loaded with the agent.
     """
@@ -81,13 +91,7 @@ class TabularAgent(PartitionPolicy):
                     "an agent needs a partition, or env to choose one for; got neither."
                 )
             partition = automatic_partition(env)
-        if not isinstance(partition, Partition):
-            raise TypeError(
-                "partition must be a Partition such as Crisp or Fuzzy, got "
-                f"{type(partition).__name__}; build one with Fuzzy.from_box("
-                "env.single_observation_space, cells), or leave it out."
-            )
-        self.partition = partition
+        self.partition = checked_partition(partition)
         if max_steps is None:
             max_steps = time_limit(env) or DEFAULT_MAX_STEPS
         self._max_steps = validation.integer("max_steps", max_steps, at_least=1)
@@ -103,13 +107,26 @@ class TabularAgent(PartitionPolicy):
         self._n_actions = n_actions
         if env is not None:
             self._attach(Rollout(env, self.max_steps))
+        n_cells = self.partition.n_cells
+        validation.check_memory(
+            f"the tables of {n_cells} cells and {self.n_actions} actions",
+            BYTES_PER_PAIR * n_cells * self.n_actions,
+            "use fewer cells or actions",
+        )
         self.num_timesteps = 0
         self.trials = 0
         self.seconds = 0.0
         self.history: list[Row] = []
         self.in_trial = False
+        self.busy = False
         self.metadata: dict[str, Any] = {}
         self.set_random_seed(seed)
+
+    _fixed = ("partition", "pheromone")
+
+    @property
+    def _n_cells(self) -> int:
+        return len(self._table)
 
     @property
     @abstractmethod
@@ -189,7 +206,7 @@ class TabularAgent(PartitionPolicy):
     @property
     def num_envs(self) -> int:
         """The number of slots: M, the number of ants."""
-        return int(self.rollout.env.num_envs)
+        return self.rollout.num_envs
 
     def set_env(self, env: VectorEnv[Any, Any, Any]) -> None:
         """Learn on another environment from now on; its number of slots may differ.
@@ -198,7 +215,13 @@ class TabularAgent(PartitionPolicy):
             TypeError: `env` is not a vector environment.
             ValueError: its actions are not those of the table, or its observations
                 not those of the partition.
+            RuntimeError: a trial is under way.
         """
+        if self.busy:
+            raise RuntimeError(
+                "set_env must not be called while a trial is under way; call it between "
+                "trials, such as in a callback's on_trial_end, or after learn."
+            )
         rollout = Rollout(env, self.max_steps)
         if rollout.first_action != self.first_action:
             raise ValueError(
@@ -213,14 +236,27 @@ class TabularAgent(PartitionPolicy):
                 f"env must have {self._n_actions} actions as the table has, got "
                 f"{rollout.n_actions}."
             )
-        self.partition.check_space(rollout.env.single_observation_space)
+        space = rollout.env.single_observation_space
+        if isinstance(space, (spaces.Dict, spaces.Tuple)):
+            raise ValueError(
+                "observations must be arrays for an agent with a table, got "
+                f"{validation.shown(space)}; flatten them with "
+                "gymnasium.wrappers.vector.FlattenObservation, or choose a few "
+                "variables with TransformObservation."
+            )
+        self.partition.check_space(space)
         self._n_actions = rollout.n_actions
         self.first_action = rollout.first_action
-        self.env = env = rollout.env
+        self.env = rollout.env
         self._rollout = rollout
-        k = self.partition.cells_per_state
-        self._index: CellArray = np.zeros((env.num_envs, k), dtype=np.int32)
-        self._degree: FloatArray = np.zeros((env.num_envs, k))
+        slots, k = rollout.num_envs, self.partition.cells_per_state
+        validation.check_memory(
+            f"the cells of {slots} slots",
+            12 * slots * k,
+            "use fewer slots or variables",
+        )
+        self._index: CellArray = np.zeros((slots, k), dtype=np.int32)
+        self._degree: FloatArray = np.zeros((slots, k))
 
     def set_random_seed(self, seed: int | None) -> None:
         """Restart the agent's random numbers.
@@ -236,8 +272,7 @@ class TabularAgent(PartitionPolicy):
             TypeError: `seed` is not an integer.
             ValueError: it is negative.
         """
-        seed = validation.seed(seed)
-        self.seed = seed
+        self.seed = seed = validation.seed(seed)
         learning, predicting, ties = np.random.SeedSequence(seed).spawn(3)
         self.rng = np.random.default_rng(learning)
         self._predict_rng = np.random.default_rng(predicting)
@@ -275,9 +310,8 @@ class TabularAgent(PartitionPolicy):
     ) -> tuple[CellArray, FloatArray]:
         """`(index, degree)` of the walking ants, valid until the next call."""
         index, degree = self._index[: ants.size], self._degree[: ants.size]
-        self.partition.locate(observation, ants, index, degree)
-        if not self.partition.checked:
-            check_cells(index, self.partition)
+        rows = len(self._table)
+        locate_checked(self.partition, observation, ants, index, degree, rows)
         return index, degree
 
     def _next_seed(self) -> int:

@@ -18,7 +18,7 @@ from acl_gym.colony.greedy import (
     mark_greedy,
 )
 from acl_gym.evaluation.rollout import Rollout, Step
-from acl_gym.partitions import Partition
+from acl_gym.partitions import Partition, locate_all
 from acl_gym.utils import validation
 from acl_gym.utils.compiling import njit
 from acl_gym.utils.parameters import Parameter, fixed
@@ -149,7 +149,7 @@ class QLearning(TabularAgent):
             while training.next_trial():
                 rollout, traces = self.rollout, self._empty_traces()
                 observation = rollout.start(seed=self._next_seed())
-                index, degree = self.partition(observation)
+                index, degree = locate_all(self.partition, observation, self._n_cells)
                 allowed = rollout.allowed()
                 while rollout.ants.size:
                     actions = epsilon_greedy_actions(
@@ -271,6 +271,11 @@ class _Traces:
 
     def __init__(self, slots: int, n_pairs: int, longest: int) -> None:
         capacity = min(n_pairs, longest)
+        validation.check_memory(
+            f"the traces of {slots} slots",
+            16 * slots * capacity + 8 * n_pairs,
+            "use fewer slots, cells or steps, or trace_decay=0",
+        )
         self.greedy: BoolArray = np.empty(slots, dtype=np.bool_)
         pair: IntArray = np.empty((slots, capacity), dtype=np.int64)
         trace: FloatArray = np.empty((slots, capacity))

@@ -53,6 +53,11 @@ class Training:
             log_interval = validation.integer("log_interval", log_interval, at_least=1)
         if total_timesteps is None and trials is None:
             trials = DEFAULT_TRIALS
+        if agent.busy:
+            raise RuntimeError(
+                "learn must not be called while a trial is under way; call it after the "
+                "first call has returned."
+            )
         self._agent = agent
         cost = getattr(agent, "cost", None)
         self._reported = (
@@ -86,6 +91,7 @@ class Training:
         error: BaseException | None,
         traceback: TracebackType | None,
     ) -> None:
+        self._agent.busy = False
         try:
             for callback in self._callbacks:
                 callback.on_training_end(self._agent)
@@ -99,6 +105,7 @@ class Training:
             and self._agent.num_timesteps < self._last_step
             and self._agent.trials < self._last_trial
         )
+        self._agent.busy = self._agent.in_trial
         return self._agent.in_trial
 
     def end_trial(self, costs: NDArray[np.float64] | None = None) -> None:
@@ -108,6 +115,7 @@ class Training:
             costs: J of each ant; None takes the sums of the stage costs.
         """
         agent, rollout = self._agent, self._agent.rollout
+        agent.busy = False
         steps = int(rollout.length.sum())
         agent.num_timesteps += steps
         agent.trials += 1

@@ -348,13 +348,19 @@ def solution_costs(cost: Cost, episodes: Episodes) -> FloatArray:
     Raises:
         ValueError: the cost does not give one finite number for each ant.
     """
-    costs = np.asarray(cost(episodes), dtype=np.float64)
-    if costs.shape != (len(episodes),) or not np.isfinite(costs).all():
+    found = cost(episodes)
+    costs = validation.as_array(found)
+    if (
+        costs is None
+        or costs.dtype.kind not in "biuf"
+        or costs.shape != (len(episodes),)
+        or not np.isfinite(costs).all()
+    ):
         raise ValueError(
             f"a cost must give one finite number for each of the {len(episodes)} ants, "
-            f"got {costs.tolist()!r:.200} from {cost!r:.100}."
+            f"got {validation.shown(found)} from {validation.shown(cost)}."
         )
-    return costs
+    return costs.astype(np.float64)
 
 
 def cost_from_settings(settings: Any) -> Cost | None:

@@ -137,16 +137,29 @@ class FunctionDeposit(Deposit):
 
     def __call__(self, costs: FloatArray, tau0: float) -> FloatArray:
         """See `Deposit`."""
-        deposits = np.asarray(self.function(costs), dtype=np.float64)
-        valid = deposits.shape == costs.shape and (
-            np.isfinite(deposits).all() and (deposits > 0.0).all()
+        # A copy, which the function may do with as it likes.
+        return checked_deposits(self.function(costs.copy()), costs.size)
+
+
+def checked_deposits(deposits: Any, n_ants: int) -> FloatArray:
+    """What a deposit of a user's own has returned, as an array of its own.
+
+    Raises:
+        ValueError: it is not a finite number > 0 for each ant.
+    """
+    array = validation.as_array(deposits)
+    if (
+        array is None
+        or array.dtype.kind not in "iuf"
+        or array.shape != (n_ants,)
+        or not np.isfinite(array).all()
+        or not (array > 0.0).all()
+    ):
+        raise ValueError(
+            f"deposit must return a finite number > 0 for each of the {n_ants} ants, "
+            f"got {validation.shown(deposits)}."
         )
-        if not valid:
-            raise ValueError(
-                "deposit must return a finite number > 0 for each of the "
-                f"{costs.size} ants, got {deposits.tolist()!r:.200}."
-            )
-        return deposits
+    return array.astype(np.float64)
 
 
 def as_deposit(deposit: str | Deposit | Function) -> Deposit:

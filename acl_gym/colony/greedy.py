@@ -10,6 +10,8 @@ import numpy as np
 from acl_gym.utils.compiling import njit
 from acl_gym.utils.typing import BoolArray, CellArray, FloatArray, IntArray, RankArray
 
+_CELL, _FLOAT, _BOOL = np.dtype(np.int32), np.dtype(np.float64), np.dtype(np.bool_)
+
 ALL: BoolArray = np.empty((0, 0), dtype=np.bool_)
 """What kernels take as `allowed` where every action is allowed."""
 
@@ -30,11 +32,67 @@ def epsilon_greedy_actions(
 
     See `choose_actions`.
     """
+    check_choice(index, degree, table, allowed)
     draws = rng.random((NUMBERS_PER_ACTION, index.shape[0]))
     actions = np.empty(index.shape[0], dtype=np.int64)
     any_action = ALL if allowed is None else allowed
     _epsilon_greedy(table, weights, index, degree, draws, epsilon, any_action, actions)
     return actions
+
+
+def check_choice(
+    index: CellArray,
+    degree: FloatArray,
+    table: FloatArray,
+    allowed: BoolArray | None,
+    cells: bool = True,
+) -> None:
+    """Check what kernels choose by: they address the table without further checks.
+
+    Args:
+        index: cells of the states, int32 `(n, k)`.
+        degree: their degrees, float64 `(n, k)`.
+        table: `(n_cells, n_actions)`.
+        allowed: bool `(n, n_actions)`, or None.
+        cells: look at every cell; False where another kernel does so.
+
+    Raises:
+        ValueError: a shape or type is wrong, or a cell is not one of the table.
+    """
+    good = (
+        index.ndim == 2
+        and index.shape == degree.shape
+        and index.dtype == _CELL
+        and degree.dtype == _FLOAT
+    )
+    if not good:
+        raise ValueError(
+            "index and degree must be int32 and float64 of the same shape (n, k), got "
+            f"{index.dtype} {index.shape} and {degree.dtype} {degree.shape}."
+        )
+    if allowed is not None:
+        shape = (len(index), table.shape[1])
+        if allowed.shape != shape or allowed.dtype != _BOOL:
+            raise ValueError(
+                f"allowed must be bool of shape {shape}, got {allowed.dtype} "
+                f"{allowed.shape}."
+            )
+        cells = True
+    if cells and not _all_below(index, len(table)):
+        raise ValueError(
+            f"index must hold cells in 0..{len(table) - 1}, got {index.min()} to "
+            f"{index.max()}."
+        )
+
+
+@njit
+def _all_below(index: CellArray, n_cells: int) -> bool:
+    """Whether all cells are in 0..n_cells - 1; vectorised."""
+    good = True
+    for j in range(index.shape[0]):
+        for c in range(index.shape[1]):
+            good &= (index[j, c] >= 0) & (index[j, c] < n_cells)
+    return good
 
 
 def greedy_actions(
@@ -59,6 +117,7 @@ def greedy_actions(
     Returns:
         Indices of actions, `(n,)`.
     """
+    check_choice(index, degree, table, allowed)
     actions = np.empty(index.shape[0], dtype=np.int64)
     _greedy(table, ranks, index, degree, ALL if allowed is None else allowed, actions)
     return actions

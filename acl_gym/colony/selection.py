@@ -14,6 +14,7 @@ from acl_gym.colony.greedy import (
     NUMBERS_PER_ACTION,
     any_action,
     best_action,
+    check_choice,
     epsilon_greedy_actions,
 )
 from acl_gym.colony.pheromone import Pheromone
@@ -69,6 +70,8 @@ def choose_actions(
             allowed,
             pheromone.greedy_weights,
         )
+    # `repair` looks at the cells.
+    check_choice(index, degree, pheromone.levels, allowed, cells=False)
     draws = rng.random((NUMBERS_PER_ACTION, index.shape[0]))
     actions = np.empty(index.shape[0], dtype=np.int64)
     columns, corners = written_out(pheromone.n_actions), written_out(index.shape[1])

@@ -10,8 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acl_gym.partitions import Partition
-from acl_gym.partitions.base import check_cells
+from acl_gym.partitions.base import locate_checked
+from acl_gym.utils import validation
 from acl_gym.utils.compiling import njit
+from acl_gym.utils.parameters import Fixed
 from acl_gym.utils.typing import ActionArray, BoolArray, CellArray, FloatArray, IntArray
 
 ROWS_PER_BLOCK = 4_096
@@ -50,7 +52,7 @@ class _Room:
     degree: FloatArray
 
 
-class Solutions:
+class Solutions(Fixed):
     """The multiset S_trial: what every ant did in one trial.
 
     Where a state has one cell, the cell is kept, in 4 bytes. Where it has more, cells
@@ -67,8 +69,13 @@ class Solutions:
         partition: turns observations into cells and degrees.
 
     Attributes:
-        length: how many steps each ant has made, `(n_ants,)`.
+        length: how many steps each ant has made, `(n_ants,)`, read-only.
+
+    Raises:
+        ValueError: there is no memory for so many steps.
     """
+
+    _fixed = ("n_ants", "max_steps", "partition")
 
     def __init__(
         self, n_ants: int, max_steps: int, n_actions: int, partition: Partition
@@ -80,16 +87,23 @@ class Solutions:
         self._action: ActionArray = np.empty(
             self._size, dtype=np.min_scalar_type(n_actions - 1)
         )
-        self.length: IntArray = np.zeros(n_ants, dtype=np.int64)
-        self._one_cell = partition.cells_per_state == 1
+        self._length: IntArray = np.zeros(n_ants, dtype=np.int64)
+        self._n_actions, self._n_cells = n_actions, partition.n_cells
+        self._k = partition.cells_per_state
+        self._one_cell = self._k == 1
         # Cells or observations, a row each.
         self._rows: NDArray[Any] | None = None
         self._state_shape: tuple[int, ...] = ()
         self._room: _Room | None = None
 
+    @property
+    def length(self) -> IntArray:
+        """How many steps each ant has made, `(n_ants,)`, read-only."""
+        return validation.read_only(self._length)
+
     def clear(self) -> None:
         """Forget all solutions."""
-        self.length[:] = 0
+        self._length[:] = 0
 
     def append(
         self,
@@ -105,6 +119,11 @@ class Solutions:
             observation: observations of all slots, `(n_ants, ...)`.
             index: the cells of the observations of `ants`, `(m, k)`.
             actions: the actions they chose, `(m,)`.
+
+        Raises:
+            ValueError: the arrays do not fit together, an ant or an action does not
+                exist, an ant has made `max_steps` already, or observations are not
+                numbers.
         """
         seen = index
         if not self._one_cell:
@@ -115,7 +134,24 @@ class Solutions:
             rows = self._rows_for(seen)
             self._state_shape = observation.shape[1:]
         by_slot = not self._one_cell
-        _append(ants, seen, by_slot, actions, rows, self._action, self.length)
+        good = _append(
+            ants,
+            seen,
+            by_slot,
+            actions,
+            self._n_actions,
+            self.max_steps,
+            rows,
+            self._action,
+            self._length,
+        )
+        if not good:
+            raise ValueError(
+                f"each of {ants.size} ants must exist, have made fewer than "
+                f"{self.max_steps} steps, and take an action in "
+                f"0..{self._n_actions - 1}, got {len(seen)} states and "
+                f"{validation.shown(actions)}."
+            )
 
     def _rows_for(self, seen: NDArray[Any]) -> NDArray[Any]:
         """Memory for observations of another type or size than before.
@@ -127,7 +163,12 @@ class Solutions:
         """
         width, kept = seen.shape[1], self._rows
         self._room = None  # has room for rows of the former kind
-        if kept is None or not self.length.any():
+        if seen.dtype.kind not in "biuf":
+            raise ValueError(
+                f"observations must be numbers, got {seen.dtype}; check the "
+                "environment, or use a partition with one cell per state."
+            )
+        if kept is None or not self._length.any():
             self._rows = np.empty((self._size, width), dtype=seen.dtype)
         elif kept.shape[1] != width:
             raise ValueError(
@@ -160,7 +201,7 @@ class Solutions:
         left = allowed.copy()
         if self._rows is not None:
             _strike_tried(
-                ants, index, self._rows, self._action, self.length, allowed, left
+                ants, index, self._rows, self._action, self._length, allowed, left
             )
         return left
 
@@ -173,7 +214,7 @@ class Solutions:
         if rows is None:
             return
         room = self._room_for(rows)
-        ends = np.cumsum(self.length)
+        ends = np.cumsum(self._length)
         first = done = 0
         while first < self.n_ants:
             last = int(np.searchsorted(ends, done + ROWS_PER_BLOCK, side="right"))
@@ -181,15 +222,14 @@ class Solutions:
             size = int(ends[last - 1]) - done
             places, action = room.places[:size], room.action[:size]
             index, degree = room.index[:size], room.degree[:size]
-            _collect(first, last, self.length, self._action, places, action)
+            _collect(first, last, self._length, self._action, places, action)
             seen = index if self._one_cell else room.seen[:size]
             np.take(rows, places, axis=0, out=seen, mode="clip")  # all are in range
             if not self._one_cell:
                 # A copy: the rest of the memory may hold anything.
                 states = seen.reshape(size, *self._state_shape)
-                self.partition.locate(states, room.all[:size], index, degree)
-                if not self.partition.checked:
-                    check_cells(index, self.partition)
+                every, n_cells = room.all[:size], self._n_cells
+                locate_checked(self.partition, states, every, index, degree, n_cells)
             ants = slice(first, last)
             yield Block(ants, index, degree, action, ends[ants] - done)
             first, done = last, done + size
@@ -199,7 +239,7 @@ class Solutions:
         room = self._room
         if room is None:
             most = max(ROWS_PER_BLOCK, self.max_steps)
-            k = self.partition.cells_per_state
+            k = self._k
             room = self._room = _Room(
                 np.empty((most, rows.shape[1]), dtype=rows.dtype),
                 np.arange(most),
@@ -227,19 +267,32 @@ def _append(
     seen: NDArray[Any],
     by_slot: bool,
     actions: IntArray,
+    n_actions: int,
+    max_steps: int,
     all_seen: NDArray[Any],
     all_action: ActionArray,
     length: IntArray,
-) -> None:
-    """Add a step; `seen` has a row for each slot if `by_slot`, else for each ant."""
+) -> bool:
+    """Add a step; `seen` has a row for each slot if `by_slot`, else for each ant.
+
+    Returns False where something does not exist; the steps before it are added.
+    """
+    n_rows = length.size if by_slot else ants.size
+    if actions.size != ants.size or seen.shape[0] < n_rows:
+        return False
     for j in range(ants.size):
-        ant = np.uint64(ants[j])  # unsigned, as in `_place`
+        ant = np.uint64(ants[j])  # unsigned, as in `_place`; negative ones become huge
+        if ant >= np.uint64(length.size) or length[ant] >= max_steps:
+            return False
+        if not 0 <= actions[j] < n_actions:
+            return False
         place = _place(length[ant], ants[j], length.size)
         row = ant if by_slot else np.uint64(j)
         for i in range(seen.shape[1]):
             all_seen[place, i] = seen[row, i]
         all_action[place] = actions[j]
         length[ant] += 1
+    return True
 
 
 @njit

@@ -43,16 +43,25 @@ def decay(
     tau0: float,
     levels: FloatArray,
     stale: BoolArray,
-) -> None:
-    """Local update, eq. (4.12): every ant's pair decays by 1 - gamma * degree."""
+) -> bool:
+    """Local update, eq. (4.12): every ant's pair decays by 1 - gamma * degree.
+
+    Returns False if the arrays do not fit together, or a pair is not one of the table.
+    """
+    if index.shape[0] != actions.size or degree.shape != index.shape:
+        return False
+    n_cells, n_actions = np.uint64(levels.shape[0]), np.uint64(levels.shape[1])
     for j in range(actions.size):
-        action = np.uint64(actions[j])
+        action = np.uint64(actions[j])  # unsigned: negative ones become huge
         for c in range(len(corners) or index.shape[1]):
             if degree[j, c] > 0.0:
                 cell = np.uint64(index[j, c])
+                if cell >= n_cells or action >= n_actions:
+                    return False
                 _decay_pair(
                     levels, cell, action, local_decay * degree[j, c], tau0, stale
                 )
+    return True
 
 
 # Columns of the deposits on a pair, side by side because they are used together.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar
 
 import numpy as np
@@ -13,6 +13,7 @@ from acl_gym.colony.episodes import Episodes
 from acl_gym.colony.pheromone import Pheromone
 from acl_gym.colony.selection import choose_actions
 from acl_gym.colony.solutions import Solutions
+from acl_gym.utils import validation
 from acl_gym.utils.serialization import Savable
 from acl_gym.utils.typing import BoolArray, CellArray, FloatArray, IntArray
 
@@ -130,6 +131,98 @@ class UpdateRule(Savable, ABC):
 
     def restore(self, memory: dict[str, NDArray[Any]]) -> None:
         """Take over what `memory` gave when the agent was saved."""
+
+
+class WatchedRule(UpdateRule):
+    """Stands between a colony and a rule that is not of this package.
+
+    Kernels address tables by what a colony keeps of a step, without further checks. So
+    the rule is given copies, and the actions that it chooses are checked.
+
+    Args:
+        rule: the rule.
+        n_actions: how many actions there are.
+    """
+
+    def __init__(self, rule: UpdateRule, n_actions: int) -> None:
+        self._rule, self._n_actions = rule, n_actions
+
+    def start_trial(self, pheromone: Pheromone, trial: int) -> None:
+        """See `UpdateRule`."""
+        self._rule.start_trial(pheromone, trial)
+
+    def choose(
+        self,
+        selection: str,
+        pheromone: Pheromone,
+        index: CellArray,
+        degree: FloatArray,
+        epsilon: float,
+        rng: np.random.Generator,
+        allowed: BoolArray | None,
+        local_decay: float,
+    ) -> IntArray:
+        """Let the rule choose.
+
+        Raises:
+            ValueError: it does not choose one allowed action for each ant.
+        """
+        found = self._rule.choose(
+            selection,
+            pheromone,
+            index.copy(),
+            degree.copy(),
+            epsilon,
+            rng,
+            None if allowed is None else allowed.copy(),
+            local_decay,
+        )
+        actions, m = validation.as_array(found), len(index)
+        name = f"{type(self._rule).__name__}.choose"
+        if actions is None or actions.dtype.kind not in "iu" or actions.shape != (m,):
+            raise ValueError(
+                f"{name} must return an integer for each of the {m} ants, got "
+                f"{validation.shown(found)}."
+            )
+        good = (actions >= 0) & (actions < self._n_actions)
+        if allowed is not None and good.all():
+            good = allowed[np.arange(m), actions]
+        if not good.all():
+            j = int(np.argmin(good))
+            raise ValueError(
+                f"{name} must return allowed actions in 0..{self._n_actions - 1}, got "
+                f"{actions[j]} for ant {j} of the {m} that walk."
+            )
+        return actions.astype(np.int64)
+
+    def local_update(
+        self,
+        pheromone: Pheromone,
+        index: CellArray,
+        degree: FloatArray,
+        actions: IntArray,
+        local_decay: float,
+    ) -> None:
+        """See `UpdateRule`."""
+        self._rule.local_update(
+            pheromone, index.copy(), degree.copy(), actions.copy(), local_decay
+        )
+
+    def global_update(
+        self,
+        pheromone: Pheromone,
+        result: TrialResult,
+        local_decay: float,
+        global_decay: float,
+    ) -> None:
+        """See `UpdateRule`."""
+        own = replace(
+            result,
+            costs=result.costs.copy(),
+            deposits=result.deposits.copy(),
+            success=result.success.copy(),
+        )
+        self._rule.global_update(pheromone, own, local_decay, global_decay)
 
 
 @dataclass

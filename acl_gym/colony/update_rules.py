@@ -14,7 +14,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from acl_gym.colony.greedy import ALL, NUMBERS_PER_ACTION
+from acl_gym.colony.greedy import ALL, NUMBERS_PER_ACTION, check_choice
 from acl_gym.colony.pheromone import Pheromone
 from acl_gym.colony.solutions import Solutions
 from acl_gym.colony.update_kernels import (
@@ -25,7 +25,12 @@ from acl_gym.colony.update_kernels import (
     reinforce,
     sum_deposits,
 )
-from acl_gym.colony.update_rule import MissingRule, TrialResult, UpdateRule
+from acl_gym.colony.update_rule import (
+    MissingRule,
+    TrialResult,
+    UpdateRule,
+    WatchedRule,
+)
 from acl_gym.partitions.kernels import written_out
 from acl_gym.utils import validation
 from acl_gym.utils.serialization import from_settings, to_settings
@@ -61,6 +66,15 @@ class Reinforcement:
             ValueError: a deposit is not positive and finite.
         """
         _check_deposits(deposits)
+        if (
+            deposits.shape != (solutions.n_ants,)
+            or self._summed.shape[0] != pheromone.levels.size
+        ):
+            raise ValueError(
+                f"deposits must have shape ({solutions.n_ants},), one for each ant, for "
+                f"a table of {self._summed.shape[0]} pairs, got {deposits.shape} for "
+                f"{pheromone.levels.shape}."
+            )
         if self._interrupted:
             self._summed[:] = 0.0
         self._interrupted = True
@@ -87,6 +101,10 @@ class Reinforcement:
 
 
 def _check_deposits(deposits: FloatArray) -> None:
+    if not isinstance(deposits, np.ndarray) or deposits.dtype != np.float64:
+        raise ValueError(
+            f"deposits must be an array of float64, got {validation.shown(deposits)}."
+        )
     with np.errstate(over="ignore"):
         total = deposits.sum()
     valid = np.isfinite(deposits) & (deposits > 0.0)
@@ -132,7 +150,7 @@ class EachVisit(_DepositAtEnd):
         local_decay: float,
     ) -> None:
         """Decay the visited pairs towards tau0 by 1 - gamma * degree, eq. (4.12)."""
-        if local_decay > 0.0:
+        if local_decay > 0.0 and not (
             decay(
                 index,
                 degree,
@@ -142,6 +160,12 @@ class EachVisit(_DepositAtEnd):
                 pheromone.tau0,
                 pheromone.levels,
                 pheromone.stale,
+            )
+        ):
+            raise ValueError(
+                "local_update needs a cell of the table and an action for each ant, got "
+                f"index {index.shape}, degree {degree.shape} and actions "
+                f"{actions.shape} for {pheromone.levels.shape}."
             )
 
 
@@ -166,6 +190,7 @@ class InTurn(_DepositAtEnd):
         local_decay: float,
     ) -> IntArray:
         """Choose by `selection` and decay by eq. (4.12), ant by ant."""
+        check_choice(index, degree, pheromone.levels, allowed)
         greedy = selection == "epsilon_greedy"
         actions = np.empty(index.shape[0], dtype=np.int64)
         choose_and_decay(
@@ -287,6 +312,14 @@ def as_update(update: str | UpdateRule) -> UpdateRule:
             f"got {update!r}."
         )
     return copy.deepcopy(update)
+
+
+def watched(rule: UpdateRule, n_actions: int) -> UpdateRule:
+    """The rule itself if it is one of this package, else behind a `WatchedRule`."""
+    own = type(rule) in map(type, UPDATE_RULES.values()) or isinstance(
+        rule, MissingRule
+    )
+    return rule if own else WatchedRule(rule, n_actions)
 
 
 def update_to_settings(rule: UpdateRule) -> Any:

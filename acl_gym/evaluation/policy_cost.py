@@ -15,9 +15,10 @@ from acl_gym.colony.costs import Cost, as_cost, solution_costs
 from acl_gym.colony.episodes import Episode
 from acl_gym.envs.control.environments import ControlVectorEnv
 from acl_gym.envs.control.single import ControlEnv
-from acl_gym.evaluation.rollout import Rollout
+from acl_gym.evaluation.rollout import Rollout, rows_of
 from acl_gym.policies import PartitionPolicy
-from acl_gym.utils.typing import FloatArray, Predictor, Row
+from acl_gym.utils import validation
+from acl_gym.utils.typing import FloatArray, IntArray, Predictor, Row
 from acl_gym.utils.vector_envs import require_vector_env
 
 
@@ -110,6 +111,8 @@ def evaluate_policy_cost(
     require_predictor(model)
     require_vector_env(env)
     base = env.unwrapped
+    if states is not None:
+        states = validation.real_array("states", states)
     if isinstance(base, ControlVectorEnv):
         if states is None:
             states = base.system.evaluation_states()
@@ -133,7 +136,7 @@ def evaluate_policy_cost(
     )
     memory = None
     while rollout.ants.size:
-        seen = observation[rollout.ants]
+        seen = rows_of(observation, rollout.ants)
         actions, memory = _chosen(model, seen, rollout, memory)
         observation = rollout.step(actions).observation
     costs = rollout.cost
@@ -226,13 +229,57 @@ def _chosen(
     """Indices of the actions that `model` takes in the active slots, and its state."""
     allowed = rollout.allowed()
     if isinstance(model, PartitionPolicy):
-        starts = np.full(len(observation), rollout.steps == 0)
-        actions, memory = model.predict(
-            observation, memory, starts, action_masks=allowed
-        )
+        starts = np.full(rollout.ants.size, rollout.steps == 0)
+        found = model.predict(observation, memory, starts, action_masks=allowed)
+        memory = found[1]
     else:
-        actions, _ = model.predict(observation, deterministic=True)
-    return np.asarray(actions) - rollout.first_action, memory
+        found = model.predict(observation, deterministic=True)
+    first, count = rollout.first_action, rollout.n_actions
+    return _checked_actions(found, rollout.ants, first, count) - first, memory
+
+
+def _checked_actions(
+    found: Any, slots: IntArray, first: int, count: int
+) -> NDArray[np.int64]:
+    """The actions that `predict` returned, if they are one for each slot.
+
+    Args:
+        found: what it returned.
+        slots: whose observations it was given, `(m,)`.
+        first: the first action of the environment.
+        count: how many actions the environment has.
+
+    Raises:
+        ValueError: they are not integers of the action space, one for each slot.
+    """
+    if not isinstance(found, tuple) or len(found) != 2:
+        raise ValueError(
+            "model.predict must return (actions, state), got "
+            f"{validation.shown(found)}; return (actions, None) where it has no state."
+        )
+    array = validation.as_array(found[0])
+    if array is None or array.dtype.kind not in "iu":
+        what = validation.shown(found[0]) if array is None else f"dtype {array.dtype}"
+        raise ValueError(
+            f"model.predict must return integers as actions, got {what}; round them in "
+            "predict and cast with .astype(np.int64)."
+        )
+    if array.shape == (slots.size, 1) or (array.ndim == 0 and slots.size == 1):
+        array = array.reshape(slots.size)
+    if array.shape != slots.shape:
+        raise ValueError(
+            f"model.predict must return one action for each of the {slots.size} "
+            f"observations, got shape {array.shape}; check that it handles batches."
+        )
+    wrong = (array < first) | (array >= first + count)
+    if wrong.any():
+        j = int(np.argmax(wrong))
+        raise ValueError(
+            f"model.predict must return actions in {first}..{first + count - 1}, got "
+            f"{array[j]} in slot {slots[j]}; check that the model is of this "
+            "environment."
+        )
+    return array.astype(np.int64)
 
 
 def record_trajectory(
@@ -302,9 +349,13 @@ def actions_in(
     control_env(env)
     env = with_slots_for(env, states)
     observation, _ = env.reset(options={"state": states})
+    space = env.single_action_space
     if isinstance(model, PartitionPolicy):
-        return model.predict(observation, None, np.ones(len(observation), np.bool_))[0]
-    return np.asarray(model.predict(observation, deterministic=True)[0], dtype=np.int64)
+        found = model.predict(observation, None, np.ones(len(observation), np.bool_))
+    else:
+        found = model.predict(observation, deterministic=True)
+    first, count = int(space.start), int(space.n)
+    return _checked_actions(found, np.arange(env.num_envs), first, count)
 
 
 def require_predictor(model: Any) -> None:

@@ -12,6 +12,9 @@ from acl_gym.utils.compiling import njit
 from acl_gym.utils.threads import shared_among_threads
 from acl_gym.utils.typing import CellArray, FloatArray, IntArray
 
+OUTSIDE = -2
+"""What `locate` returns if a slot is not a row of the states."""
+
 BLOCK = 256
 """States that `locate` handles at a time, so that scratch stays in the nearest cache."""
 
@@ -83,7 +86,10 @@ def locate_on_axis(
         for i in range(x.size):
             x[i] -= period * np.floor((x[i] - first) / period)
     for i in range(x.size):
-        x[i] = min(max(x[i], first), end)
+        # Written so that NaN, to which huge values of a circular variable may overflow,
+        # does not pass: kernels index by the result.
+        value = x[i] if x[i] > first else first
+        x[i] = value if value < end else end
     if rate > 0.0:
         # On a regular axis the interval is known but for the rounding of the guess.
         highest = float(last)
@@ -154,6 +160,11 @@ def locate_block(
     """
     start = block * BLOCK
     size = min(BLOCK, slots.size - start)
+    rows, inside = np.uint64(states.shape[0]), True
+    for i in range(size):
+        inside &= np.uint64(slots[start + i]) < rows  # negative ones become huge
+    if not inside:
+        return OUTSIDE
     first, count, cells, period, rate = axes
     dimensions = len(cells)
     # What the cells below and above each state add to the index (4.8), per axis.
@@ -245,9 +256,10 @@ def locate(
     index: CellArray,
     degree: FloatArray,
 ) -> int:
-    """Fill rows of `index` and `degree`; return a slot that is not finite, or -1.
+    """Fill rows of `index` and `degree`; return -1.
 
-    `axes` holds tuples, so that the number of axes is known when the kernel is compiled
+    If a state is not finite, its slot is returned; `OUTSIDE` if a slot is not a row of
+    `states`. `axes` holds tuples, so that the number of axes is known when the kernel is compiled
     and the loops over them are unrolled.
     """
     ends, reals = scratch_for(len(axes[0]))
@@ -255,7 +267,7 @@ def locate(
         bad = locate_block(
             states, slots, edges, axes, fuzzy, index, degree, block, ends, reals
         )
-        if bad >= 0:
+        if bad != -1:
             return bad
     return -1
 
@@ -283,7 +295,7 @@ def locate_in_parallel(
             states, slots, edges, own, fuzzy, index, degree, block, ends, reals
         )
     for slot in bad:
-        if slot >= 0:
+        if slot != -1:
             return int(slot)
     return -1
 
@@ -308,10 +320,13 @@ def locate_discrete(
         degree: `(>= m, 1)`, receives ones.
 
     Returns:
-        A slot and a variable whose value is not whole or not in range, or (-1, -1).
+        A slot and a variable whose value is not whole or not in range, `OUTSIDE` if the
+        slot is not a row of `states`, or (-1, -1).
     """
     for j in range(slots.size):
         slot = slots[j]
+        if not 0 <= slot < states.shape[0]:
+            return OUTSIDE, -1
         cell = 0
         for axis in range(sizes.size):
             x = states[slot, axis]

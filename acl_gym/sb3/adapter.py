@@ -24,6 +24,7 @@ from stable_baselines3.common.vec_env.base_vec_env import (
     VecEnvStepReturn,
 )
 
+from acl_gym.envs import received
 from acl_gym.envs.control.environments import ControlVectorEnv
 from acl_gym.envs.wrappers.partial_reset import reset_slots
 from acl_gym.sb3.slots import SlotEnvs, slot_envs
@@ -157,10 +158,17 @@ class VectorEnvAdapter(VecEnv):
             )
         actions, self._actions = self._actions, None
         observations, rewards, terminated, truncated, infos = self.env.step(actions)
+        n = self.num_envs
+        rewards = received.rewards(rewards, n)
+        terminated = received.flags("terminated", terminated, n)
+        truncated = received.flags("truncated", truncated, n)
         dones = np.logical_or(terminated, truncated)
         slots = np.flatnonzero(dones).tolist()
-        plain = {key: infos[key] for key in infos if key not in _FINAL_KEYS}
-        rows = _infos_per_slot(plain, self.num_envs)
+        rows = [
+            {key: row[key] for key in row if key not in _FINAL_KEYS}
+            for row in _infos_per_slot(infos, n)
+        ]
+        infos = received.infos(infos, n)
         if slots and self._resets_itself:
             # Entries missing from final_info were written by the reset or a wrapper.
             last = _infos_per_slot(infos.get("final_info", {}), self.num_envs)
@@ -341,7 +349,7 @@ def _settle_mode(env: VectorEnv[Any, Any, Any]) -> AutoresetMode:
     Raises:
         ValueError: a `VecEnv` does not support the mode, and it cannot be changed.
     """
-    mode = AutoresetMode(env.metadata.get("autoreset_mode", AutoresetMode.NEXT_STEP))
+    mode = received.autoreset_mode_of(env)
     if mode in _SUPPORTED_MODES:
         return mode
     # Not below wrappers, which may have read the mode already.
@@ -403,8 +411,18 @@ def _check_start(what: str, space: spaces.Space[Any]) -> None:
         )
 
 
-def _infos_per_slot(infos: dict[str, Any], count: int) -> list[dict[str, Any]]:
-    """Split batched infos into one dict per slot, following the mask of each key."""
+def _infos_per_slot(infos: Any, count: int) -> list[dict[str, Any]]:
+    """Split batched infos into one dict per slot, following the mask of each key.
+
+    Infos that are a list with a dict for each slot already are taken as they are.
+
+    Raises:
+        ValueError: they are neither.
+    """
+    if isinstance(infos, list):
+        received.infos(infos, count)
+        return [dict(row) for row in infos]
+    infos = received.infos(infos, count)
     rows: list[dict[str, Any]] = [{} for _ in range(count)]
     for key, values in infos.items():
         if key.startswith("_") and key[1:] in infos:

@@ -15,6 +15,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv, VectorObservationWrapper
 from gymnasium.vector.utils import batch_space
 from numpy.typing import ArrayLike, NDArray
 
+from acl_gym.utils.boxes import declared_bounds
 from acl_gym.utils.typing import Float32Array
 
 TWO_PI = 2.0 * math.pi
@@ -160,7 +161,7 @@ def _bounds(space: spaces.Space[Any]) -> tuple[NDArray[np.float64], ...]:
             f"observations must be a Box of one axis, got {space}; use "
             "gymnasium's FlattenObservation first."
         )
-    low, high = space.low.astype(np.float64), space.high.astype(np.float64)
+    low, high = declared_bounds(space)
     for axis in range(low.size):
         if not (np.isfinite([low[axis], high[axis]]).all() and low[axis] < high[axis]):
             raise ValueError(

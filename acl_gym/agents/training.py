@@ -13,6 +13,7 @@ from tqdm.auto import tqdm
 from acl_gym.agents.base import TabularAgent
 from acl_gym.callbacks.base import Callbacks, as_callbacks, is_stop
 from acl_gym.utils import validation
+from acl_gym.utils.serialization import check_row
 from acl_gym.utils.typing import Row
 
 DEFAULT_TRIALS = 100
@@ -52,6 +53,9 @@ class Training:
             log_interval = validation.integer("log_interval", log_interval, at_least=1)
         if total_timesteps is None and trials is None:
             trials = DEFAULT_TRIALS
+        # Before any work is done that could not be saved.
+        agent.require_all_given()
+        agent.checked_metadata()
         self._agent = agent
         self._last_step = _end(agent.num_timesteps, total_timesteps)
         self._last_trial = _end(agent.trials, trials)
@@ -84,6 +88,8 @@ class Training:
         try:
             for callback in self._callbacks:
                 callback.on_training_end(self._agent)
+                if self._agent.history:
+                    check_row(self._agent.history[-1])
         finally:
             self._bar.close()
 
@@ -123,6 +129,7 @@ class Training:
         for callback in self._callbacks:
             if is_stop(callback.on_trial_end(agent, row)):
                 self._stopped = True
+            check_row(row)
         self._report(row, 1 if self._bar_counts_trials else steps)
         self._clock = time.perf_counter()
 

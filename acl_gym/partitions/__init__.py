@@ -11,7 +11,11 @@ one (§4.3) k = 2^d. Equations written over `(index, degree)` therefore hold for
 from acl_gym.partitions.base import Partition, check_cells
 from acl_gym.partitions.discrete import Discrete
 from acl_gym.partitions.grid import KINDS, Crisp, Fuzzy, Grid
-from acl_gym.partitions.settings import partition_from_settings
+from acl_gym.partitions.settings import (
+    given_partition,
+    partition_from_settings,
+    partition_to_settings,
+)
 
 __all__ = [
     "KINDS",
@@ -21,5 +25,7 @@ __all__ = [
     "Grid",
     "Partition",
     "check_cells",
+    "given_partition",
     "partition_from_settings",
+    "partition_to_settings",
 ]

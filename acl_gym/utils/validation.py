@@ -89,12 +89,18 @@ def number(
     return result
 
 
-def integer(name: str, value: Any, *, at_least: int) -> int:
+def integer(name: str, value: Any, *, at_least: int, at_most: int | None = None) -> int:
     """Return `value` as an int of at least `at_least`.
+
+    Args:
+        name: what the number is called in the error message.
+        value: the candidate.
+        at_least: the smallest that is allowed.
+        at_most: the largest; None sets no limit.
 
     Raises:
         TypeError: `value` is not an integer.
-        ValueError: `value` is too small.
+        ValueError: `value` is too small or too large.
     """
     if isinstance(value, bool) or not isinstance(value, Integral):
         raise TypeError(
@@ -102,6 +108,8 @@ def integer(name: str, value: Any, *, at_least: int) -> int:
         )
     if value < at_least:
         raise ValueError(f"{name} must be at least {at_least}, got {value}.")
+    if at_most is not None and value > at_most:
+        raise ValueError(f"{name} must be at most {at_most}, got {value}.")
     return int(value)
 
 

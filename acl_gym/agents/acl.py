@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any, Self
 
 import numpy as np
@@ -30,7 +30,6 @@ from acl_gym.colony.update_rule import MissingRule, TrialResult, UpdateRule
 from acl_gym.colony.update_rules import (
     as_update,
     update_from_settings,
-    update_to_settings,
     watched,
 )
 from acl_gym.evaluation.rollout import Rollout
@@ -38,7 +37,7 @@ from acl_gym.partitions import Partition
 from acl_gym.policies import SoftPolicy
 from acl_gym.utils import validation
 from acl_gym.utils.parameters import Parameter, fixed
-from acl_gym.utils.serialization import to_settings
+from acl_gym.utils.serialization import Missing, to_settings
 from acl_gym.utils.typing import BoolArray, CellArray, FloatArray, IntArray, Row
 
 __all__ = ["ACL", "PheromoneBoundWarning"]
@@ -172,9 +171,9 @@ class ACL(TabularAgent):
         self.pheromone = Pheromone(
             *shape,
             self.tau0,
-            self._now("alpha"),
+            self._at_first("alpha"),
             as_heuristic(heuristic, env, self.partition, shape),
-            self._now("beta"),
+            self._at_first("beta"),
         )
         self._solutions: Solutions | None = None
         self._rule = self._update  # of the trial under way; see `watched`
@@ -282,7 +281,8 @@ class ACL(TabularAgent):
     def update(self) -> UpdateRule:
         """The local and the global update; the colony's own copy of what was set.
 
-        A user's own rule is not saved. Set it again after `load`: a rule of the same
+        Of a user's own rule a file holds the name and what it remembered. Give it again
+        with `load(path, env, update=...)` or set it after `load`: a rule of the same
         class takes over what the saved one remembered.
         """
         return self._update
@@ -361,7 +361,7 @@ class ACL(TabularAgent):
             "selection": self.selection,
             "cost": to_settings(self.cost),
             "deposit": to_settings(self.deposit),
-            "update": update_to_settings(self.update),
+            "update": to_settings(self.update),
             "tabu": self.tabu,
             "max_steps": self.max_steps,
             "seed": self.seed,
@@ -389,15 +389,22 @@ class ACL(TabularAgent):
             arrays["heuristic"] = self.heuristic
         return arrays
 
-    def _restore(self, header: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> None:
+    def _restore(
+        self, header: dict[str, Any], arrays: Mapping[str, NDArray[Any]]
+    ) -> None:
         super()._restore(header, arrays)
         memory = {
-            name.removeprefix("update_"): array
-            for name, array in arrays.items()
+            name.removeprefix("update_"): arrays[name]
+            for name in arrays
             if name.startswith("update_")
         }
         if memory:
-            self.update.restore(memory)
+            saved = update_from_settings(header["parameters"]["update"])
+            if type(saved) is type(self.update):
+                self.update.restore(memory)
+            elif isinstance(saved, MissingRule):  # the rule was given again
+                saved.restore(memory)
+                saved.hand_over(self.update)
         self.pheromone.heuristic = as_heuristic(
             arrays.get("heuristic"), None, self.partition, self._table.shape
         )
@@ -411,6 +418,11 @@ class ACL(TabularAgent):
         """The value that a number or schedule has in the next trial."""
         parameter: Parameter = getattr(type(self), name)
         return parameter.at(self, self.trials)
+
+    def _at_first(self, name: str) -> float:
+        """The value with which to begin; 1 where a file could not hold the schedule."""
+        missing = isinstance(getattr(self, name), Missing)
+        return 1.0 if missing else self._now(name)
 
     def _set_exponents(self) -> float:
         """Set alpha and beta to their values in the next trial; return its epsilon."""

@@ -26,6 +26,9 @@ from acl_gym.utils.typing import BoolArray, CellArray, FloatArray, IntArray
 
 TRACES = ("replacing", "accumulating")
 
+FIRST_TRACES = 1_024
+"""For how many traces of each slot there is memory at first."""
+
 TRACE_CUTOFF = 1e-4
 """Traces that fade below it are dropped (a decision)."""
 
@@ -188,7 +191,7 @@ class QLearning(TabularAgent):
                             self._kind == "accumulating",
                             TRACE_CUTOFF,
                             step.ants,
-                            *traces.arrays,
+                            *traces.with_room(index.shape[1]),
                         )
                     allowed, stays = next_allowed, ~step.finished
                     index, degree = next_index[stays], next_degree[stays]
@@ -261,7 +264,7 @@ class QLearning(TabularAgent):
 class _Traces:
     """The eligibility traces e of all slots, those that are not 0.
 
-    Memory is reserved for the longest episode, but only what traces need is touched.
+    Memory grows with what traces need: by doubling, up to the longest episode.
 
     Args:
         slots: how many slots there are.
@@ -270,22 +273,35 @@ class _Traces:
     """
 
     def __init__(self, slots: int, n_pairs: int, longest: int) -> None:
-        capacity = min(n_pairs, longest)
-        validation.check_memory(
-            f"the traces of {slots} slots",
-            16 * slots * capacity + 8 * n_pairs,
-            "use fewer slots, cells or steps, or trace_decay=0",
-        )
-        self.greedy: BoolArray = np.empty(slots, dtype=np.bool_)
-        pair: IntArray = np.empty((slots, capacity), dtype=np.int64)
-        trace: FloatArray = np.empty((slots, capacity))
+        self._most = min(n_pairs, longest)
+        first = min(self._most, FIRST_TRACES)
+        self._greedy: BoolArray = np.empty(slots, dtype=np.bool_)
+        self._pair: IntArray = np.empty((slots, first), dtype=np.int64)
+        self._trace: FloatArray = np.empty((slots, first))
         self._count: IntArray = np.zeros(slots, dtype=np.int64)
-        mark: FloatArray = np.zeros(n_pairs)
-        self.arrays = (self.greedy, pair, trace, self._count, mark)
+        self._mark: FloatArray = np.zeros(n_pairs)
+
+    @property
+    def greedy(self) -> BoolArray:
+        """Whether the last action of each walking slot was greedy; to be written."""
+        return self._greedy
 
     def clear(self) -> None:
         """Forget all traces."""
         self._count[:] = 0
+
+    def with_room(self, more: int) -> tuple[Any, ...]:
+        """The arrays that `_update_traced` changes, with room for `more` in each slot."""
+        room = self._pair.shape[1]
+        needed = min(int(self._count.max()) + more, self._most)
+        if needed > room:
+            wider = min(max(2 * room, needed), self._most)
+            for name in ("_pair", "_trace"):
+                array = getattr(self, name)
+                copy = np.empty((len(array), wider), dtype=array.dtype)
+                copy[:, :room] = array
+                setattr(self, name, copy)
+        return self._greedy, self._pair, self._trace, self._count, self._mark
 
 
 def _next_allowed(rollout: Rollout, step: Step) -> BoolArray:

@@ -14,6 +14,7 @@ from acl_gym.agents.base import TabularAgent
 from acl_gym.callbacks.base import Callbacks, as_callbacks, is_stop
 from acl_gym.evaluation import reports_returns
 from acl_gym.utils import validation
+from acl_gym.utils.serialization import check_row
 from acl_gym.utils.typing import Row
 
 DEFAULT_TRIALS = 100
@@ -58,6 +59,9 @@ class Training:
                 "learn must not be called while a trial is under way; call it after the "
                 "first call has returned."
             )
+        # Before any work is done that could not be saved.
+        agent.require_all_given()
+        agent.checked_metadata()
         self._agent = agent
         cost = getattr(agent, "cost", None)
         self._reported = (
@@ -95,6 +99,8 @@ class Training:
         try:
             for callback in self._callbacks:
                 callback.on_training_end(self._agent)
+                if self._agent.history:
+                    check_row(self._agent.history[-1])
         finally:
             self._bar.close()
 
@@ -136,6 +142,7 @@ class Training:
         for callback in self._callbacks:
             if is_stop(callback.on_trial_end(agent, row)):
                 self._stopped = True
+            check_row(row)
         self._report(row, 1 if self._bar_counts_trials else steps)
         self._clock = time.perf_counter()
 

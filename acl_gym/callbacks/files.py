@@ -9,6 +9,8 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from acl_gym.callbacks.base import Agent, Callback
 from acl_gym.utils import files, validation
 from acl_gym.utils.typing import Row
@@ -138,7 +140,7 @@ class CSVLog(Callback):
 
 def _plain(value: Any) -> Any:
     """Turn a NumPy number, which a callback may have added, into a Python number."""
-    return value.item() if hasattr(value, "item") else value
+    return value.item() if isinstance(value, np.generic) else value
 
 
 def _is_log(path: Path) -> bool:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from importlib import import_module
+from numbers import Real
 from pathlib import Path
 from typing import Any
 
@@ -70,7 +71,7 @@ class TensorBoardLog(Callback):
     def _write(self, row: Row, values: Row) -> None:
         step = int(row["env_steps"])
         for name, value in values.items():
-            if name != "env_steps":
+            if name != "env_steps" and isinstance(value, Real):  # notes have no curve
                 tag = _TAGS.get(name, f"other/{name}")
                 self._writer.add_scalar(tag, float(value), step)
         self._written = dict(row)

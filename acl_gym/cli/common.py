@@ -243,10 +243,10 @@ def load_agent(path: str) -> TabularAgent:
         BadArgumentError: there is no such file, or it holds no agent of this package.
     """
     import acl_gym
-    from acl_gym.utils import files
+    from acl_gym.utils.archives import Archive
 
     with bad_arguments():
-        name = str(files.load(path)[0].get("agent"))
+        name = str(Archive(path).header.get("agent"))
         if name not in AGENTS.values():
             raise ValueError(
                 f"{path} must hold one of {', '.join(AGENTS.values())}, got {name!r}."

@@ -17,7 +17,7 @@ import numpy as np
 
 from acl_gym.colony.episodes import Episode, Episodes
 from acl_gym.utils import validation
-from acl_gym.utils.serialization import Savable, from_settings
+from acl_gym.utils.serialization import Savable, Unsaved, from_settings, make_plain
 from acl_gym.utils.typing import FloatArray
 
 
@@ -80,6 +80,7 @@ class Quadratic(Cost):
     periods: tuple[float | None, ...] | None = None
 
     def __post_init__(self) -> None:
+        make_plain(self)
         size = validation.real_array("goal", self.goal, ndim=1).size
         _weight("state_weight", self.state_weight, size)
         if (self.inputs is None) != (self.input_weight is None):
@@ -132,6 +133,7 @@ class _Response(Cost):
         """The period of a circular variable, > 0; else None."""
 
     def __post_init__(self) -> None:
+        make_plain(self)
         validation.integer("variable", self.variable, at_least=0)
         validation.number("target", self.target)
         if self.period is not None:
@@ -248,6 +250,7 @@ class Constant(Cost):
     value: float
 
     def __post_init__(self) -> None:
+        make_plain(self)
         validation.number("value", self.value, at_least=0)
 
     def __call__(self, episodes: Episodes) -> FloatArray:
@@ -264,6 +267,10 @@ class Sum(Cost):
     """
 
     terms: tuple[Cost, ...]
+
+    def __post_init__(self) -> None:
+        make_plain(self)
+        _check_costs("terms", self.terms)
 
     def __call__(self, episodes: Episodes) -> FloatArray:
         """See `Cost`."""
@@ -283,7 +290,9 @@ class Weighted(Cost):
     cost: Cost
 
     def __post_init__(self) -> None:
+        make_plain(self)
         validation.number("factor", self.factor, above=0)
+        _check_costs("cost", (self.cost,))
 
     def __call__(self, episodes: Episodes) -> FloatArray:
         """See `Cost`."""
@@ -310,6 +319,10 @@ class FunctionCost(Cost):
                 for ant in range(len(episodes))
             ]
         )
+
+
+class MissingCost(Unsaved, Cost):
+    """Stands in for a user's own cost in an agent read from a file."""
 
 
 _KINDS = (
@@ -369,7 +382,7 @@ def cost_from_settings(settings: Any) -> Cost | None:
     Raises:
         ValueError: they are not those of a cost.
     """
-    cost = from_settings("cost", settings, _KINDS)
+    cost = from_settings("cost", settings, _KINDS, MissingCost)
     if cost is not None and not isinstance(cost, Cost):
         raise ValueError(f"cost must be a Cost, got {settings!r:.200}.")
     return cost
@@ -384,6 +397,15 @@ def _first_crossing(progress: FloatArray, level: float) -> FloatArray:
     with np.errstate(divide="ignore", invalid="ignore"):
         part = np.where(step > 0, (after - level) / (after - before), 0.0)
     return np.where(above.any(axis=0), step - part, np.inf)
+
+
+def _check_costs(name: str, costs: Any) -> None:
+    for cost in costs if isinstance(costs, tuple) else (costs,):
+        if not isinstance(cost, Cost):
+            raise TypeError(
+                f"{name} must be made of Costs such as Steps(), got {cost!r:.80}; make "
+                "a Cost of a function with FunctionCost(function)."
+            )
 
 
 def _weight(name: str, values: Any, size: int) -> FloatArray:

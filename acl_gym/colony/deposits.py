@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from acl_gym.utils import validation
-from acl_gym.utils.serialization import Savable, from_settings
+from acl_gym.utils.serialization import Savable, Unsaved, from_settings, make_plain
 from acl_gym.utils.typing import FloatArray
 
 Function = Callable[[FloatArray], FloatArray]
@@ -50,6 +50,7 @@ class InverseCost(Deposit):
     offset: float = 0.0
 
     def __post_init__(self) -> None:
+        make_plain(self)
         validation.number("offset", self.offset)
 
     def __call__(self, costs: FloatArray, tau0: float) -> FloatArray:
@@ -105,6 +106,7 @@ class Rank(Deposit):
     exponent: float = 1.0
 
     def __post_init__(self) -> None:
+        make_plain(self)
         validation.number("exponent", self.exponent, above=0)
 
     def __call__(self, costs: FloatArray, tau0: float) -> FloatArray:
@@ -162,6 +164,10 @@ def checked_deposits(deposits: Any, n_ants: int) -> FloatArray:
     return array.astype(np.float64)
 
 
+class MissingDeposit(Unsaved, Deposit):
+    """Stands in for a user's own deposit in an agent read from a file."""
+
+
 def as_deposit(deposit: str | Deposit | Function) -> Deposit:
     """Turn every accepted form of `deposit` into a `Deposit`.
 
@@ -188,7 +194,7 @@ def deposit_from_settings(settings: Any) -> Deposit:
         ValueError: they are not those of a deposit.
     """
     kinds = (InverseCost, Return, Rank, FunctionDeposit)
-    deposit = from_settings("deposit", settings, kinds)
+    deposit = from_settings("deposit", settings, kinds, MissingDeposit)
     if not isinstance(deposit, Deposit):
         raise ValueError(f"deposit must be a Deposit, got {settings!r:.200}.")
     return deposit

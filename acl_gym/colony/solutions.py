@@ -24,6 +24,10 @@ RUN = 5
 ant: a step is written for all ants at once, but deposits are read ant by ant."""
 
 
+FIRST_STEPS = 640
+"""For how many steps of each ant there is memory at first; more is made when needed."""
+
+
 @dataclass(frozen=True, slots=True)
 class Block:
     """The solutions of some ants, one after the other, `r` pairs in all."""
@@ -60,7 +64,7 @@ class Solutions(Fixed):
     instead and located again when it is needed, with the same bits. An action takes one
     byte if there are at most 256.
 
-    Memory is reserved for `max_steps` steps, but only the steps made are touched.
+    Memory grows with the steps that ants make: by doubling, up to `max_steps`.
 
     Args:
         n_ants: M.
@@ -82,8 +86,8 @@ class Solutions(Fixed):
     ) -> None:
         self.n_ants, self.max_steps = n_ants, max_steps
         self.partition = partition
-        # `_place` computes where step t of an ant lies.
-        self._size = (max_steps + RUN - 1) // RUN * RUN * n_ants
+        self._room_for_steps = min(max_steps, FIRST_STEPS)
+        self._appended = 0  # no ant has made more steps than this
         self._action: ActionArray = np.empty(
             self._size, dtype=np.min_scalar_type(n_actions - 1)
         )
@@ -101,9 +105,15 @@ class Solutions(Fixed):
         """How many steps each ant has made, `(n_ants,)`, read-only."""
         return validation.read_only(self._length)
 
+    @property
+    def _size(self) -> int:
+        """How many pairs there is memory for; `_place` computes where each lies."""
+        return (self._room_for_steps + RUN - 1) // RUN * RUN * self.n_ants
+
     def clear(self) -> None:
         """Forget all solutions."""
         self._length[:] = 0
+        self._appended = 0
 
     def append(
         self,
@@ -133,6 +143,9 @@ class Solutions(Fixed):
         if rows is None or rows.dtype != seen.dtype or rows.shape[1] != seen.shape[1]:
             rows = self._rows_for(seen)
             self._state_shape = observation.shape[1:]
+        if self._appended >= self._room_for_steps < self.max_steps:
+            rows = self._grow(rows)
+        self._appended += 1
         by_slot = not self._one_cell
         good = _append(
             ants,
@@ -178,6 +191,14 @@ class Solutions(Fixed):
         else:
             kind = np.result_type(kept, seen)
             self._rows = kept if kept.dtype == kind else kept.astype(kind)
+        return self._rows
+
+    def _grow(self, rows: NDArray[Any]) -> NDArray[Any]:
+        """Make memory for twice as many steps; what is there stays in its place."""
+        self._room_for_steps = min(2 * self._room_for_steps, self.max_steps)
+        self._room = None  # has room for the longest solution
+        self._action = _enlarged(self._action, self._size)
+        self._rows = _enlarged(rows, self._size)
         return self._rows
 
     def untried(
@@ -238,7 +259,7 @@ class Solutions(Fixed):
         """Scratch for a block, the same in every trial."""
         room = self._room
         if room is None:
-            most = max(ROWS_PER_BLOCK, self.max_steps)
+            most = max(ROWS_PER_BLOCK, self._room_for_steps)
             k = self._k
             room = self._room = _Room(
                 np.empty((most, rows.shape[1]), dtype=rows.dtype),
@@ -249,6 +270,13 @@ class Solutions(Fixed):
                 np.ones((most, 1)) if k == 1 else np.empty((most, k)),
             )
         return room
+
+
+def _enlarged(array: NDArray[Any], size: int) -> NDArray[Any]:
+    """A copy with more rows, of which those at the end hold nothing yet."""
+    larger = np.empty((size, *array.shape[1:]), dtype=array.dtype)
+    larger[: len(array)] = array
+    return larger
 
 
 @njit(inline="always")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 import numpy as np
@@ -14,7 +14,7 @@ from acl_gym.colony.pheromone import Pheromone
 from acl_gym.colony.selection import choose_actions
 from acl_gym.colony.solutions import Solutions
 from acl_gym.utils import validation
-from acl_gym.utils.serialization import Savable
+from acl_gym.utils.serialization import Missing, Savable
 from acl_gym.utils.typing import BoolArray, CellArray, FloatArray, IntArray
 
 
@@ -225,21 +225,22 @@ class WatchedRule(UpdateRule):
         self._rule.global_update(pheromone, own, local_decay, global_decay)
 
 
-@dataclass
-class MissingRule(UpdateRule):
+class MissingRule(Missing, UpdateRule):
     """Stands in for a user's own update rule in an agent read from a file.
 
     It keeps what that rule remembered, for the rule itself or for the next file.
 
-    Attributes:
+    Args:
+        parameter: "update".
         name: of the rule's class.
+
+    Attributes:
         kept: what the rule's `memory` gave when the agent was saved.
     """
 
-    name: str
-    kept: dict[str, NDArray[Any]] = field(
-        default_factory=dict, init=False, repr=False, compare=False
-    )
+    def __init__(self, parameter: str, name: str) -> None:
+        super().__init__(parameter, name)
+        self.kept: dict[str, NDArray[Any]] = {}
 
     def start_trial(self, pheromone: Pheromone, trial: int) -> None:
         """Report which rule is missing.
@@ -247,10 +248,7 @@ class MissingRule(UpdateRule):
         Raises:
             ValueError: always.
         """
-        raise ValueError(
-            f"update was the rule {self.name!r}, which a file cannot hold; set "
-            "agent.update to it before learning continues."
-        )
+        raise self.error()
 
     def local_update(self, *arguments: Any) -> None:
         """Never called: a trial does not start."""
@@ -268,5 +266,7 @@ class MissingRule(UpdateRule):
 
     def hand_over(self, rule: UpdateRule) -> None:
         """Give what is kept to `rule`, if it is of the class that is missing."""
-        if self.kept and type(rule).__qualname__ == self.name:
+        # A script is a module of another name when it is imported; older files name the
+        # class only.
+        if self.kept and type(rule).__qualname__ == self.name.rpartition(":")[2]:
             rule.restore(self.kept)

@@ -33,7 +33,7 @@ from acl_gym.colony.update_rule import (
 )
 from acl_gym.partitions.kernels import written_out
 from acl_gym.utils import validation
-from acl_gym.utils.serialization import from_settings, to_settings
+from acl_gym.utils.serialization import from_settings
 from acl_gym.utils.typing import BoolArray, CellArray, FloatArray, IntArray
 
 
@@ -322,26 +322,14 @@ def watched(rule: UpdateRule, n_actions: int) -> UpdateRule:
     return rule if own else WatchedRule(rule, n_actions)
 
 
-def update_to_settings(rule: UpdateRule) -> Any:
-    """The saved form of a rule: its settings, or the name of a user's own class."""
-    if isinstance(rule, MissingRule):
-        return {"type": "function", "name": rule.name}
-    if type(rule) not in map(type, UPDATE_RULES.values()):
-        return {"type": "function", "name": type(rule).__qualname__}
-    return to_settings(rule)
-
-
 def update_from_settings(settings: Any) -> UpdateRule:
-    """Undo `update_to_settings`.
+    """An update rule from the settings in a file.
 
     Raises:
         ValueError: the settings are those of no rule.
     """
-    if isinstance(settings, dict) and settings.get("type") == "function":
-        return MissingRule(str(settings.get("name")))
-    rule = from_settings(
-        "update", settings, [type(each) for each in UPDATE_RULES.values()]
-    )
+    kinds = [type(each) for each in UPDATE_RULES.values()]
+    rule = from_settings("update", settings, kinds, MissingRule)
     if not isinstance(rule, UpdateRule):
         raise ValueError(f"update must be an UpdateRule, got {settings!r:.200}.")
     return rule

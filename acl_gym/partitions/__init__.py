@@ -16,7 +16,11 @@ from acl_gym.partitions.base import (
 )
 from acl_gym.partitions.discrete import Discrete
 from acl_gym.partitions.grid import KINDS, Crisp, Fuzzy, Grid
-from acl_gym.partitions.settings import partition_from_settings
+from acl_gym.partitions.settings import (
+    given_partition,
+    partition_from_settings,
+    partition_to_settings,
+)
 
 __all__ = [
     "KINDS",
@@ -26,7 +30,9 @@ __all__ = [
     "Grid",
     "Partition",
     "checked_partition",
+    "given_partition",
     "locate_all",
     "locate_checked",
     "partition_from_settings",
+    "partition_to_settings",
 ]

@@ -220,12 +220,16 @@ class GridSearch(NumberedSystem):
         return np.flatnonzero(~self._goal).astype(np.float64)[:, None]
 
 
+MOST_STATES = 1_000_000
+"""Of a row: tables of what each move leads to are made for all of them."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class GridSearch1D(GridSearch):
     """A row of states (§3.6.2); actions 0 west, 1 east; the goal is the last state.
 
     Attributes:
-        n_states: the length of the row, goal included, >= 2.
+        n_states: the length of the row, goal included, 2 to 1,000,000.
         transition_probability: p, in (0, 1]: a move fails with probability 1 - p.
         mask_blocked: whether infos carry `"action_mask"`, U_q of (3.4), which leaves
             out the blocked move of the first state.
@@ -239,7 +243,9 @@ class GridSearch1D(GridSearch):
     mask_blocked: bool = False
 
     def __post_init__(self) -> None:
-        n_states = validation.integer("n_states", self.n_states, at_least=2)
+        n_states = validation.integer(
+            "n_states", self.n_states, at_least=2, at_most=MOST_STATES
+        )
         object.__setattr__(self, "n_states", n_states)
         self._check_moves()
 

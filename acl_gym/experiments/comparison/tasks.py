@@ -163,7 +163,9 @@ def _dqn(task: Task, settings: dict[str, Any], steps: int, every: int) -> Study:
     )
 
 
-_READ = tomllib.loads(Path(__file__).with_name("tasks.toml").read_text())
+_READ = tomllib.loads(
+    Path(__file__).with_name("tasks.toml").read_text(encoding="utf-8")
+)
 
 _COLONIES = {
     "pendulum": systems.pendulum("fuzzy"),
@@ -287,7 +289,7 @@ PLAIN = {name: task for name, task in TASKS.items() if name in SYSTEMS}
 @cache
 def tuned_settings() -> dict[str, dict[str, dict[str, Any]]]:
     """What the searches have found: task -> method -> settings."""
-    return json.loads(SETTINGS_FILE.read_text())  # type: ignore[no-any-return]
+    return json.loads(SETTINGS_FILE.read_text(encoding="utf-8"))  # type: ignore[no-any-return]
 
 
 def tuned(name: str, method: str, most_runs: int | None = None) -> Study:

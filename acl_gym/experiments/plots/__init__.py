@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import io
 import tomllib
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 from matplotlib.figure import Figure
 
@@ -40,7 +42,7 @@ PLOTS: dict[str, Callable[[Experiment, Results], Figure]] = {
 """What draws the figure of each name."""
 
 CAPTIONS: dict[str, dict[str, str]] = tomllib.loads(
-    Path(__file__).with_name("captions.toml").read_text()
+    Path(__file__).with_name("captions.toml").read_text(encoding="utf-8")
 )
 """For the figure of each name the `text` below it, and `alt`, what it shows."""
 
@@ -86,6 +88,41 @@ def save(
             figure.savefig(buffer, format=kind)
             path = directory / f"{file_name(experiment, plot)}.{kind}"
             write_atomically(path, buffer.getvalue())
+
+
+class FigureFailedError(RuntimeError):
+    """A figure could not be drawn or written; the results are there."""
+
+
+@contextmanager
+def drawing(directory: Path) -> Iterator[Callable[..., None]]:
+    """Draw figures so that one that fails stops neither the others nor the report.
+
+    Args:
+        directory: where the results are, for the message.
+
+    Yields:
+        A function that calls its first argument with the others.
+
+    Raises:
+        FigureFailedError: at the end, if a call has failed.
+    """
+    failed: list[Exception] = []
+
+    def attempt(draw: Callable[..., None], *arguments: Any) -> None:
+        try:
+            draw(*arguments)
+        except Exception as error:
+            failed.append(error)
+
+    yield attempt
+    if failed:
+        raise FigureFailedError(
+            f"{len(failed)} of the figures in {directory} failed, the first with "
+            f"{type(failed[0]).__name__}: {str(failed[0]).rstrip('.')}; all results are "
+            "written, and the report without these figures. Give the same command again "
+            "when the cause is removed."
+        ) from failed[0]
 
 
 def write_animation(path: Path, trials: tuple[int, ...] = SHOWN) -> None:

@@ -20,7 +20,9 @@ from acl_gym.utils.typing import FloatArray
 
 T = TypeVar("T")
 
-_WORDS = tomllib.loads(Path(__file__).with_name("claims.toml").read_text())
+_WORDS = tomllib.loads(
+    Path(__file__).with_name("claims.toml").read_text(encoding="utf-8")
+)
 
 Attempt = Callable[[Results], Tried]
 Attempts = tuple[Attempt, ...]

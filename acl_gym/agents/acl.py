@@ -379,6 +379,12 @@ class ACL(TabularAgent):
 
     def _restore(self, header: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> None:
         super()._restore(header, arrays)
+        self._set_arrays(arrays)
+        self.pheromone.heuristic = as_heuristic(
+            arrays.get("heuristic"), None, self.partition, self._table.shape
+        )
+
+    def _set_arrays(self, arrays: dict[str, NDArray[Any]]) -> None:
         memory = {
             name.removeprefix("update_"): array
             for name, array in arrays.items()
@@ -386,9 +392,6 @@ class ACL(TabularAgent):
         }
         if memory:
             self.update.restore(memory)
-        self.pheromone.heuristic = as_heuristic(
-            arrays.get("heuristic"), None, self.partition, self._table.shape
-        )
 
     def measures(self, policy: IntArray) -> Row:
         """The mean sensitivity of the policy (3.48) over the cells, in [0, 1]."""

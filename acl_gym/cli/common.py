@@ -45,7 +45,7 @@ def console(stderr: bool = False) -> Console:
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:
-    """ " Did you mean 'fig3.9'?" for the most similar of the known names, or ""."""
+    """The question "Did you mean ...?" after a blank, or "" if no name is similar."""
     similar = get_close_matches(name, list(known), 1)
     return f" Did you mean {similar[0]!r}?" if similar else ""
 

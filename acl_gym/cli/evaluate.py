@@ -224,7 +224,14 @@ def _evaluate(
     with bad_arguments():
         agent.set_env(env)
     max_steps = max_steps or default_steps(env)
-    result = evaluate_policy_cost(agent, env, states, max_steps=max_steps, seed=seed)
+    result = evaluate_policy_cost(
+        agent,
+        env,
+        states,
+        max_steps=max_steps,
+        seed=seed,
+        cost=getattr(agent, "cost", None),  # as in training
+    )
     return result, {
         "env_id": environment.env_id,
         "env_args": environment.arguments,
@@ -241,6 +248,7 @@ def figures(result: PolicyCost) -> dict[str, Any]:
 
     return {
         "policy_cost": result.cost,
+        "mean_return": result.mean_return,
         "success_rate": result.success_rate,
         "mean_length": float(result.lengths.mean()),
         "cost_min": float(result.costs.min()),
@@ -256,7 +264,9 @@ def _print(settings: dict[str, Any], found: dict[str, Any]) -> None:
     table.add_column(style="bold")
     table.add_column(justify="right")
     table.add_row("policy cost", f"{found['policy_cost']:.4f}")
-    table.add_row("success", f"{found['success_rate']:.1%}")
+    table.add_row("mean return", f"{found['mean_return']:.4f}")
+    if found["success_rate"] is not None:
+        table.add_row("success", f"{found['success_rate']:.1%}")
     table.add_row("mean length", f"{found['mean_length']:.1f}")
     for name in ("min", "median", "max"):
         table.add_row(f"cost, {name}", f"{found[f'cost_{name}']:.4f}")

@@ -11,6 +11,7 @@ import numpy as np
 from acl_gym.callbacks import Agent, Callback, Row
 from acl_gym.cli.errors import report
 from acl_gym.cli.interrupts import Interruption
+from acl_gym.evaluation import reports_returns
 
 CHECKPOINT_SECONDS = 60.0
 """Between checkpoints, where no number of trials is given."""
@@ -75,10 +76,13 @@ class PlainProgress(Callback):
     def __init__(self, last: int) -> None:
         self._last = last
         self._shown = 0.0
+        self._what = "cost"
 
-    def on_training_start(self, agent: Agent) -> None:
+    def on_training_start(self, agent: Any) -> None:
         """Start the clock."""
         self._shown = time.monotonic()
+        returns = reports_returns(agent.env, getattr(agent, "cost", None))
+        self._what = "return" if returns else "cost"
 
     def on_trial_end(self, agent: Agent, row: Row) -> bool | None:
         """Write a line if it is time to."""
@@ -88,11 +92,12 @@ class PlainProgress(Callback):
                 f"trial {row['trial']} of {self._last}",
                 f"{row['env_steps']:,} steps",
                 f"{row['seconds']:.0f} s",
-                f"ants' cost {row['ants_cost']:.4g}",
+                f"ants' {self._what} {row[f'ants_{self._what}']:.4g}",
             ]
-            evaluated = [each for each in agent.history if "policy_cost" in each]
-            if evaluated:
-                parts.append(f"policy cost {evaluated[-1]['policy_cost']:.4g}")
+            name = f"policy_{self._what}"
+            known = next((e[name] for e in agent.history[::-1] if name in e), None)
+            if known is not None:
+                parts.append(f"policy {self._what} {known:.4g}")
             report("acl-gym", ", ".join(parts))
         return True
 

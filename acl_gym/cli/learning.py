@@ -24,6 +24,7 @@ from acl_gym.cli.interrupts import Interruption
 from acl_gym.cli.keeping import EqualCosts, Keeper, PlainProgress
 from acl_gym.colony.deposits import InverseCost, Rank
 from acl_gym.envs.control.environments import ControlVectorEnv
+from acl_gym.evaluation import reports_returns
 from acl_gym.evaluation.rollout import Rollout
 from acl_gym.partitions.automatic import automatic_partition
 
@@ -190,8 +191,8 @@ def _as_if_uninterrupted(learner: Any, evaluation: PolicyEvaluation) -> None:
     """
     row = learner.history[-1]
     if row["trial"] % evaluation.every:
-        row.pop("policy_cost", None)
-        row.pop("success_rate", None)
+        for name in ("policy_cost", "policy_return", "success_rate"):
+            row.pop(name, None)
     else:
         evaluation.on_training_end(learner)
 
@@ -349,6 +350,12 @@ def best_row(learner: Any) -> dict[str, Any] | None:
     return min(rows, key=lambda row: row["policy_cost"], default=None)
 
 
+def _measures(row: dict[str, Any]) -> dict[str, Any]:
+    """What an evaluation has found; None where it is not known."""
+    names = ("policy_cost", "policy_return", "success_rate")
+    return {name: row.get(name) for name in names}
+
+
 def _summary(plan: Plan, target: Path, best: Path | None) -> dict[str, Any]:
     learner = plan.learner
     last, cheapest = learner.history[-1], best_row(learner)
@@ -357,8 +364,7 @@ def _summary(plan: Plan, target: Path, best: Path | None) -> dict[str, Any]:
         found = {
             "file": str(best),
             "trial": cheapest["trial"],
-            "policy_cost": cheapest["policy_cost"],
-            "success_rate": cheapest["success_rate"],
+            **_measures(cheapest),
         }
     return {
         **learner.metadata,
@@ -368,8 +374,7 @@ def _summary(plan: Plan, target: Path, best: Path | None) -> dict[str, Any]:
         "trials": learner.trials,
         "env_steps": learner.num_timesteps,
         "seconds": learner.seconds,
-        "policy_cost": last["policy_cost"],
-        "success_rate": last["success_rate"],
+        **_measures(last),
         "file": str(target),
         "best": found,
         "rows": learner.history,
@@ -379,28 +384,32 @@ def _summary(plan: Plan, target: Path, best: Path | None) -> dict[str, Any]:
 def _print_rows(learner: Any, target: Path, best: Path | None) -> None:
     from rich.table import Table
 
+    cost = getattr(learner, "cost", None)
+    what = "return" if reports_returns(learner.rollout.env, cost) else "cost"
+    rows = [row for row in learner.history if "policy_cost" in row]
+    heads = ["trial", "steps", "seconds", f"ants' {what}", f"policy {what}"]
+    known = any("success_rate" in row for row in rows)
     table = Table(box=None, pad_edge=False, header_style="bold")
-    heads = ("trial", "steps", "seconds", "ants' cost", "policy cost", "success")
-    for head in heads:
+    for head in [*heads, "success"][: 5 + known]:
         table.add_column(head, justify="right")
-    for row in learner.history:
-        if "policy_cost" in row:
-            table.add_row(
-                f"{row['trial']}",
-                f"{row['env_steps']:,}",
-                f"{row['seconds']:.2f}",
-                f"{row['ants_cost']:.2f}",
-                f"{row['policy_cost']:.4f}",
-                f"{row['success_rate']:.1%}",
-            )
+    for row in rows:
+        cells = [
+            f"{row['trial']}",
+            f"{row['env_steps']:,}",
+            f"{row['seconds']:.2f}",
+            f"{row[f'ants_{what}']:.2f}",
+            f"{row[f'policy_{what}']:.4f}",
+            f"{row['success_rate']:.1%}" if "success_rate" in row else "",
+        ]
+        table.add_row(*cells[: 5 + known])
     screen = console()
     screen.print(table)
     cheapest = best_row(learner)
     lines = [f"Saved {target}. To evaluate it again: acl-gym evaluate {target}"]
     if best is not None and cheapest is not None:
         lines.append(
-            f"The best policy, after trial {cheapest['trial']} with a cost of "
-            f"{cheapest['policy_cost']:.4f}: {best}"
+            f"The best policy, after trial {cheapest['trial']} with a {what} of "
+            f"{cheapest[f'policy_{what}']:.4f}: {best}"
         )
     for line in lines:
         screen.print(line, markup=False, highlight=False, soft_wrap=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
@@ -17,6 +18,8 @@ from stable_baselines3.common.vec_env.base_vec_env import (
     VecEnvObs,
     VecEnvStepReturn,
 )
+
+from acl_gym.envs.wrappers.partial_reset import reset_slots
 
 _SUPPORTED_MODES = (AutoresetMode.DISABLED, AutoresetMode.SAME_STEP)
 _FINAL_KEYS = ("final_obs", "_final_obs", "final_info", "_final_info")
@@ -37,7 +40,11 @@ class VectorEnvAdapter(VecEnv):
     with `reset(options={"reset_mask": ...})`; with SAME_STEP it takes the last
     observations from `infos["final_obs"]`.
 
-    Wrap it in a `VecMonitor` to log the returns of the episodes.
+    The info of a slot whose episode has ended has `"episode"`, its return `r`, length `l`
+    and time `t`, from which agents log `rollout/ep_rew_mean` and `ep_len_mean`, as with a
+    `Monitor`; and `"is_success"` if the environment gives it, for `rollout/success_rate`
+    and `EvalCallback`. A `VecMonitor` is needed for a log file only, and for
+    `evaluate_policy` not to warn that there is none.
 
     Args:
         env: a vector environment whose autoreset mode is DISABLED (preferred, because
@@ -85,6 +92,9 @@ class VectorEnvAdapter(VecEnv):
         self.env = env
         self._resets_itself = mode is AutoresetMode.SAME_STEP
         self._actions: NDArray[Any] | None = None
+        self._returns = np.zeros(env.num_envs)
+        self._lengths = np.zeros(env.num_envs, dtype=np.int64)
+        self._began = time.time()
         super().__init__(
             env.num_envs, env.single_observation_space, env.single_action_space
         )
@@ -108,6 +118,8 @@ class VectorEnvAdapter(VecEnv):
         self._reset_seeds()
         self._reset_options()
         self._actions = None
+        self._returns[:] = 0.0
+        self._lengths[:] = 0
         return _copy(observations)
 
     def set_options(
@@ -136,7 +148,7 @@ class VectorEnvAdapter(VecEnv):
         Returns:
             `(observations, rewards, dones, infos)`, the rewards as float32. Every
             info has `TimeLimit.truncated`; that of a slot that has finished also has
-            `terminal_observation`.
+            `terminal_observation` and `episode`.
 
         Raises:
             RuntimeError: `step_async` has not been called.
@@ -162,14 +174,33 @@ class VectorEnvAdapter(VecEnv):
         elif slots:
             for slot in slots:
                 rows[slot]["terminal_observation"] = _row(observations, slot)
-            # Some environments remove the mask from the dict, so make a new dict.
-            observations, infos = self.env.reset(options={"reset_mask": dones.copy()})
+            observations, infos = reset_slots(self.env, dones)
             first = _infos_per_slot(infos, self.num_envs)
             for slot in slots:
                 self.reset_infos[slot] = first[slot]
         for slot, cut in enumerate(np.greater(truncated, terminated).tolist()):
             rows[slot]["TimeLimit.truncated"] = cut
+        self._count(rewards, slots, rows)
         return _copy(observations), np.array(rewards, dtype=np.float32), dones, rows
+
+    def _count(
+        self, rewards: Any, slots: Iterable[int], rows: list[dict[str, Any]]
+    ) -> None:
+        """Add up rewards and steps; add those of the episodes that have ended."""
+        self._returns += rewards
+        self._lengths += 1
+        for slot in slots:
+            # What a wrapper has counted, such as RecordEpisodeStatistics, stays.
+            rows[slot].setdefault(
+                "episode",
+                {
+                    "r": float(self._returns[slot]),
+                    "l": int(self._lengths[slot]),
+                    "t": round(time.time() - self._began, 6),
+                },
+            )
+            self._returns[slot] = 0.0
+            self._lengths[slot] = 0
 
     def close(self) -> None:
         """Close the environment; calling it again is harmless."""

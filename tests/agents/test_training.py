@@ -124,7 +124,7 @@ def test_rows_hold_the_measures_of_their_trial(kind: type) -> None:
             (
                 rollout.cost.copy(),
                 rollout.length.copy(),
-                rollout.success.copy(),
+                rollout.terminated.copy(),
                 agent.table.copy(),
             )
         )

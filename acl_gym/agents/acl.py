@@ -393,11 +393,7 @@ class ACL(TabularAgent):
         self, header: dict[str, Any], arrays: Mapping[str, NDArray[Any]]
     ) -> None:
         super()._restore(header, arrays)
-        memory = {
-            name.removeprefix("update_"): arrays[name]
-            for name in arrays
-            if name.startswith("update_")
-        }
+        memory = _memory_of_rule(arrays)
         if memory:
             saved = update_from_settings(header["parameters"]["update"])
             if type(saved) is type(self.update):
@@ -408,6 +404,11 @@ class ACL(TabularAgent):
         self.pheromone.heuristic = as_heuristic(
             arrays.get("heuristic"), None, self.partition, self._table.shape
         )
+
+    def _set_arrays(self, arrays: Mapping[str, NDArray[Any]]) -> None:
+        memory = _memory_of_rule(arrays)
+        if memory:
+            self.update.restore(memory)
 
     def measures(self, policy: IntArray) -> Row:
         """The mean sensitivity of the policy (3.48) over the cells, in [0, 1]."""
@@ -496,3 +497,12 @@ class ACL(TabularAgent):
             self._solutions = kept
         kept.clear()
         return kept
+
+
+def _memory_of_rule(arrays: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
+    """What an update rule remembered, from the arrays of an agent's file."""
+    return {
+        name.removeprefix("update_"): arrays[name]
+        for name in arrays
+        if name.startswith("update_")
+    }

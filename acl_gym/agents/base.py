@@ -7,7 +7,7 @@ import os
 from abc import abstractmethod
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, BinaryIO, Self, overload
+from typing import Any, BinaryIO, NamedTuple, Self, overload
 
 import numpy as np
 from gymnasium import spaces
@@ -78,6 +78,15 @@ _DAMAGES = (
     ValueError,
 )
 """What nonsense in a file can raise."""
+
+
+class Snapshot(NamedTuple):
+    """What `TabularAgent.snapshot` keeps, for `take_back`."""
+
+    table: FloatArray
+    arrays: dict[str, NDArray[Any]]
+    generators: list[Any]
+    counts: tuple[int, int, float, int]
 
 
 class TabularAgent(PartitionPolicy):
@@ -196,6 +205,9 @@ class TabularAgent(PartitionPolicy):
     def _arrays(self) -> dict[str, NDArray[Any]]:
         """More arrays to save, which `_restore` takes over again."""
         return {}
+
+    def _set_arrays(self, arrays: Mapping[str, NDArray[Any]]) -> None:
+        """Take over what `_arrays` gave."""
 
     def measures(self, policy: IntArray) -> Row:
         """More columns for the row of a trial, given the policy `(n_cells,)`."""
@@ -362,6 +374,35 @@ class TabularAgent(PartitionPolicy):
                 f"table must have shape {self._table.shape}, got {values.shape}."
             )
         return values
+
+    def snapshot(self) -> Snapshot:
+        """All that learning changes, as it is now, for `take_back`.
+
+        Take it between two trials; the table and the arrays are copied.
+        """
+        return Snapshot(
+            self._table.copy(),
+            {name: array.copy() for name, array in self._arrays().items()},
+            [rng.bit_generator.state for rng in (self.rng, self._predict_rng)],
+            (self.num_timesteps, self.trials, self.seconds, len(self.history)),
+        )
+
+    def take_back(self, snapshot: Snapshot) -> None:
+        """Forget what was learned since a snapshot, such as an interrupted trial.
+
+        Args:
+            snapshot: of this agent. Learning then goes on, bit for bit, as it did
+                after it.
+        """
+        self.set_table(snapshot.table)
+        self._set_arrays(snapshot.arrays)
+        for rng, state in zip(
+            (self.rng, self._predict_rng), snapshot.generators, strict=True
+        ):
+            rng.bit_generator.state = state
+        self.num_timesteps, self.trials, self.seconds, rows = snapshot.counts
+        del self.history[rows:]
+        self.in_trial = False
 
     @overload
     def save(self, path: str | os.PathLike[str]) -> Path: ...

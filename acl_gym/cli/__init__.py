@@ -1,7 +1,7 @@
 """The command line: `acl-gym`, or `python -m acl_gym`.
 
-Showing help imports neither torch nor Numba nor matplotlib: each command imports what
-it needs when it runs.
+Showing help and answering a wrong name import neither torch nor Numba nor matplotlib:
+each command imports what it needs when it runs.
 """
 
 

@@ -7,17 +7,18 @@ from typing import Annotated
 import typer
 
 import acl_gym
-from acl_gym.cli.common import Command, DebugOption, Group
+from acl_gym.cli.common import DebugOption
 from acl_gym.cli.compare import HELP as COMPARE_HELP
 from acl_gym.cli.compare import CompareCommand, compare
 from acl_gym.cli.envs import HELP as ENVS_HELP
 from acl_gym.cli.envs import envs
+from acl_gym.cli.errors import Command, Group
 from acl_gym.cli.evaluate import HELP as EVALUATE_HELP
 from acl_gym.cli.evaluate import evaluate
 from acl_gym.cli.reproduce import HELP as REPRODUCE_HELP
 from acl_gym.cli.reproduce import REPORT_HELP, ReproduceCommand, report, reproduce
 from acl_gym.cli.train import HELP as TRAIN_HELP
-from acl_gym.cli.train import train
+from acl_gym.cli.train import TrainCommand, train
 
 HELP = """Ant Colony Learning: colonies of ants that learn control policies.
 
@@ -30,7 +31,7 @@ Examples:
   acl-gym reproduce fig5.4 --runs 3               repeat a figure of the thesis
 
 For the options of a command: acl-gym train --help. Exit codes are 0 for success, 1 for
-a run that failed, 2 for bad arguments, and 130 for Ctrl-C.
+a run that failed, 2 for bad arguments, 130 for Ctrl-C, 143 for SIGTERM.
 """
 
 app = typer.Typer(cls=Group, add_completion=False, rich_markup_mode=None)
@@ -59,7 +60,7 @@ def _main(
         raise typer.Exit(2)
 
 
-app.command(help=TRAIN_HELP)(train)
+app.command(help=TRAIN_HELP, cls=TrainCommand)(train)
 app.command(help=EVALUATE_HELP)(evaluate)
 app.command(help=ENVS_HELP)(envs)
 app.command(help=COMPARE_HELP, cls=CompareCommand)(compare)

@@ -7,13 +7,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from acl_gym.cli.common import (
+from acl_gym.cli.common import DebugOption, JsonOption, console
+from acl_gym.cli.errors import (
     Command,
-    DebugOption,
     InterruptedRunError,
-    JsonOption,
     bad_arguments,
-    console,
 )
 
 if TYPE_CHECKING:

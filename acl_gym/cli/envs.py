@@ -7,23 +7,24 @@ imports Numba, which takes a second.
 from __future__ import annotations
 
 import ast
-import importlib.util
 import inspect
 import re
+import shutil
+import textwrap
 from dataclasses import MISSING, Field, fields, is_dataclass
-from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
 from acl_gym.cli.common import (
-    BadArgumentError,
     DebugOption,
     JsonOption,
-    console,
-    make_env,
+    did_you_mean,
     print_json,
 )
+from acl_gym.cli.environments import Environment
+from acl_gym.cli.errors import BadArgumentError
+from acl_gym.cli.sources import class_node
 from acl_gym.envs import ENVIRONMENTS
 
 HELP = """List the environments of acl-gym, or show the parameters of one.
@@ -66,7 +67,7 @@ def envs(
     if env_id not in ENVIRONMENTS:
         raise BadArgumentError(
             f"acl-gym has no environment {env_id!r}; choose from "
-            f"{', '.join(ENVIRONMENTS)}."
+            f"{', '.join(ENVIRONMENTS)}.{did_you_mean(env_id, ENVIRONMENTS)}"
         )
     found = {**describe(env_id), **_example(env_id, seed)}
     if as_json:
@@ -78,7 +79,8 @@ def envs(
 def describe(env_id: str) -> dict[str, Any]:
     """A summary of an environment from its docstring, read without importing it."""
     module, name = ENVIRONMENTS[env_id][0].split(":")
-    text = _docstring(module, name)
+    # The package of a system imports the class from its module `env`.
+    text = ast.get_docstring(class_node(f"{module}.env", name)) or ""
     section = re.search(r"§[\d.]*\d|Chapter \d+", text)
     return {
         "id": env_id,
@@ -113,20 +115,6 @@ def _default(field: Field[Any]) -> Any:
     return None
 
 
-def _docstring(module: str, name: str) -> str:
-    spec = importlib.util.find_spec(module)
-    if spec is None or spec.origin is None:
-        return ""
-    # The package of a system imports the class from its module `env`. To look up that
-    # module would import the package, and with it Numba.
-    source = Path(spec.origin).with_name("env.py")
-    tree = ast.parse(source.read_text(encoding="utf-8"))
-    for node in tree.body:
-        if isinstance(node, ast.ClassDef) and node.name == name:
-            return ast.get_docstring(node) or ""
-    return ""
-
-
 def _first_sentence(text: str, head: str) -> str:
     """The first sentence under a heading of a docstring, without backquotes."""
     match = re.search(rf"^## {head}\n+((?:.+\n?)+)", text, re.MULTILINE)
@@ -153,42 +141,46 @@ def _attributes(text: str) -> dict[str, str]:
 
 
 def _example(env_id: str, seed: int) -> dict[str, Any]:
-    env = make_env(env_id, 1, {})
+    env: Any = Environment(env_id).vector(1)
     observation, _ = env.reset(seed=seed)
     return {
         "example": observation[0].tolist(),
-        "parameters": parameters(type(env.unwrapped.system)),  # type: ignore[attr-defined]
+        "parameters": parameters(type(env.unwrapped.system)),
     }
 
 
 def _print_list(rows: list[dict[str, Any]]) -> None:
-    from rich.table import Table
-
-    table = Table(box=None, pad_edge=False, header_style="bold", padding=(0, 2, 1, 0))
-    for head in ("id", "description", "observation", "actions", "thesis"):
-        table.add_column(head, overflow="fold", no_wrap=head in ("id", "thesis"))
+    """A paragraph for each environment, which wraps at any width."""
     for row in rows:
-        table.add_row(*row.values())
-    console().print(table, markup=False, highlight=False)
+        typer.echo(row["id"])
+        _wrapped(row["description"])
+        for head in ("observation", "actions", "thesis"):
+            _wrapped(f"{head}: {row[head]}")
+        typer.echo()
+    typer.echo("For the parameters of one: acl-gym envs ID")
 
 
 def _print_one(found: dict[str, Any]) -> None:
-    from rich.table import Table
-    from rich.text import Text
-
-    target = console()
-    lines = [
-        f"{found['id']}: {found['description']}",
-        f"observation: {found['observation']}; for example {found['example']}",
-        f"actions: {found['actions']}",
-        f"thesis: {found['thesis']}",
-    ]
-    for line in lines:
-        target.print(line, markup=False, highlight=False)
-    table = Table(box=None, pad_edge=False, header_style="bold")
-    for head in ("parameter", "default", "meaning"):
-        table.add_column(head, overflow="fold")
+    typer.echo(found["id"])
+    _wrapped(found["description"])
+    _wrapped(f"observation: {found['observation']}; for example {found['example']}")
+    for head in ("actions", "thesis"):
+        _wrapped(f"{head}: {found[head]}")
+    typer.echo("\nParameters (--env-arg NAME=VALUE), with their defaults:")
     for each in found["parameters"]:
-        table.add_row(each["name"], Text(str(each["default"])), Text(each["meaning"]))
-    target.print()
-    target.print(table, highlight=False)
+        _wrapped(f"{each['name']} = {each['default']}", indent=2)
+        _wrapped(each["meaning"], indent=6)
+
+
+def _wrapped(text: str, indent: int = 2) -> None:
+    """Print words that wrap at the width of the terminal, and are never cut."""
+    space = " " * indent
+    lines = textwrap.wrap(
+        text,
+        max(20, shutil.get_terminal_size((80, 24)).columns),
+        initial_indent=space,
+        subsequent_indent=space,
+        break_long_words=False,
+        break_on_hyphens=False,
+    )
+    typer.echo("\n".join(lines))

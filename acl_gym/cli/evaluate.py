@@ -1,24 +1,15 @@
-"""`acl-gym evaluate`: the cost of a saved policy."""
+"""`acl-gym evaluate`: the cost of a saved policy, in figures, in a window or as a film."""
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import numpy as np
 import typer
 
-from acl_gym.cli.common import (
-    FOREIGN_EPISODES,
-    BadArgumentError,
-    DebugOption,
-    JsonOption,
-    bad_arguments,
-    console,
-    default_steps,
-    load_agent,
-    make_env,
-    print_json,
-)
+from acl_gym.cli.common import DebugOption, JsonOption, console, print_json
+from acl_gym.cli.environments import Environment, check_named_by_file, from_metadata
+from acl_gym.cli.errors import BadArgumentError, bad_arguments
 
 if TYPE_CHECKING:
     from acl_gym.evaluation import PolicyCost
@@ -27,14 +18,24 @@ HELP = """Evaluate the policy of a saved agent.
 
 The greedy policy is run without exploration. A file written by acl-gym train records
 its environment and how it was evaluated; without options the evaluation is repeated and
-gives the same cost. A file saved from Python needs --env-id.
+gives the same cost. A file saved from Python needs --env-id, and so does one that names
+a module: a file may come from anywhere, so no module is imported because it says so.
 
 \b
 Examples:
   acl-gym evaluate pendulum.npz
+  acl-gym evaluate pendulum-best.npz --video pendulum.gif
+  acl-gym evaluate pendulum.npz --render
   acl-gym evaluate pendulum.npz --episodes 1000 --seed 7     random initial states
   acl-gym evaluate swing_up.npz --env-id acl_gym/Pendulum-v0 --json
+  acl-gym evaluate mine.npz --env-id my_module:MyEnv-v0
 """
+
+MOST_EPISODES = 100_000
+"""More are not evaluated at once because a file says so."""
+
+MOST_STEPS = 10_000_000
+"""A file cannot ask for longer episodes."""
 
 
 def evaluate(
@@ -44,8 +45,27 @@ def evaluate(
     env_id: Annotated[
         str | None,
         typer.Option(
+            "--env-id",
+            "--env",
             metavar="ID",
-            help="Evaluate in this environment.  [default: the one in the file]",
+            help='Evaluate in this environment; "module:id" imports a module first.  '
+            "[default: the one in the file]",
+            show_default=False,
+        ),
+    ] = None,
+    env_arg: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME=VALUE",
+            help="A parameter of the environment, in place of that in the file.",
+            show_default=False,
+        ),
+    ] = None,
+    discretize: Annotated[
+        str | None,
+        typer.Option(
+            metavar="N|N,N,...",
+            help="See acl-gym train; for a file that does not record it.",
             show_default=False,
         ),
     ] = None,
@@ -55,8 +75,7 @@ def evaluate(
             min=1,
             metavar="N",
             help="Number of episodes, from random initial states.  [default: the "
-            "evaluation states of the environment, or "
-            f"{FOREIGN_EPISODES} random ones if it has none]",
+            "evaluation states of the environment, or 100 random ones if it has none]",
             show_default=False,
         ),
     ] = None,
@@ -79,56 +98,154 @@ def evaluate(
             show_default=False,
         ),
     ] = None,
+    render: Annotated[
+        bool,
+        typer.Option(
+            "--render", help="Show an episode in a window; with --episodes N show N."
+        ),
+    ] = False,
+    video: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE.gif|mp4",
+            help="Write an episode to a film; with --episodes N write N.",
+            show_default=False,
+        ),
+    ] = None,
     as_json: JsonOption = False,
     debug: DebugOption = False,
 ) -> None:
     """Evaluate; see `HELP`."""
-    from acl_gym.envs.control.environments import ControlVectorEnv
-    from acl_gym.evaluation import evaluate_policy_cost
+    from acl_gym.cli.settings import parse_settings
+
+    typed = None if env_id is None else Environment(env_id)
+    if typed is not None:
+        typed.check_id()
+    arguments = parse_settings("--env-arg", env_arg or ())
+    if render or video is not None:
+        from acl_gym.cli import showing
+
+        showing.check(render, video)
+    from acl_gym.cli.agents import load_agent
 
     agent = load_agent(file)
-    known_id, env_args, how = _recorded_evaluation(agent.metadata)
-    if env_id is not None and env_id != known_id:
-        # Arguments and evaluation of another environment do not apply.
-        known_id, env_args, how = env_id, {}, {}
-    if known_id is None:
-        raise BadArgumentError(
-            f"{file} does not name its environment; add --env-id ID."
-        )
+    environment, how = _chosen(file, agent.metadata, typed, arguments, discretize)
     if seed is None:
         seed = how.get("seed", 0)
-    with bad_arguments():
-        env = make_env(known_id, 1, env_args)
-        base = env.unwrapped
-        states = None
-        count = episodes or how.get("episodes") or FOREIGN_EPISODES
-        if isinstance(base, ControlVectorEnv):
-            states = base.system.evaluation_states()
-            if episodes is not None:
-                rng = np.random.default_rng(seed)
-                states = base.system.sample_states(rng, episodes).T.copy()
-            count = len(states)
-        env = make_env(known_id, count, env_args)
-        agent.set_env(env)
-        if max_steps is None:
-            max_steps = how.get("max_steps") or default_steps(env)
-    result = evaluate_policy_cost(agent, env, states, max_steps=max_steps, seed=seed)
-    settings = {
-        "file": file,
-        "env_id": known_id,
-        "env_args": env_args,
-        "episodes": count,
-        "max_steps": max_steps,
-        "seed": seed,
-    }
+    if max_steps is None:
+        max_steps = how.get("max_steps")
+    result, settings = _evaluate(
+        agent, environment, episodes, how.get("episodes"), max_steps, seed
+    )
+    if render or video is not None:
+        shown = episodes or 1
+        showing.play(agent, environment, shown, settings["max_steps"], seed, video)
+    settings = {"file": file, **settings}
+    if video is not None:
+        settings["video"] = str(video)
     if as_json:
         print_json({**settings, **figures(result)})
     else:
         _print(settings, figures(result))
 
 
+def _chosen(
+    file: str,
+    metadata: dict[str, Any],
+    typed: Environment | None,
+    arguments: dict[str, Any],
+    discretize: str | None,
+) -> tuple[Environment, dict[str, Any]]:
+    """The environment, and how it was evaluated as far as that holds for it."""
+    from acl_gym.cli.environments import parse_bins
+
+    found = from_metadata(file, metadata)
+    how = _recorded(file, metadata) if found is not None else {}
+    if found is None or (typed is not None and typed.name != found.name):
+        if typed is None:
+            raise BadArgumentError(
+                f"{file} does not name its environment; add --env-id ID."
+            )
+        # Arguments and evaluation of another environment do not apply.
+        found, how = Environment(typed.env_id), {}
+    kept = {name: v for name, v in found.arguments.items() if name not in arguments}
+    if typed is not None:
+        typed.import_module()
+    check_named_by_file(file, Environment(found.env_id, kept, found.bins), "--env-id")
+    bins = parse_bins(discretize) or found.bins
+    return Environment(found.env_id, {**kept, **arguments}, bins), how
+
+
+def _recorded(file: str, metadata: dict[str, Any]) -> dict[str, Any]:
+    """How `acl-gym train` has evaluated: `episodes`, `max_steps` and `seed`, if known.
+
+    Raises:
+        BadArgumentError: the file holds something else there.
+    """
+    how = metadata.get("evaluation", {})
+    limits = {"episodes": MOST_EPISODES, "max_steps": MOST_STEPS, "seed": 2**63}
+    sound = isinstance(how, dict) and all(
+        how.get(name) is None
+        or (type(how[name]) is int and (name != "seed") <= how[name] <= limit)
+        for name, limit in limits.items()
+    )
+    if not sound:
+        raise BadArgumentError(
+            f"the metadata of {file} must hold evaluation as acl-gym train writes it, "
+            f"with at most {MOST_EPISODES:,} episodes, got {repr(how)[:200]}."
+        )
+    return {name: how[name] for name in limits if how.get(name) is not None}
+
+
+def _evaluate(
+    agent: Any,
+    environment: Environment,
+    episodes: int | None,
+    recorded: int | None,
+    max_steps: int | None,
+    seed: int,
+) -> tuple[PolicyCost, dict[str, Any]]:
+    import numpy as np
+
+    from acl_gym.cli.environments import default_steps
+    from acl_gym.cli.learning import FOREIGN_EPISODES
+    from acl_gym.envs.control.environments import ControlVectorEnv
+    from acl_gym.evaluation import evaluate_policy_cost
+
+    base = environment.vector(1).unwrapped
+    states, count = None, episodes or recorded or FOREIGN_EPISODES
+    if isinstance(base, ControlVectorEnv):
+        states = base.system.evaluation_states()
+        if episodes is not None:
+            rng = np.random.default_rng(seed)
+            states = base.system.sample_states(rng, episodes).T.copy()
+        count = len(states)
+    env = environment.vector(count)
+    with bad_arguments():
+        agent.set_env(env)
+    max_steps = max_steps or default_steps(env)
+    result = evaluate_policy_cost(
+        agent,
+        env,
+        states,
+        max_steps=max_steps,
+        seed=seed,
+        cost=getattr(agent, "cost", None),  # as in training
+    )
+    return result, {
+        "env_id": environment.env_id,
+        "env_args": environment.arguments,
+        "discretize": None if environment.bins is None else list(environment.bins),
+        "episodes": count,
+        "max_steps": max_steps,
+        "seed": seed,
+    }
+
+
 def figures(result: PolicyCost) -> dict[str, Any]:
     """The printed results of an evaluation, JSON types only."""
+    import numpy as np
+
     return {
         "policy_cost": result.cost,
         "mean_return": result.mean_return,
@@ -138,25 +255,6 @@ def figures(result: PolicyCost) -> dict[str, Any]:
         "cost_median": float(np.median(result.costs)),
         "cost_max": float(result.costs.max()),
     }
-
-
-def _recorded_evaluation(
-    metadata: dict[str, Any],
-) -> tuple[str | None, dict[str, Any], dict[str, Any]]:
-    env_id = metadata.get("env_id")
-    env_args = metadata.get("env_args", {})
-    how = metadata.get("evaluation", {})
-    sound = (
-        (env_id is None or isinstance(env_id, str))
-        and isinstance(env_args, dict)
-        and isinstance(how, dict)
-    )
-    if not sound:
-        raise BadArgumentError(
-            "the file's metadata must hold env_id, env_args and evaluation as acl-gym "
-            f"train writes them, got {metadata!r}."
-        )
-    return env_id, env_args, how
 
 
 def _print(settings: dict[str, Any], found: dict[str, Any]) -> None:
@@ -172,12 +270,14 @@ def _print(settings: dict[str, Any], found: dict[str, Any]) -> None:
     table.add_row("mean length", f"{found['mean_length']:.1f}")
     for name in ("min", "median", "max"):
         table.add_row(f"cost, {name}", f"{found[f'cost_{name}']:.4f}")
-    target = console()
-    target.print(
+    screen = console()
+    screen.print(
         f"{settings['env_id']}, {settings['episodes']} episodes of at most "
         f"{settings['max_steps']} steps",
         markup=False,
         highlight=False,
         soft_wrap=True,
     )
-    target.print(table)
+    screen.print(table)
+    if "video" in settings:
+        screen.print(f"Wrote {settings['video']}.", markup=False, soft_wrap=True)

@@ -8,14 +8,12 @@ from typing import Annotated, Any
 
 import typer
 
-from acl_gym.cli.common import (
+from acl_gym.cli.common import DebugOption, JsonOption, console
+from acl_gym.cli.errors import (
     BadArgumentError,
     Command,
-    DebugOption,
     InterruptedRunError,
-    JsonOption,
     bad_arguments,
-    console,
 )
 
 HELP = """Repeat experiments of the thesis and judge its claims.

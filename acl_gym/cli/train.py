@@ -2,78 +2,111 @@
 
 from __future__ import annotations
 
-import inspect
-import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import Annotated, Any, Literal
 
 import typer
 
-from acl_gym.cli.common import (
-    AGENTS,
-    FOREIGN_EPISODES,
-    AgentName,
-    BadArgumentError,
-    DebugOption,
-    JsonOption,
-    bad_arguments,
-    console,
-    default_steps,
-    make_env,
-    parse_settings,
-    print_json,
+from acl_gym.cli.agents import AGENTS, load_agent, name_of, parameters
+from acl_gym.cli.common import DebugOption, JsonOption, check_name
+from acl_gym.cli.environments import (
+    Environment,
+    check_named_by_file,
+    from_metadata,
+    parse_bins,
 )
-
-if TYPE_CHECKING:
-    from gymnasium.vector import VectorEnv
-
-    from acl_gym.agents.base import TabularAgent
-    from acl_gym.callbacks import Callback, PolicyEvaluation
-    from acl_gym.partitions import Partition
+from acl_gym.cli.errors import BadArgumentError, Command, bad_arguments
 
 HELP = """Learn in an environment, print the progress, and save the agent.
 
-ENV_ID is the id of any Gymnasium environment with Discrete actions; "module:id" imports
-a module first, which may be in the working directory. ACL expects rewards that are
-negative costs; use --param deposit=return if rewards are never negative.
+ENV_ID is the id of any Gymnasium environment; "module:id" imports a module first, which
+may be in the working directory. Two files are written: NAME.npz, the agent as it is at
+the end, and NAME-best.npz, as it was when its policy was the best.
+
+Ctrl-C, and SIGTERM, end learning after the trial under way (or at once if that takes
+more than two seconds) and save the agent; --resume goes on from there as if nothing had
+happened. The exit code is then 130, or 143. A second Ctrl-C ends the program at once.
 
 \b
 Examples:
   acl-gym train acl_gym/Pendulum-v0
-  acl-gym train acl_gym/GridSearch2D-v0 --ants 86 --param tabu=true --out grid.npz
   acl-gym train acl_gym/Pendulum-v0 --ants 2000 --trials 50 --seed 3
-  acl-gym train acl_gym/Pendulum-v0 --agent q-learning --param epsilon=0.05
+  acl-gym train --resume Pendulum-v0.npz --trials 50            50 more trials
+  acl-gym train acl_gym/GridSearch2D-v0 --ants 86 --param tabu=true --out grid.npz
+  acl-gym train acl_gym/Pendulum-v0 --agent q-learning --param trace_decay=0.5
   acl-gym train acl_gym/Pendulum-v0 --partition crisp --param global_decay=0.001
+  acl-gym train acl_gym/Pendulum-v0 --param epsilon=linear:0.3:0.01:50
   acl-gym train acl_gym/Pendulum-v0 --env-arg torques=[-1,0,1] --cells 64,65
+  acl-gym train CartPole-v1 --param deposit=rank:5
+  acl-gym train Pendulum-v1 --discretize 5
   acl-gym train my_module:MyEnv-v0 --max-steps 200 --log run.csv --json
 """
 
-RANDOM_STEPS = 10_000
-"""Random steps from which missing bounds of observations are estimated."""
 
-_OWN_OPTIONS = ("env", "partition", "max_steps", "seed", "n_actions", "heuristic")
+class TrainCommand(Command):
+    """Its help lists the parameters of the agents, which are looked up only then."""
+
+    def format_help(self, ctx: Any, formatter: Any) -> None:
+        """Write the help."""
+        from acl_gym.cli.settings import OBJECTS, SCHEDULES, signature
+
+        blocks = []
+        for name in AGENTS:
+            lines = [
+                f"  {each:14} {declared.default}"
+                + (f"  {declared.words}" if declared.words else "")
+                for each, declared in parameters(name).items()
+            ]
+            blocks += [f"Parameters of --agent {name} with their defaults:", *lines, ""]
+        families = {"a number that changes (schedule)": SCHEDULES, **OBJECTS}
+        for title, kinds in families.items():
+            blocks.append(f"Values for {title}:")
+            blocks += [f"  {signature(name, kind)}" for name, kind in kinds.items()]
+            blocks.append("")
+        blocks.append("Costs add up: settling_time:0:3.14+2*overshoot:0:3.14+0.1")
+        self.epilog = "\b\n" + "\n\n\b\n".join("\n".join(blocks).split("\n\n"))
+        super().format_help(ctx, formatter)
 
 
 def train(
     env_id: Annotated[
-        str,
-        typer.Argument(metavar="ENV_ID", help="See acl-gym envs.", show_default=False),
-    ],
-    agent: Annotated[AgentName, typer.Option(help="The learning algorithm.")] = "acl",
+        str | None,
+        typer.Argument(
+            metavar="ENV_ID",
+            help="See acl-gym envs; with --resume it may be left out.",
+            show_default=False,
+        ),
+    ] = None,
+    agent: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME",
+            help=f"The learning algorithm: {', '.join(AGENTS)}.  [default: "
+            f"{next(iter(AGENTS))}]",
+            show_default=False,
+        ),
+    ] = None,
     trials: Annotated[
-        int,
+        int | None,
         typer.Option(
             min=1,
             metavar="K",
-            help="Number of trials; in each, every ant makes one episode.",
+            help="Number of trials; in each, every ant makes one episode. With --resume: "
+            "that many more.  [default: 100; with --resume: what an interrupted run had "
+            "left, or 100 more]",
+            show_default=False,
         ),
-    ] = 100,
+    ] = None,
     ants: Annotated[
-        int,
+        int | None,
         typer.Option(
-            min=1, metavar="M", help="Number of ants: slots of the vector environment."
+            min=1,
+            metavar="M",
+            help="Number of ants: slots of the vector environment.  [default: 250; with "
+            "--resume: as before]",
+            show_default=False,
         ),
-    ] = 250,
+    ] = None,
     partition: Annotated[
         Literal["auto", "fuzzy", "crisp"],
         typer.Option(
@@ -87,6 +120,16 @@ def train(
             metavar="N,N,...",
             help="Cells of each variable, or one number for all.  "
             "[default: those of the thesis, or a few thousand in total]",
+            show_default=False,
+        ),
+    ] = None,
+    discretize: Annotated[
+        str | None,
+        typer.Option(
+            metavar="N|N,N,...",
+            help="For continuous actions: the number of values of each dimension, one "
+            "for all or one for each. They lie in the middle of equal parts of the range "
+            "(gymnasium.wrappers.DiscretizeAction).",
             show_default=False,
         ),
     ] = None,
@@ -104,8 +147,8 @@ def train(
         list[str] | None,
         typer.Option(
             metavar="NAME=VALUE",
-            help="A parameter of the agent, such as epsilon=0.2; repeat the option for "
-            "more. An unknown name prints the list of parameters.",
+            help="A parameter of the agent, such as epsilon=0.2 or deposit=rank:5, see "
+            "below; repeat the option for more.",
             show_default=False,
         ),
     ] = None,
@@ -113,17 +156,20 @@ def train(
         list[str] | None,
         typer.Option(
             metavar="NAME=VALUE",
-            help="A parameter of the environment, see acl-gym envs ENV_ID. Values are "
-            "read as JSON: numbers, true, false, [lists].",
+            help="A parameter of the environment, see acl-gym envs ENV_ID: a number, "
+            "true, false, a [list] or a text.",
             show_default=False,
         ),
     ] = None,
     seed: Annotated[
-        int,
+        int | None,
         typer.Option(
-            min=0, metavar="N", help="Seed; the same seed gives the same run."
+            min=0,
+            metavar="N",
+            help="Seed; the same seed gives the same run.  [default: 0]",
+            show_default=False,
         ),
-    ] = 0,
+    ] = None,
     threads: Annotated[
         int,
         typer.Option(
@@ -136,14 +182,46 @@ def train(
         Path | None,
         typer.Option(
             metavar="FILE.npz",
-            help="Save the agent to this file.  [default: the name of the environment, "
-            "with a number if the file exists]",
+            help="Save the agent to this file, and the best one beside it.  [default: "
+            "the name of the environment, with a number if the file exists; with "
+            "--resume: that file]",
             show_default=False,
         ),
     ] = None,
+    resume: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE.npz",
+            help="Go on with a saved agent, bit for bit as if it had not stopped.",
+            show_default=False,
+        ),
+    ] = None,
+    checkpoint_every: Annotated[
+        int | None,
+        typer.Option(
+            min=1,
+            metavar="N",
+            help="Trials between checkpoints, which are saved to the same file.  "
+            "[default: one each minute]",
+            show_default=False,
+        ),
+    ] = None,
+    keep_best: Annotated[
+        bool,
+        typer.Option(
+            "--keep-best/--no-keep-best", help="Write NAME-best.npz, the best policy."
+        ),
+    ] = True,
     evaluate_every: Annotated[
-        int, typer.Option(min=1, metavar="N", help="Trials between evaluations.")
-    ] = 10,
+        int | None,
+        typer.Option(
+            min=1,
+            metavar="N",
+            help="Trials between evaluations.  [default: 10, or 2 in environments of "
+            "other packages, whose best policies pass quickly; with --resume: as before]",
+            show_default=False,
+        ),
+    ] = None,
     log: Annotated[
         Path | None,
         typer.Option(
@@ -157,72 +235,88 @@ def train(
         ),
     ] = None,
     quiet: Annotated[
-        bool, typer.Option("--quiet", help="Print no progress bar and no table.")
+        bool, typer.Option("--quiet", help="Print no progress and no table.")
     ] = False,
     as_json: JsonOption = False,
     debug: DebugOption = False,
 ) -> None:
     """Learn; see `HELP`."""
+    from acl_gym.cli.settings import parse_parameters, parse_settings
+
+    # Names first: a wrong one is answered before anything slow is imported.
+    if agent is not None:
+        check_name("--agent", agent, AGENTS)
+    arguments = parse_settings("--env-arg", env_arg or ())
+    bins = parse_bins(discretize)
+    wanted_cells = _cells(cells)
+    typed = None if env_id is None else Environment(env_id, arguments, bins)
+    if typed is not None:
+        typed.check_id()
+    kind = agent or next(iter(AGENTS))
+    if resume is None:
+        if typed is None:
+            raise BadArgumentError(
+                "ENV_ID is missing: name an environment, see `acl-gym envs`, or a file "
+                "to go on with, --resume FILE."
+            )
+        settings = parse_parameters("--param", param or (), parameters(kind))
+        typed.import_module()
     from acl_gym import set_num_threads
-    from acl_gym.utils import files
+    from acl_gym.cli import learning
 
     with bad_arguments():
         set_num_threads(threads)
-        out = files.checked_target(
-            _free_name(env_id) if out is None else files.with_suffix(out)
+    shown = learning.Shown(quiet, as_json)
+    if resume is None and typed is not None:
+        target = _target(_free_name(typed.name) if out is None else out)
+        plan = learning.begin(
+            typed,
+            kind,
+            settings,
+            ants=ants or learning.ANTS,
+            partition=partition,
+            cells=wanted_cells,
+            max_steps=max_steps,
+            seed=seed or 0,
+            evaluate_every=evaluate_every,
+            trials=trials or learning.TRIALS,
         )
-        kind = agent_class(agent)
-        settings = parse_settings("--param", param or (), _parameters(kind))
-        env_args = parse_settings("--env-arg", env_arg or ())
-        env = make_env(env_id, ants, env_args)
-        steps = max_steps or default_steps(env)
-        grid = _make_partition(env, partition, _cells(cells))
-        learner = kind(env, grid, max_steps=steps, seed=seed, **settings)
-        evaluation = _make_evaluation(env, env_id, env_args, evaluate_every, steps)
-        watchers = [evaluation, *_make_logs(log, tensorboard)]
-    learner.metadata = {
-        "env_id": env_id,
-        "env_args": env_args,
-        "evaluation": {
-            "episodes": None if evaluation.env is env else evaluation.env.num_envs,
-            "max_steps": steps,
-            "seed": evaluation.seed,
-        },
-    }
-    learner.learn(
-        trials=trials,
-        callback=watchers,
-        progress_bar=not quiet and sys.stderr.isatty(),
+    elif resume is not None:
+        if cells is not None or partition != "auto":
+            raise BadArgumentError(
+                "--cells and --partition cannot be changed with --resume: the file "
+                "holds a table over its cells; leave them out."
+            )
+        learner = load_agent(str(resume))
+        environment = _resumed_environment(resume, learner, typed, arguments, bins)
+        known = name_of(learner)
+        if agent not in (None, known):
+            raise BadArgumentError(
+                f"--agent must be {known}, as in {resume}, got {agent!r}; leave it out."
+            )
+        changes = parse_parameters("--param", param or (), parameters(known))
+        for option, value, now in (
+            ("--seed", seed, learner.seed),
+            ("--max-steps", max_steps, learner.max_steps),
+        ):
+            if value not in (None, now):
+                raise BadArgumentError(
+                    f"{option} must be {now}, as in {resume}, got {value}; leave it out."
+                )
+        target = _target(_name_after(resume, environment.name) if out is None else out)
+        plan = learning.go_on(
+            environment, learner, changes, ants, evaluate_every, trials
+        )
+    best = target.with_name(f"{target.stem}-best.npz") if keep_best else None
+    learning.run(
+        plan,
+        target,
+        best,
+        checkpoint_every,
+        log=log,
+        tensorboard=tensorboard,
+        shown=shown,
     )
-    learner.save(out)
-    if as_json:
-        print_json(_summary(learner, agent, ants, out))
-    elif not quiet:
-        _print_rows(learner, out)
-
-
-def agent_class(name: str) -> Any:
-    """The class that `--agent` selects."""
-    import acl_gym
-
-    return getattr(acl_gym, AGENTS[name])
-
-
-def parameter_names(kind: type) -> list[str]:
-    """Names for `--param`: constructor keywords that have no option of their own."""
-    parameters = inspect.signature(kind).parameters
-    return [name for name in parameters if name not in _OWN_OPTIONS]
-
-
-def _parameters(kind: type) -> dict[str, str]:
-    """What `--param` may set, and the range of each number, as in "> 0"."""
-    from acl_gym.utils.parameters import parameters_of
-
-    declared = parameters_of(kind)
-    return {
-        name: declared[name].range.in_words() if name in declared else ""
-        for name in parameter_names(kind)
-    }
 
 
 def _cells(text: str | None) -> list[int] | None:
@@ -236,92 +330,72 @@ def _cells(text: str | None) -> list[int] | None:
         ) from None
 
 
-def _make_partition(env: VectorEnv, kind: str, cells: list[int] | None) -> Partition:
-    from acl_gym import Crisp, Fuzzy
-    from acl_gym.partitions.automatic import automatic_partition
-
-    return automatic_partition(
-        env,
-        kind=Crisp if kind == "crisp" else Fuzzy,
-        cells=cells[0] if cells and len(cells) == 1 else cells,
-        random_steps=max(RANDOM_STEPS, env.num_envs),
-    )
-
-
-def _make_evaluation(
-    env: VectorEnv, env_id: str, env_args: dict[str, Any], every: int, steps: int
-) -> PolicyEvaluation:
-    """Evaluate from the environment's evaluation states, or from fixed random ones."""
-    from acl_gym import PolicyEvaluation
-    from acl_gym.envs.control.environments import ControlVectorEnv
-
-    if not isinstance(env.unwrapped, ControlVectorEnv):
-        env = make_env(env_id, FOREIGN_EPISODES, env_args)
-    return PolicyEvaluation(env, every=every, max_steps=steps)
-
-
-def _make_logs(log: Path | None, tensorboard: Path | None) -> list[Callback]:
-    from acl_gym import CSVLog, TensorBoardLog
-
-    logs: list[Callback] = []
-    if log is not None:
-        logs.append(CSVLog(log))
-    if tensorboard is not None:
-        logs.append(TensorBoardLog(tensorboard))
-    return logs
-
-
-def _summary(learner: TabularAgent, name: str, ants: int, out: Path) -> dict[str, Any]:
-    last = learner.history[-1]
-    return {
-        **learner.metadata,
-        "agent": name,
-        "ants": ants,
-        "partition": repr(learner.partition),
-        "parameters": learner.parameters(),
-        "trials": learner.trials,
-        "env_steps": learner.num_timesteps,
-        "seconds": learner.seconds,
-        "policy_cost": last["policy_cost"],
-        "policy_return": last.get("policy_return"),
-        "success_rate": last.get("success_rate"),
-        "file": str(out),
-        "rows": learner.history,
-    }
-
-
-def _print_rows(learner: TabularAgent, out: Path) -> None:
-    from rich.table import Table
-
-    from acl_gym.evaluation import reports_returns
-
-    table = Table(box=None, pad_edge=False, header_style="bold")
-    cost = getattr(learner, "cost", None)
-    what = "return" if reports_returns(learner.rollout.env, cost) else "cost"
-    heads = ("trial", "steps", "seconds", f"ants' {what}", f"policy {what}", "success")
-    for head in heads:
-        table.add_column(head, justify="right")
-    for row in learner.history:
-        if "policy_cost" in row:
-            table.add_row(
-                f"{row['trial']}",
-                f"{row['env_steps']:,}",
-                f"{row['seconds']:.2f}",
-                f"{row[f'ants_{what}']:.2f}",
-                f"{row[f'policy_{what}']:.4f}",
-                f"{row['success_rate']:.1%}" if "success_rate" in row else "",
+def _resumed_environment(
+    file: Path,
+    learner: Any,
+    typed: Environment | None,
+    arguments: dict[str, Any],
+    bins: tuple[int, ...] | None,
+) -> Environment:
+    """The environment that a file names, or the user where it names none."""
+    found = from_metadata(str(file), learner.metadata)
+    if found is None:
+        if typed is None:
+            raise BadArgumentError(
+                f"{file} does not name its environment; name it: acl-gym train ENV_ID "
+                f"--resume {file}."
             )
-    target = console()
-    target.print(table)
-    line = f"Saved {out}. To evaluate it again: acl-gym evaluate {out}"
-    target.print(line, markup=False, highlight=False, soft_wrap=True)
+        typed.import_module()
+        return typed
+    if typed is not None and typed.name != found.name:
+        raise BadArgumentError(
+            f"{file} was trained in {found.name}, got {typed.name}; leave ENV_ID out to "
+            "go on there."
+        )
+    if bins is not None and found.bins is not None and len(bins) != len(found.bins):
+        same = len(set(bins) | set(found.bins)) == 1
+    else:
+        same = bins in (None, found.bins)
+    if not same:
+        raise BadArgumentError(
+            f"--discretize must be {','.join(map(str, found.bins or ())) or 'left out'}, "
+            f"as in {file}, got {','.join(map(str, bins or ()))}."
+        )
+    for name, value in arguments.items():
+        if found.arguments.get(name, value) != value or name not in found.arguments:
+            raise BadArgumentError(
+                f"--env-arg {name} must be as in {file}, "
+                f"{found.arguments.get(name, 'where it is not set')!r}, got {value!r}; "
+                "leave it out."
+            )
+    if typed is not None and typed.module:
+        typed.import_module()
+    untyped = {k: v for k, v in found.arguments.items() if k not in arguments}
+    check_named_by_file(str(file), Environment(found.env_id, untyped, found.bins), "")
+    return found
+
+
+def _target(path: Path) -> Path:
+    """A file that can be written when learning is over, checked before it begins."""
+    from acl_gym.utils import files
+
+    with bad_arguments():
+        target = files.checked_target(files.with_suffix(path))
+    if target.is_dir():
+        raise BadArgumentError(f"{target} is a folder; give the name of a file.")
+    return target
 
 
 def _free_name(env_id: str) -> Path:
     """A file name that is not taken in this folder: Pendulum-v0.npz, -2, -3, ..."""
-    stem = env_id.rpartition(":")[2].rpartition("/")[2]
+    stem = env_id.rpartition("/")[2]
     path, number = Path(f"{stem}.npz"), 1
-    while path.exists():
+    while path.exists() or path.with_name(f"{path.stem}-best.npz").exists():
         number += 1
         path = Path(f"{stem}-{number}.npz")
     return path
+
+
+def _name_after(resumed: Path, env_id: str) -> Path:
+    """The file that was resumed; but never a best policy, which others would replace."""
+    return _free_name(env_id) if resumed.stem.endswith("-best") else resumed

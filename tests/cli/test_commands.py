@@ -17,8 +17,9 @@ import pytest
 
 import acl_gym
 from acl_gym import ACL, Crisp, Fuzzy, PolicyEvaluation, QLearning, evaluate_policy_cost
-from acl_gym.cli.common import AGENTS, parse_settings
+from acl_gym.cli.agents import AGENTS
 from acl_gym.cli.envs import describe, parameters
+from acl_gym.cli.settings import parse_settings
 from acl_gym.cli.train import agent_class, parameter_names
 from acl_gym.envs import ENVIRONMENTS
 from acl_gym.envs.pendulum import Pendulum

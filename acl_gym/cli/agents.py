@@ -1,0 +1,131 @@
+"""The agents that `--agent` selects, and their parameters, read without importing them."""
+
+from __future__ import annotations
+
+import ast
+from dataclasses import dataclass
+from functools import cache
+from importlib import import_module
+from typing import Any, NamedTuple
+
+from acl_gym.cli.errors import BadArgumentError, bad_arguments
+from acl_gym.cli.sources import class_node
+from acl_gym.utils.validation import Range
+
+OWN_OPTIONS = ("env", "partition", "max_steps", "seed", "n_actions", "heuristic")
+"""Keywords of the constructors that have an option of their own, or none at all."""
+
+
+class AgentKind(NamedTuple):
+    """An agent.
+
+    Attributes:
+        module: where its class is.
+        name: of its class.
+        deposits: whether its ants deposit by the costs of solutions: it then needs a
+            deposit that suits the environment, and learns nothing from equal costs.
+    """
+
+    module: str
+    name: str
+    deposits: bool
+
+    def load(self) -> Any:
+        """Import the class."""
+        return getattr(import_module(self.module), self.name)
+
+
+AGENTS = {
+    "acl": AgentKind("acl_gym.agents.acl", "ACL", deposits=True),
+    "q-learning": AgentKind("acl_gym.agents.q_learning", "QLearning", deposits=False),
+}
+"""Value of `--agent` -> the agent. To add one, add an entry."""
+
+
+@dataclass(frozen=True)
+class Declared:
+    """A parameter of an agent as its class declares it.
+
+    Attributes:
+        default: of the constructor.
+        scheduled: whether a schedule may stand in for the number.
+        words: what it is and its range, such as "Exploration probability, in [0, 1]".
+        range: such as "in [0, 1]"; "" where it is no number.
+    """
+
+    default: Any
+    scheduled: bool = False
+    words: str = ""
+    range: str = ""
+
+
+@cache
+def parameters(name: str) -> dict[str, Declared]:
+    """What `--param` may set.
+
+    Args:
+        name: a key of `AGENTS`.
+    """
+    node = class_node(AGENTS[name].module, AGENTS[name].name)
+    numbers = dict(_numbers(node))
+    constructor = next(
+        each
+        for each in node.body
+        if isinstance(each, ast.FunctionDef) and each.name == "__init__"
+    )
+    keywords = zip(
+        constructor.args.kwonlyargs, constructor.args.kw_defaults, strict=True
+    )
+    found = {}
+    for keyword, default in keywords:
+        if keyword.arg in OWN_OPTIONS:
+            continue
+        value = None if default is None else ast.literal_eval(default)
+        scheduled, words, within = numbers.get(keyword.arg, (False, "", ""))
+        found[keyword.arg] = Declared(value, scheduled, words, within)
+    return found
+
+
+def _numbers(node: ast.ClassDef) -> Any:
+    """The attributes that are a `Parameter`, each with what it says of itself."""
+    for each in node.body:
+        if not (isinstance(each, ast.Assign) and isinstance(each.value, ast.Call)):
+            continue
+        call = each.value
+        if isinstance(call.func, ast.Name) and call.func.id == "Parameter":
+            given = {k.arg: ast.literal_eval(k.value) for k in call.keywords}
+            bounds = {
+                bound: given[bound]
+                for bound in Range.__dataclass_fields__
+                if bound in given
+            }
+            meaning = ast.literal_eval(call.args[0])
+            within = Range(**bounds).in_words()
+            scheduled = bool(given.get("scheduled", False))
+            for target in each.targets:
+                if isinstance(target, ast.Name):
+                    yield target.id, (scheduled, f"{meaning}, {within}", within)
+
+
+def load_agent(path: str) -> Any:
+    """Load an agent of any kind from a file.
+
+    Raises:
+        BadArgumentError: there is no such file, or it holds no agent of this package.
+    """
+    from acl_gym.utils.archives import Archive
+
+    with bad_arguments():
+        name = str(Archive(path).header.get("agent"))
+    for kind in AGENTS.values():
+        if kind.name == name:
+            with bad_arguments():
+                return kind.load().load(path)
+    names = ", ".join(kind.name for kind in AGENTS.values())
+    raise BadArgumentError(f"{path} must hold one of {names}, got {name!r}.")
+
+
+def name_of(agent: Any) -> str:
+    """The value of `--agent` for an agent."""
+    kind = type(agent).__name__
+    return next(name for name, each in AGENTS.items() if each.name == kind)

@@ -1,0 +1,331 @@
+"""The environment that a command works on: by id, arguments and bins of its actions."""
+
+from __future__ import annotations
+
+import math
+import os
+import re
+import sys
+from dataclasses import dataclass, field, fields, is_dataclass
+from difflib import get_close_matches
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+import gymnasium as gym
+from gymnasium import spaces
+
+from acl_gym.cli.errors import BadArgumentError, bad_arguments
+from acl_gym.envs import ENVIRONMENTS
+
+if TYPE_CHECKING:
+    from gymnasium.vector import VectorEnv
+
+MOST_ACTIONS = 10_000
+"""More actions than any table is good for; `--discretize` may not make as many."""
+
+_OWN_KEYWORDS = (
+    "disable_env_checker",
+    "entry_point",
+    "env_id",
+    "num_envs",
+    "render_mode",
+    "vector_kwargs",
+    "vectorization_mode",
+    "wrappers",
+)
+"""Keywords of `gym.make` that are no parameters of the environment."""
+
+_IMPORTS = re.compile(r"[A-Za-z_][\w.]*:[A-Za-z_][\w./-]*")
+"""A text that says "module:name", which some environments import."""
+
+
+@dataclass(frozen=True)
+class Environment:
+    """An environment as the user chose it, or as an agent's file names it.
+
+    Attributes:
+        env_id: a registered id, or `module:id`.
+        arguments: keywords of the environment, plain values.
+        bins: into how many actions each dimension of a Box is divided, one number for
+            all or one for each; None leaves the actions as they are.
+    """
+
+    env_id: str
+    arguments: dict[str, Any] = field(default_factory=dict)
+    bins: tuple[int, ...] | None = None
+
+    @property
+    def name(self) -> str:
+        """The id without the module."""
+        return self.env_id.rpartition(":")[2]
+
+    @property
+    def module(self) -> str:
+        """The module that registers the id; "" if none is named."""
+        return self.env_id.rpartition(":")[0]
+
+    def check_id(self) -> None:
+        """Check that there is such an id, without importing anything.
+
+        Ids of modules that are still to be imported are not checked.
+
+        Raises:
+            BadArgumentError: there is none.
+        """
+        if not self.module and self.name not in gym.registry:
+            raise BadArgumentError(_unknown(self.name))
+
+    def import_module(self) -> None:
+        """Import the module of the id, which may be in the working directory.
+
+        Only for an id that the user has typed, never for one that a file names.
+
+        Raises:
+            BadArgumentError: it cannot be imported.
+        """
+        if not self.module:
+            return
+        if os.getcwd() not in sys.path:
+            sys.path.insert(0, os.getcwd())
+        with bad_arguments():
+            import_module(self.module)
+        if self.name not in gym.registry:
+            raise BadArgumentError(
+                f"{self.module} was imported, but registers no {self.name!r}."
+            )
+
+    def vector(self, slots: int) -> VectorEnv[Any, Any, Any]:
+        """Make it with some slots; one of this package natively.
+
+        Raises:
+            BadArgumentError: it cannot be made with these arguments, or its actions are
+                not those of `bins`.
+        """
+        from acl_gym.envs.wrappers.waiting import WaitingVectorEnv
+
+        self.check_id()
+        self._check_arguments()
+        native = gym.registry[self.name].vector_entry_point is not None
+        with bad_arguments():
+            if self.bins is None and native:
+                env: VectorEnv[Any, Any, Any] = gym.make_vec(
+                    self.name, num_envs=slots, **self.arguments
+                )
+            else:
+                env = WaitingVectorEnv([self.single] * slots)
+            self._check_actions(env.single_action_space)
+        return env
+
+    def single(self, render_mode: str | None = None) -> gym.Env[Any, Any]:
+        """Make one that can be rendered."""
+        keywords = dict(self.arguments)
+        if render_mode is not None:
+            keywords["render_mode"] = render_mode
+        env = gym.make(self.name, **keywords)
+        return env if self.bins is None else _discretized(self.name, env, self.bins)
+
+    def _check_arguments(self) -> None:
+        for name in self.arguments:
+            if name in _OWN_KEYWORDS:
+                raise BadArgumentError(
+                    f"{name} is no parameter of {self.name}; leave out --env-arg {name}."
+                )
+        if not self.arguments or self.name not in ENVIRONMENTS:
+            return
+        # A system of this package says which parameters it has.
+        with bad_arguments():
+            plain: Any = gym.make_vec(self.name, num_envs=1)
+            system = plain.unwrapped.system_type
+            plain.close()
+        if not is_dataclass(system):
+            return
+        names = [*(each.name for each in fields(system)), "max_episode_steps"]
+        for name in self.arguments:
+            if name not in names:
+                raise BadArgumentError(
+                    f"{self.name} has no parameter {name!r}; choose from "
+                    f"{', '.join(names)}."
+                )
+
+    def _check_actions(self, space: spaces.Space[Any]) -> None:
+        if isinstance(space, spaces.Box):
+            twin = _twin(self.name)
+            hint = f"; {twin} of this package has discrete ones" if twin else ""
+            raise BadArgumentError(
+                f"{self.name} must have Discrete actions, but has continuous ones, "
+                f"{space}; add --discretize 5 for five values of each of its "
+                f"{math.prod(space.shape)} dimensions, or --discretize 5,3,... for one "
+                f"number for each (gymnasium.wrappers.DiscretizeAction){hint}."
+            )
+
+
+def parse_bins(text: str | None) -> tuple[int, ...] | None:
+    """Parse `--discretize`: 5, or 5,3.
+
+    Raises:
+        BadArgumentError: it is neither a number >= 2 nor a list of those.
+    """
+    if text is None:
+        return None
+    parts = [part.strip() for part in text.split(",")]
+    if not all(part.isdecimal() and 2 <= int(part) <= MOST_ACTIONS for part in parts):
+        raise BadArgumentError(
+            "--discretize must be a number of values >= 2 such as 5, or one for each "
+            f"dimension such as 5,3, got {text!r}."
+        )
+    return tuple(map(int, parts))
+
+
+def _discretized(
+    name: str, env: gym.Env[Any, Any], bins: tuple[int, ...]
+) -> gym.Env[Any, Any]:
+    from gymnasium.wrappers import DiscretizeAction
+
+    space = env.action_space
+    if not isinstance(space, spaces.Box):
+        raise BadArgumentError(
+            f"--discretize is for continuous actions, but {name} has {space}; leave it "
+            "out."
+        )
+    count = math.prod(space.shape)
+    if len(bins) not in (1, count):
+        raise BadArgumentError(
+            f"--discretize must have one number, or one for each of the {count} "
+            f"dimensions of {space}, got {','.join(map(str, bins))}."
+        )
+    each = bins * count if len(bins) == 1 else bins
+    if math.prod(each) > MOST_ACTIONS:
+        raise BadArgumentError(
+            f"--discretize must make at most {MOST_ACTIONS:,} actions, got "
+            f"{math.prod(each):,} of {count} dimensions; take fewer values, or one "
+            "number for each dimension such as 5,3."
+        )
+    return DiscretizeAction(env, bins=each)
+
+
+def default_steps(env: VectorEnv[Any, Any, Any]) -> int:
+    """T: the limit of the environment, or 300 if it has none."""
+    from acl_gym.agents.base import DEFAULT_MAX_STEPS, time_limit
+    from acl_gym.envs.control.environments import ControlVectorEnv
+
+    base = env.unwrapped
+    if isinstance(base, ControlVectorEnv):
+        return base.system.evaluation_steps
+    return time_limit(env) or DEFAULT_MAX_STEPS
+
+
+def from_metadata(file: str, metadata: dict[str, Any]) -> Environment | None:
+    """The environment that a file names; None if it names none.
+
+    A file may come from anywhere. So it may name what is registered, with plain values;
+    a module is imported only if the user types it.
+
+    Args:
+        file: its name, for messages.
+        metadata: of the agent.
+
+    Raises:
+        BadArgumentError: the metadata are not those that `acl-gym train` writes.
+    """
+    env_id = metadata.get("env_id")
+    if env_id is None:
+        return None
+    arguments = metadata.get("env_args", {})
+    bins = metadata.get("discretize")
+    sound = (
+        isinstance(env_id, str)
+        and isinstance(arguments, dict)
+        and all(map(_is_plain, arguments.values()))
+        and (
+            bins is None
+            or (isinstance(bins, list) and all(type(each) is int for each in bins))
+        )
+    )
+    if not sound:
+        raise BadArgumentError(
+            f"the metadata of {file} must hold env_id, env_args and discretize as "
+            f"acl-gym train writes them, got {repr(metadata)[:200]}."
+        )
+    return Environment(env_id, arguments, None if bins is None else tuple(bins))
+
+
+def check_named_by_file(file: str, found: Environment, option: str) -> None:
+    """Check that an environment can be made without importing what a file names.
+
+    Args:
+        file: the file, for messages.
+        found: what it names.
+        option: how the user can name it, such as "--env-id".
+
+    Raises:
+        BadArgumentError: it cannot.
+    """
+    if found.name not in gym.registry:
+        typed = f"{option} {found.env_id if found.module else 'MODULE:' + found.name}"
+        raise BadArgumentError(
+            f"{file} names the environment {found.env_id!r}, which is not registered; a "
+            "module is not imported because a file says so. If you trust it, name it "
+            f"yourself: add {typed.strip()}."
+        )
+    for name, value in found.arguments.items():
+        if isinstance(value, str) and _IMPORTS.fullmatch(value):
+            raise BadArgumentError(
+                f"{file} sets {name}={value!r}, which may name a module; it is not "
+                "imported because a file says so. If you trust it, add --env-arg "
+                f"{name}={value}."
+            )
+
+
+def _is_plain(value: Any, depth: int = 0) -> bool:
+    """Whether a value is a number, a text, None, or a list or dict of such."""
+    if isinstance(value, dict):
+        keys = all(isinstance(key, str) for key in value)
+        return (
+            keys and depth < 20 and all(_is_plain(v, depth + 1) for v in value.values())
+        )
+    if isinstance(value, list):
+        return depth < 20 and all(_is_plain(each, depth + 1) for each in value)
+    return value is None or isinstance(value, (bool, int, float, str))
+
+
+def _stem(env_id: str) -> str:
+    return env_id.rpartition("/")[2].rpartition("-v")[0] or env_id.rpartition("/")[2]
+
+
+def _twin(name: str) -> str:
+    """The environment of this package with the same name as one of another."""
+    return next(
+        (each for each in ENVIRONMENTS if each != name and _stem(each) == _stem(name)),
+        "",
+    )
+
+
+def _unknown(name: str) -> str:
+    """What to say of an id that is not registered."""
+    known = list(gym.registry)
+    similar = [each for each in known if _stem(each).lower() == _stem(name).lower()]
+    own = [each for each in similar if each in ENVIRONMENTS]
+    plain = [each for each in similar if "/" not in each]
+    # Of the versions of one environment the newest.
+    similar = [*own[-1:], *sorted(plain or set(similar) - set(own))[-1:]]
+    similar = similar or get_close_matches(name, known, 1)
+    if not similar:
+        stems = {_stem(each): each for each in known}
+        similar = [stems[each] for each in get_close_matches(_stem(name), stems, 1)]
+    message = f"there is no environment {name!r}."
+    if not similar:
+        return (
+            f"{message} `acl-gym envs` lists those of this package; for one of your own "
+            "name the module that registers it, module:Id-v0."
+        )
+    words = [repr(each) + _remark(each) for each in similar]
+    return f"{message} Did you mean {' or '.join(words)}?"
+
+
+def _remark(env_id: str) -> str:
+    """What to know of an environment that is named beside one of this package."""
+    if env_id in ENVIRONMENTS:
+        return " of this package"
+    if _twin(env_id) == "acl_gym/Pendulum-v0":
+        return " of Gymnasium, whose torque is continuous, with --discretize 5"
+    return ""

@@ -1,0 +1,415 @@
+"""The work of `acl-gym train`: a new or a resumed agent learns and is saved."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from acl_gym import Crisp, CSVLog, Fuzzy, PolicyEvaluation, TensorBoardLog
+from acl_gym.callbacks import Callback
+from acl_gym.cli.agents import AGENTS, name_of
+from acl_gym.cli.common import console, print_json
+from acl_gym.cli.environments import Environment, default_steps
+from acl_gym.cli.errors import (
+    InterruptedRunError,
+    bad_arguments,
+    in_words,
+    report,
+)
+from acl_gym.cli.interrupts import Interruption
+from acl_gym.cli.keeping import EqualCosts, Keeper, PlainProgress
+from acl_gym.colony.deposits import InverseCost, Rank
+from acl_gym.envs.control.environments import ControlVectorEnv
+from acl_gym.evaluation import reports_returns
+from acl_gym.evaluation.rollout import Rollout
+from acl_gym.partitions.automatic import automatic_partition
+
+ANTS = 250
+TRIALS = 100
+EVALUATE_EVERY = 10
+FOREIGN_EVALUATE_EVERY = 2
+"""In environments of other packages good policies may last for a trial or two."""
+
+FOREIGN_EPISODES = 100
+"""Episodes of an evaluation if the environment has no evaluation states."""
+
+RANDOM_STEPS = 10_000
+"""Random steps from which missing bounds of observations are estimated."""
+
+PROBES = 20
+"""Random episodes from which it is seen whether rewards are negative costs."""
+
+FOREIGN_DEPOSIT = Rank(5)
+"""Where rewards are not negative costs; found on CartPole, see docs/gymnasium.md."""
+
+
+class Shown(NamedTuple):
+    """What is printed besides errors.
+
+    Attributes:
+        quiet: neither progress nor a table.
+        as_json: JSON on stdout in their place.
+    """
+
+    quiet: bool
+    as_json: bool
+
+    @property
+    def progress(self) -> bool:
+        """Whether progress is shown."""
+        return not (self.quiet or self.as_json)
+
+
+@dataclass
+class Plan:
+    """What is to be learned.
+
+    Attributes:
+        learner: the agent.
+        environment: where.
+        evaluation: how its policy is evaluated.
+        trials: how many trials are to be made now.
+    """
+
+    learner: Any
+    environment: Environment
+    evaluation: PolicyEvaluation
+    trials: int
+
+
+def begin(
+    environment: Environment,
+    kind: str,
+    settings: dict[str, Any],
+    *,
+    ants: int,
+    partition: str,
+    cells: list[int] | None,
+    max_steps: int | None,
+    seed: int,
+    evaluate_every: int | None,
+    trials: int,
+) -> Plan:
+    """A new agent.
+
+    Raises:
+        BadArgumentError: an argument does not suit the environment or the agent.
+    """
+    env = environment.vector(ants)
+    steps = max_steps or default_steps(env)
+    with bad_arguments():
+        grid = automatic_partition(
+            env,
+            kind=Crisp if partition == "crisp" else Fuzzy,
+            cells=cells[0] if cells and len(cells) == 1 else cells,
+            random_steps=max(RANDOM_STEPS, env.num_envs),
+        )
+    if AGENTS[kind].deposits and not {"deposit", "cost"} & settings.keys():
+        settings = {**settings, **_deposit(environment, env, steps, seed)}
+    with bad_arguments():
+        learner = AGENTS[kind].load()(env, grid, max_steps=steps, seed=seed, **settings)
+    own = isinstance(env.unwrapped, ControlVectorEnv)
+    every = evaluate_every or (EVALUATE_EVERY if own else FOREIGN_EVALUATE_EVERY)
+    evaluation = _evaluation(environment, env, every, steps)
+    learner.metadata = {
+        "env_id": environment.env_id,
+        "env_args": environment.arguments,
+        "discretize": None if environment.bins is None else list(environment.bins),
+        "ants": ants,
+        "evaluation": {
+            "episodes": None if evaluation.env is env else evaluation.env.num_envs,
+            "max_steps": steps,
+            "seed": evaluation.seed,
+            "every": every,
+        },
+    }
+    return Plan(learner, environment, evaluation, trials)
+
+
+def go_on(
+    environment: Environment,
+    learner: Any,
+    changes: dict[str, Any],
+    ants: int | None,
+    evaluate_every: int | None,
+    trials: int | None,
+) -> Plan:
+    """A saved agent that goes on.
+
+    Args:
+        environment: where.
+        learner: as it was loaded.
+        changes: parameters that are different from now on.
+        ants: None takes as many as before.
+        evaluate_every: None takes what it was.
+        trials: how many more; None takes what was left of an interrupted run.
+
+    Raises:
+        BadArgumentError: a parameter is fixed, or the environment does not fit.
+    """
+    known = learner.metadata
+    ants = ants or _count(known.get("ants"), ANTS)
+    how = known.get("evaluation", {})
+    how = how if isinstance(how, dict) else {}
+    every = evaluate_every or _count(how.get("every"), EVALUATE_EVERY)
+    env = environment.vector(ants)
+    with bad_arguments():
+        learner.set_env(env)
+        for name, value in changes.items():
+            setattr(learner, name, value)
+    evaluation = _evaluation(environment, env, every, learner.max_steps)
+    if trials is None:
+        left = _count(known.get("planned_trials"), 0) - learner.trials
+        trials = left if left > 0 else TRIALS
+    learner.metadata = {
+        "env_id": environment.env_id,
+        "env_args": environment.arguments,
+        "discretize": None if environment.bins is None else list(environment.bins),
+        **known,
+        "ants": ants,
+        "evaluation": {
+            "episodes": None if evaluation.env is env else evaluation.env.num_envs,
+            "max_steps": learner.max_steps,
+            "seed": evaluation.seed,
+            "every": every,
+        },
+    }
+    if learner.history:
+        _as_if_uninterrupted(learner, evaluation)
+    return Plan(learner, environment, evaluation, trials)
+
+
+def _as_if_uninterrupted(learner: Any, evaluation: PolicyEvaluation) -> None:
+    """Make the last row what it is in the middle of a run.
+
+    The last trial of a run is evaluated in any case, and that of an interrupted run
+    perhaps not.
+    """
+    row = learner.history[-1]
+    if row["trial"] % evaluation.every:
+        for name in ("policy_cost", "policy_return", "success_rate"):
+            row.pop(name, None)
+    else:
+        evaluation.on_training_end(learner)
+
+
+def _count(value: Any, default: int) -> int:
+    """A number from a file, if it is one."""
+    usable = isinstance(value, int) and not isinstance(value, bool) and value > 0
+    return value if usable else default
+
+
+def _deposit(
+    environment: Environment, env: Any, steps: int, seed: int
+) -> dict[str, Any]:
+    """A deposit for rewards that are no negative costs, with a word; else nothing.
+
+    Ants that walk at random show of which sign costs are.
+    """
+    if isinstance(env.unwrapped, ControlVectorEnv):
+        return {}
+    rollout = Rollout(environment.vector(PROBES), steps)
+    rng = np.random.default_rng(seed)
+    rollout.start(seed=seed)
+    while rollout.ants.size:
+        allowed = rollout.allowed()
+        chances = rng.random((rollout.ants.size, rollout.n_actions))
+        if allowed is not None:
+            chances[~allowed] = -1.0
+        rollout.step(chances.argmax(axis=1))
+    if (rollout.cost > 0.0).all():
+        return {}
+    report(
+        "acl-gym",
+        f"note: the rewards of {environment.name} are not negative costs, so the ants "
+        f"deposit by their rank, --param deposit=rank:{FOREIGN_DEPOSIT.exponent:g}; "
+        "deposit=return and deposit=inverse_cost:OFFSET are other choices.",
+    )
+    return {"deposit": FOREIGN_DEPOSIT}
+
+
+def _evaluation(
+    environment: Environment, env: Any, every: int, steps: int
+) -> PolicyEvaluation:
+    """Evaluate from the environment's evaluation states, or from fixed random ones."""
+    if not isinstance(env.unwrapped, ControlVectorEnv):
+        env = environment.vector(FOREIGN_EPISODES)
+    return PolicyEvaluation(env, every=every, max_steps=steps)
+
+
+def run(
+    plan: Plan,
+    target: Path,
+    best: Path | None,
+    checkpoint_every: int | None,
+    *,
+    log: Path | None,
+    tensorboard: Path | None,
+    shown: Shown,
+) -> None:
+    """Learn, save, and print what came of it.
+
+    Args:
+        plan: what is to be learned.
+        target: the file of the agent.
+        best: the file of the best one; None writes none.
+        checkpoint_every: trials between checkpoints; None writes one each minute.
+        log: a CSV file, or None.
+        tensorboard: a folder, or None.
+        shown: what is printed.
+
+    Raises:
+        InterruptedRunError: a signal has ended it; the agent is saved.
+    """
+    learner, evaluation = plan.learner, plan.evaluation
+    begun, last = learner.trials, learner.trials + plan.trials
+    learner.metadata["planned_trials"] = last
+    evaluation.save_best = best
+    failure: Exception | None = None
+    with bad_arguments():
+        watchers: list[Callback] = [evaluation]
+        if log is not None:
+            watchers.append(CSVLog(log))
+        if tensorboard is not None:
+            watchers.append(TensorBoardLog(tensorboard))
+    on_terminal = sys.stderr.isatty()
+    if shown.progress and not on_terminal:
+        watchers.append(PlainProgress(last))
+    if AGENTS[name_of(learner)].deposits and not shown.quiet:
+        watchers.append(EqualCosts())
+    if begun and shown.progress:
+        report(
+            "acl-gym",
+            f"going on after trial {begun} for {plan.trials} more, to trial {last}.",
+        )
+    with Interruption() as interruption:
+        keeper = Keeper(target, checkpoint_every, interruption)
+        try:
+            learner.learn(
+                trials=plan.trials,
+                callback=[*watchers, keeper],
+                progress_bar=shown.progress and on_terminal,
+            )
+        except KeyboardInterrupt:
+            if not interruption.wanted:
+                raise
+        except Exception as error:
+            failure = error
+        interruption.learning_is_over()
+        keeper.undo_trial(learner)
+        if learner.trials > begun:
+            learner.save(target)
+    stopped = learner.trials < last
+    if failure is not None:
+        raise _failed(failure, learner, begun, target) from failure
+    if stopped:
+        raise InterruptedRunError(
+            _how_to_go_on(learner, begun, last, target), interruption.exit_code
+        )
+    if shown.as_json:
+        print_json(_summary(plan, target, best))
+    elif not shown.quiet:
+        _print_rows(learner, target, best)
+
+
+def _how_to_go_on(learner: Any, begun: int, last: int, target: Path) -> str:
+    if learner.trials == begun:
+        return "interrupted before the first trial was complete; nothing is saved."
+    return (
+        f"interrupted; the agent is saved after trial {learner.trials} of {last}. To go "
+        f"on: acl-gym train --resume {target}"
+    )
+
+
+def _failed(error: Exception, learner: Any, begun: int, target: Path) -> Exception:
+    """What to report where learning has failed."""
+    words = in_words(error)
+    deposit = getattr(learner, "deposit", None)
+    if isinstance(deposit, InverseCost) and getattr(learner, "cost", None) is None:
+        costs = learner.rollout.cost + deposit.offset
+        if (costs <= 0.0).any():
+            words = (
+                "ants deposit 1 / cost, and costs must be > 0, but an ant has cost "
+                f"{costs.min():g}: the rewards are not negative costs. Add --param "
+                "deposit=rank:5, or deposit=return if rewards are never negative."
+            )
+    if learner.trials > begun:
+        words += (
+            f" The agent is saved as it was after trial {learner.trials}, {target}."
+        )
+    return RuntimeError(words)
+
+
+def best_row(learner: Any) -> dict[str, Any] | None:
+    """The row of the history with the cheapest policy; None if none was evaluated."""
+    rows = [row for row in learner.history if "policy_cost" in row]
+    return min(rows, key=lambda row: row["policy_cost"], default=None)
+
+
+def _measures(row: dict[str, Any]) -> dict[str, Any]:
+    """What an evaluation has found; None where it is not known."""
+    names = ("policy_cost", "policy_return", "success_rate")
+    return {name: row.get(name) for name in names}
+
+
+def _summary(plan: Plan, target: Path, best: Path | None) -> dict[str, Any]:
+    learner = plan.learner
+    last, cheapest = learner.history[-1], best_row(learner)
+    found = None
+    if best is not None and cheapest is not None:
+        found = {
+            "file": str(best),
+            "trial": cheapest["trial"],
+            **_measures(cheapest),
+        }
+    return {
+        **learner.metadata,
+        "agent": name_of(learner),
+        "partition": repr(learner.partition),
+        "parameters": learner.parameters(),
+        "trials": learner.trials,
+        "env_steps": learner.num_timesteps,
+        "seconds": learner.seconds,
+        **_measures(last),
+        "file": str(target),
+        "best": found,
+        "rows": learner.history,
+    }
+
+
+def _print_rows(learner: Any, target: Path, best: Path | None) -> None:
+    from rich.table import Table
+
+    cost = getattr(learner, "cost", None)
+    what = "return" if reports_returns(learner.rollout.env, cost) else "cost"
+    rows = [row for row in learner.history if "policy_cost" in row]
+    heads = ["trial", "steps", "seconds", f"ants' {what}", f"policy {what}"]
+    known = any("success_rate" in row for row in rows)
+    table = Table(box=None, pad_edge=False, header_style="bold")
+    for head in [*heads, "success"][: 5 + known]:
+        table.add_column(head, justify="right")
+    for row in rows:
+        cells = [
+            f"{row['trial']}",
+            f"{row['env_steps']:,}",
+            f"{row['seconds']:.2f}",
+            f"{row[f'ants_{what}']:.2f}",
+            f"{row[f'policy_{what}']:.4f}",
+            f"{row['success_rate']:.1%}" if "success_rate" in row else "",
+        ]
+        table.add_row(*cells[: 5 + known])
+    screen = console()
+    screen.print(table)
+    cheapest = best_row(learner)
+    lines = [f"Saved {target}. To evaluate it again: acl-gym evaluate {target}"]
+    if best is not None and cheapest is not None:
+        lines.append(
+            f"The best policy, after trial {cheapest['trial']} with a {what} of "
+            f"{cheapest[f'policy_{what}']:.4f}: {best}"
+        )
+    for line in lines:
+        screen.print(line, markup=False, highlight=False, soft_wrap=True)

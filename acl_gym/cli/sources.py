@@ -1,0 +1,28 @@
+"""Classes as their source files declare them, read without importing them.
+
+Importing an agent or an environment imports Numba, which takes a second. Names and
+descriptions can be had from the source, also where the package lies in a zip file.
+"""
+
+from __future__ import annotations
+
+import ast
+from importlib.resources import files
+
+
+def class_node(module: str, name: str) -> ast.ClassDef:
+    """The syntax tree of a class of this package.
+
+    Args:
+        module: its module, such as "acl_gym.agents.acl".
+        name: its name.
+
+    Raises:
+        LookupError: there is no such class.
+    """
+    package, *folders, last = module.split(".")
+    file = files(package).joinpath(*folders, f"{last}.py")
+    for node in ast.parse(file.read_text(encoding="utf-8")).body:
+        if isinstance(node, ast.ClassDef) and node.name == name:
+            return node
+    raise LookupError(f"{module} must have a class {name!r}, but has none.")

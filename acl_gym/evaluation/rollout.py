@@ -265,8 +265,8 @@ class Rollout:
         """Take over what the infos of a step say of the ants that took it."""
         # Where slots are reset in the same step, the infos of their ends come last.
         for part in (infos, infos.get("final_info")) if infos else ():
-            told = part.get("is_success") if part else None
-            if told is None:
+            told = None if part is None else part.get("is_success")
+            if part is None or told is None:
                 continue
             if self._reported_success is None:
                 self._reported_success = np.zeros(self.env.num_envs, dtype=np.bool_)

@@ -49,7 +49,7 @@ def thesis_partition(
     """
     space = observation_space(env)
     checked_kind(kind)
-    system = system_of(env)
+    system = _system(env)
     if system is None:
         raise TypeError(
             f"env must be a control environment of this package, got {env}; use "
@@ -145,7 +145,7 @@ def automatic_partition(
             )
         return Discrete.from_space(space)
     box = real_box(space)
-    system = system_of(env)
+    system = _system(env)
     if system is not None and system.observation_space != space:
         system = None  # a wrapper has changed what is observed
     if cells is None and bounds is None and system is not None:
@@ -176,7 +176,7 @@ def _centres(dimensions: int) -> int:
     return CENTRES[dimensions]
 
 
-def system_of(env: Any) -> ControlSystem | None:
+def _system(env: Any) -> ControlSystem | None:
     """The system of an environment of this package, None for any other."""
     base = env.unwrapped
     if isinstance(base, gym.vector.SyncVectorEnv):

@@ -73,8 +73,6 @@ class Navigation(BlockSystem):
     """
 
     evaluation_steps: ClassVar[int] = 150  # T of Table 4.1
-    state_names: ClassVar[tuple[str, ...]] = ("c1 (m)", "v1 (m/s)", "c2 (m)", "v2 (m/s)")
-    input_names: ClassVar[tuple[str, ...]] = ("u1 (N)", "u2 (N)")
     block_kernels = (kernels.advance, kernels.advance_in_parallel)
 
     mass: float = 1.0
@@ -194,11 +192,6 @@ class Navigation(BlockSystem):
     def action_space(self) -> spaces.Discrete:
         """One action for each force."""
         return spaces.Discrete(len(self.forces))
-
-    @property
-    def inputs(self) -> FloatArray:
-        """The force of each action, N, `(n_actions, 2)`."""
-        return np.array(self.forces)
 
     @property
     def max_stage_cost(self) -> float:

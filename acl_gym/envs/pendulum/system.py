@@ -47,8 +47,6 @@ class Pendulum(BlockSystem):
     """
 
     circular: ClassVar[tuple[int, ...]] = (0,)
-    state_names: ClassVar[tuple[str, ...]] = ("theta (rad)", "omega (rad/s)")
-    input_names: ClassVar[tuple[str, ...]] = ("torque (N m)",)
     block_kernels = (kernels.advance, kernels.advance_in_parallel)
 
     inertia: float = 0.005
@@ -124,11 +122,6 @@ class Pendulum(BlockSystem):
     def action_space(self) -> spaces.Discrete:
         """One action for each torque."""
         return spaces.Discrete(len(self.torques))
-
-    @property
-    def inputs(self) -> FloatArray:
-        """The torque of each action, N m, `(n_actions, 1)`."""
-        return np.array(self.torques)[:, None]
 
     @property
     def max_stage_cost(self) -> float:

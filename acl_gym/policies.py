@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 from acl_gym.colony.greedy import NUMBERS_PER_ACTION, greedy_actions
 from acl_gym.colony.pheromone import Pheromone
 from acl_gym.colony.selection import choose_actions
+from acl_gym.envs.control.signals import Signals
+from acl_gym.export import Source, write_c_header, write_numpy_file
 from acl_gym.partitions import Partition
 from acl_gym.utils import validation
 from acl_gym.utils.typing import BoolArray, CellArray, FloatArray, IntArray, RankArray
@@ -109,6 +112,104 @@ class PartitionPolicy(ABC):
         actions = columns + self.first_action
         return (actions[0] if single else actions), state
 
+    def to_numpy(self, path: str | Path) -> Path:
+        """Write the greedy policy to a file for NumPy, without this package.
+
+        These lines evaluate it; they give what `predict` gives for every finite
+        observation within the range of a discrete one:
+
+        ```python
+        import numpy as np
+
+        p = dict(np.load("policy.npz"))
+        lines = [p[f"centres_{axis}"] for axis in range(p["periods"].size)]
+
+
+        def act(observation):
+            corners = [((), 1.0)]  # the cells around the observation, and their degrees
+            for x, line, period in zip(np.ravel(observation), lines, p["periods"]):
+                x = x - period * np.floor((x - line[0]) / period) if period else x
+                low = np.searchsorted(line[1:-1], x, "right")
+                up = np.clip((x - line[low]) / (line[low + 1] - line[low]), 0, 1)
+                up = up if p["fuzzy"] else float(up >= 0.5)
+                sides = [(low, 1 - up), (low + 1, up)]
+                corners = [((*c, s), d * w) for c, d in corners for s, w in sides if w]
+            values = sum(d * p["table"][c] for c, d in corners)
+            ranks = p["ranks"][max(corners, key=lambda corner: corner[1])[0]]
+            return int(p["first_action"] + np.lexsort((ranks, -values))[0])
+        ```
+
+        The arrays are described in `acl_gym.export.numpy_file.numpy_arrays`; where
+        they are known, `inputs` and `input_values` say what each action sets.
+
+        Args:
+            path: the file; `.npz` is added where it is missing.
+
+        Returns:
+            The path written, atomically.
+
+        Raises:
+            TypeError: the policy draws its actions, or locates states by a method of
+                its own.
+            ValueError: the table holds numbers that are not finite.
+            FileNotFoundError: the folder of the file does not exist.
+            IsADirectoryError: the path is a folder.
+        """
+        return write_numpy_file(path, self._source())
+
+    def to_c(
+        self,
+        path: str | Path,
+        *,
+        name: str = "policy",
+        precision: str = "float",
+        inputs: ArrayLike | None = None,
+    ) -> Path:
+        """Write the greedy policy as one C99 header, also for C++.
+
+        `name_action(x)` returns the action for the observation `x`. It allocates
+        nothing, needs no library but <math.h> (only for circular variables), and keeps
+        its tables in read-only memory: a byte for each cell of a crisp or discrete
+        policy, n_actions numbers and a byte or two for each cell of a fuzzy one. The
+        comment at the head of the file states the units, the memory and how to call it.
+        Where it is known, the table `name_inputs` holds the input values that each
+        action stands for.
+
+        With "double" the actions are those of `predict` to the bit. With "float", half
+        the memory, they differ only where rounding to a float, one part in 10^7, moves
+        an observation across a border between two actions. An observation that
+        `predict` refuses (NaN, infinite, out of the range of a discrete variable) gives
+        `name_INVALID`.
+
+        Args:
+            path: the file; `.h` is added to a name without an ending.
+            name: what all names in the file begin with, a C identifier.
+            precision: "float" or "double", of observations and tables.
+            inputs: what each action sets, `(n_actions,)` or `(n_actions, n_inputs)`,
+                in place of what the environment knows.
+
+        Returns:
+            The path written, atomically; the same policy gives the same bytes.
+
+        Raises:
+            TypeError: the policy draws its actions, or locates states by a method of
+                its own.
+            ValueError: an argument is not valid, the table holds numbers that are not
+                finite or do not fit a float, or is too large for a header.
+            FileNotFoundError: the folder of the file does not exist.
+            IsADirectoryError: the path is a folder.
+        """
+        source = self._source(inputs)
+        return write_c_header(path, source, name, precision)
+
+    def _source(self, inputs: ArrayLike | None = None) -> Source:
+        """What is exported; `inputs` as in `to_c`."""
+        raise TypeError(
+            "only a greedy policy over a table can be exported, got "
+            f"{type(self).__name__}, which draws its actions or has rules of its own; "
+            "export agent.policy, or TablePolicy(partition, levels)."
+        )
+
     def _checked_masks(self, masks: ArrayLike | None, count: int) -> BoolArray | None:
         if masks is None:
             return None
@@ -133,6 +234,8 @@ class TablePolicy(PartitionPolicy):
         ranks: `(n_cells, n_actions)`, the order in which tied actions are preferred;
             None draws it from a fixed seed.
         first_action: the action that column 0 stands for, `Discrete.start`.
+        signals: what observations and actions mean, for `to_c` and `to_numpy`; None if
+            unknown.
 
     Raises:
         ValueError: `table` or `ranks` do not fit the partition.
@@ -144,6 +247,7 @@ class TablePolicy(PartitionPolicy):
         table: FloatArray,
         ranks: RankArray | None = None,
         first_action: int = 0,
+        signals: Signals | None = None,
     ) -> None:
         if table.dtype != np.float64:
             raise ValueError(f"table must be float64, got {table.dtype}.")
@@ -160,6 +264,7 @@ class TablePolicy(PartitionPolicy):
         self.table = table
         self.ranks = ranks
         self.first_action = first_action
+        self.signals = signals
 
     @property
     def n_actions(self) -> int:
@@ -182,7 +287,20 @@ class TablePolicy(PartitionPolicy):
     def copy(self) -> TablePolicy:
         """The same policy over a table that no longer changes."""
         return TablePolicy(
-            self.partition, self.table.copy(), self.ranks, self.first_action
+            self.partition,
+            self.table.copy(),
+            self.ranks,
+            self.first_action,
+            self.signals,
+        )
+
+    def _source(self, inputs: ArrayLike | None = None) -> Source:
+        signals = self.signals
+        if inputs is not None:
+            names = () if signals is None else signals.observations
+            signals = Signals.of_inputs(inputs, names)
+        return Source.of(
+            self.partition, self.table, self.ranks, self.first_action, signals
         )
 
 

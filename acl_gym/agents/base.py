@@ -12,7 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from acl_gym.callbacks.base import Callbacks
 from acl_gym.colony.greedy import greedy_actions
+from acl_gym.envs.control.lookup import signals_of
 from acl_gym.evaluation.rollout import Rollout, require_vector_env
+from acl_gym.export import Source
 from acl_gym.partitions import Partition, check_cells, partition_from_settings
 from acl_gym.partitions.automatic import automatic_partition
 from acl_gym.policies import PartitionPolicy, TablePolicy, random_ranks
@@ -240,7 +242,16 @@ class TabularAgent(PartitionPolicy):
     @property
     def policy(self) -> TablePolicy:
         """The policy as it is now; it follows the table until you `copy()` it."""
-        return TablePolicy(self.partition, self._table, self._ranks, self.first_action)
+        return TablePolicy(
+            self.partition,
+            self._table,
+            self._ranks,
+            self.first_action,
+            None if self.env is None else signals_of(self.env),
+        )
+
+    def _source(self, inputs: ArrayLike | None = None) -> Source:
+        return self.policy._source(inputs)
 
     def _act(
         self,

@@ -10,8 +10,7 @@ import numpy as np
 from gymnasium import spaces
 from gymnasium.vector import VectorWrapper
 
-from acl_gym.envs.control.environments import ControlVectorEnv
-from acl_gym.envs.control.single import ControlEnv
+from acl_gym.envs.control.lookup import system_of
 from acl_gym.envs.control.system import ControlSystem
 from acl_gym.envs.wrappers.perturbations import HiddenVariables
 from acl_gym.partitions.base import Partition
@@ -49,7 +48,7 @@ def thesis_partition(
     """
     space = observation_space(env)
     checked_kind(kind)
-    system = _system(env)
+    system = system_of(env)
     if system is None:
         raise TypeError(
             f"env must be a control environment of this package, got {env}; use "
@@ -145,7 +144,7 @@ def automatic_partition(
             )
         return Discrete.from_space(space)
     box = real_box(space)
-    system = _system(env)
+    system = system_of(env)
     if system is not None and system.observation_space != space:
         system = None  # a wrapper has changed what is observed
     if cells is None and bounds is None and system is not None:
@@ -174,16 +173,6 @@ def _centres(dimensions: int) -> int:
             "each variable that does not matter."
         )
     return CENTRES[dimensions]
-
-
-def _system(env: Any) -> ControlSystem | None:
-    """The system of an environment of this package, None for any other."""
-    base = env.unwrapped
-    if isinstance(base, gym.vector.SyncVectorEnv):
-        base = base.envs[0].unwrapped
-    if not isinstance(base, (ControlEnv, ControlVectorEnv)):
-        return None
-    return base.system
 
 
 def _shown_variables(env: Any, system: ControlSystem) -> list[int]:

@@ -53,11 +53,14 @@ def checked_target(path: Path) -> Path:
 
     Raises:
         FileNotFoundError: the folder of the file does not exist.
+        IsADirectoryError: the path is a folder.
     """
     if not path.parent.is_dir():
         raise FileNotFoundError(
             f"there is no folder {path.parent} to save {path.name} in; make it first."
         )
+    if path.is_dir():
+        raise IsADirectoryError(f"{path} is a folder; give the name of a file.")
     return path
 
 

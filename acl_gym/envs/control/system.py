@@ -10,6 +10,7 @@ from gymnasium import spaces
 from numba import njit
 from numpy.typing import NDArray
 
+from acl_gym.envs.control.signals import Signals
 from acl_gym.utils import compiling as _compiling  # noqa: F401 - it says what the wait is for
 from acl_gym.utils.typing import BoolArray, FloatArray, IntArray
 
@@ -48,6 +49,11 @@ class ControlSystem(ABC):
     @abstractmethod
     def action_space(self) -> spaces.Discrete:
         """The space of one action."""
+
+    @property
+    def signals(self) -> Signals | None:
+        """Names of observations and inputs, and the inputs of each action, if known."""
+        return None
 
     @property
     @abstractmethod

@@ -13,6 +13,7 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from acl_gym.envs.control.families import NumberedSystem
+from acl_gym.envs.control.signals import Signals
 from acl_gym.envs.grid_search import kernels
 from acl_gym.envs.grid_search.maps import FREE, GOAL, MAPS, WALL, checked_map, load_map
 from acl_gym.utils import validation
@@ -138,6 +139,16 @@ class GridSearch(NumberedSystem):
     def action_space(self) -> spaces.Discrete:
         """One action for each direction."""
         return spaces.Discrete(len(self.directions))
+
+    @property
+    def signals(self) -> Signals:
+        """The number of the cell is observed, a move is made."""
+        moves = tuple((float(south), float(east)) for south, east in self.directions)
+        return Signals(
+            ("number of the cell",),
+            ("rows to the south", "columns to the east"),
+            moves,
+        )
 
     @property
     def max_stage_cost(self) -> float:

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 
 from acl_gym.envs.control import parameters, sampling
 from acl_gym.envs.control.families import BlockSystem
+from acl_gym.envs.control.signals import Signals
 from acl_gym.envs.navigation import kernels
 from acl_gym.envs.navigation.kernels import Peak, Row
 from acl_gym.utils import validation
@@ -192,6 +193,20 @@ class Navigation(BlockSystem):
     def action_space(self) -> spaces.Discrete:
         """One action for each force."""
         return spaces.Discrete(len(self.forces))
+
+    @property
+    def signals(self) -> Signals:
+        """Positions and velocities are observed, two forces are set."""
+        return Signals(
+            (
+                "position c1, m",
+                "velocity v1, m/s",
+                "position c2, m",
+                "velocity v2, m/s",
+            ),
+            ("force u1, N", "force u2, N"),
+            self.forces,
+        )
 
     @property
     def max_stage_cost(self) -> float:

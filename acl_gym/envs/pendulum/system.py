@@ -13,6 +13,7 @@ from gymnasium import spaces
 
 from acl_gym.envs.control import parameters, sampling
 from acl_gym.envs.control.families import BlockSystem
+from acl_gym.envs.control.signals import Signals
 from acl_gym.envs.pendulum import kernels
 from acl_gym.envs.pendulum.kernels import TWO_PI
 from acl_gym.utils import validation
@@ -122,6 +123,15 @@ class Pendulum(BlockSystem):
     def action_space(self) -> spaces.Discrete:
         """One action for each torque."""
         return spaces.Discrete(len(self.torques))
+
+    @property
+    def signals(self) -> Signals:
+        """Angle and angular velocity are observed, the torque is set."""
+        return Signals(
+            ("angle theta, rad, 0 hangs down", "angular velocity omega, rad/s"),
+            ("torque u, N m",),
+            tuple((torque,) for torque in self.torques),
+        )
 
     @property
     def max_stage_cost(self) -> float:

@@ -28,6 +28,9 @@ SHOWN = (0, 2, 4, 6, 8, 10, 12, 15, 20, 30, 60, 100)
 _COLOURS = 128
 """Of a GIF, one palette for all of its frames."""
 
+_WHITE = 244
+"""Of 255: lighter colours of a palette become white."""
+
 _KINDS = (".gif", ".mp4")
 
 
@@ -166,7 +169,7 @@ def _gif(pictures: Iterator[Image.Image], interval: float) -> bytes:
     sample = Image.new("RGB", (width, height * len(few)))
     for place, frame in enumerate(few):
         sample.paste(frame, (0, place * height))
-    palette = sample.quantize(_COLOURS)
+    palette = _with_white(sample.quantize(_COLOURS))
     first, *rest = (
         frame.quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames
     )
@@ -174,6 +177,14 @@ def _gif(pictures: Iterator[Image.Image], interval: float) -> bytes:
     options = {"save_all": True, "append_images": rest, "loop": 0, "optimize": True}
     first.save(buffer, format="gif", duration=round(interval), **options)
     return buffer.getvalue()
+
+
+def _with_white(image: Image.Image) -> Image.Image:
+    """The palette with white itself, of which quantising makes a light grey."""
+    colours = np.array(image.getpalette(), dtype=np.int64).reshape(-1, 3)
+    colours[(colours >= _WHITE).all(axis=1)] = 255
+    image.putpalette(colours.ravel().tolist())
+    return image
 
 
 def _mp4(film: _Film) -> bytes:

@@ -141,10 +141,20 @@ def add_bar(
     bar.ax.tick_params(length=0)
 
 
-def add_level_bar(ax: Axes, mappable: Any, name: str, *, below: bool = False) -> None:
-    """A bar of levels beside `ax`, or below a picture that is wide and low."""
+def add_level_bar(
+    ax: Axes, mappable: Any, name: str, *, below: bool = False, extend: str = "neither"
+) -> None:
+    """A bar of levels beside `ax`, or below a picture that is wide and low.
+
+    Args:
+        ax: the picture.
+        mappable: what maps levels to colours.
+        name: of the bar.
+        below: whether it lies below.
+        extend: `"max"` if levels may lie above the scale.
+    """
     place = None if below else (1.03, 0.0, 0.045, 1.0)
-    bar = _bar(ax, mappable, name, place)
+    bar = _bar(ax, mappable, name, place, extend=extend)
     norm = mappable.norm
     if isinstance(norm, LogNorm):
         axis = bar.ax.xaxis if below else bar.ax.yaxis
@@ -155,13 +165,15 @@ def add_level_bar(ax: Axes, mappable: Any, name: str, *, below: bool = False) ->
         bar.ax.minorticks_off()
 
 
-def _bar(ax: Axes, mappable: ScalarMappable, name: str, place: Any) -> Colorbar:
+def _bar(
+    ax: Axes, mappable: ScalarMappable, name: str, place: Any, extend: str = "neither"
+) -> Colorbar:
     """A bar in a place of the axes, as high as the picture; without a place, below."""
     figure: Any = ax.figure
     options: dict[str, Any] = {"ax": ax, "location": "bottom", "aspect": 40}
     if place is not None:
         options = {"cax": ax.inset_axes(place)}
-    bar: Colorbar = figure.colorbar(mappable, label=name, **options)
+    bar: Colorbar = figure.colorbar(mappable, label=name, extend=extend, **options)
     bar.outline.set_visible(False)
     return bar
 

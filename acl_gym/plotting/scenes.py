@@ -33,6 +33,9 @@ _STEP = 0.1
 _HOLD, _LAST_HOLD = 0.4, 1.6
 """Seconds that the end of an episode is shown; that of the last one."""
 
+_NEARLY_ALL = 0.999
+"""Of the levels are within the scale; a single peak would take much of its colours."""
+
 _TAIL: dict[str, Any] = {"linewidth": 1.4, "alpha": 0.9, "zorder": 5}
 _DOT: dict[str, Any] = {
     **{"marker": "o", "markersize": 7, "color": "black", "markerfacecolor": "white"},
@@ -157,7 +160,7 @@ def _explain(left: Axes, middle: Axes, stage: Stage) -> None:
         middle.tick_params(labelleft=False)
         palettes.add_bar(left, palettes.of_inputs(subject), slim=True)
     norm = palettes.norm_of(np.array(stage.limits), stage.limits)
-    palettes.add_level_bar(middle, palettes.levels(norm), "")
+    palettes.add_level_bar(middle, palettes.levels(norm), "", extend="max")
 
 
 def _plane(stage: Stage) -> Plane:
@@ -194,11 +197,11 @@ def _pendulum(ax: Axes, stage: Stage) -> Callable[[int], list[Any]]:
     system: Any = stage.subject.system
     ax.set_aspect("equal")
     ax.set_xlim(-1.25, 1.25)
-    ax.set_ylim(-1.25, 1.25)
+    ax.set_ylim(-1.25, 1.45)
     ax.set_axis_off()
     half = math.degrees(system.goal_bounds[0])
     ax.add_patch(Wedge((0, 0), 1.22, 90 - half, 90 + half, color="#A6DCC4", zorder=1))
-    ax.text(0.24, 1.1, "goal", color=style.GREEN, va="center", size="small")
+    ax.text(0, 1.27, "goal", color=style.GREEN, ha="center", size="small")
     rod_look = {"color": "0.2", "linewidth": 3.5, "solid_capstyle": "round"}
     (rod,) = ax.plot([], [], zorder=2, **rod_look)
     (bob,) = ax.plot([], [], "o", markersize=15, color=style.ORANGE, zorder=3)
@@ -256,9 +259,9 @@ def _between(states: FloatArray, subject: Subject) -> FloatArray:
 
 
 def _limits(tables: Sequence[FloatArray]) -> tuple[float, float]:
-    """From the lowest to the highest level of the best actions in all stages."""
+    """From the lowest to nearly the highest level of the best actions in all stages."""
     best = np.concatenate([table.max(axis=1) for table in tables])
-    low, high = float(best.min()), float(best.max())
+    low, high = float(best.min()), float(np.quantile(best, _NEARLY_ALL))
     if high <= low:
         high = 10.0 * low if low > 0.0 else low + 1.0
     return low, high

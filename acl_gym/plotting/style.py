@@ -105,8 +105,11 @@ def checked_axes(ax: Any) -> Axes:
 
 def keep_style(figure: Figure) -> None:
     """Make a tick of each axis now, in our style; others are copies of it."""
-    for ax in figure.axes:
-        for axis in (ax.xaxis, ax.yaxis):
+    for ax in figure.findobj(Axes):  # bars are inside others
+        for axis, name in ((ax.xaxis, "xtick"), (ax.yaxis, "ytick")):
+            axis.set_tick_params(
+                which="both", labelsize=mpl.rcParams[f"{name}.labelsize"]
+            )
             axis.get_major_ticks(1)
             axis.get_minor_ticks(1)
 

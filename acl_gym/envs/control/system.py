@@ -36,15 +36,6 @@ class ControlSystem(ABC):
     circular: ClassVar[tuple[int, ...]] = ()
     """The state variables that wrap around, such as angles: both ends are one value."""
 
-    state_names: ClassVar[tuple[str, ...]] = ()
-    """What the state variables are called, with their units: "omega (rad/s)"."""
-
-    input_names: ClassVar[tuple[str, ...]] = ()
-    """What the columns of `inputs` are called, with their units: "torque (N m)"."""
-
-    action_names: ClassVar[tuple[str, ...]] = ()
-    """What the actions are called where they are no numbers: "north"."""
-
     evaluation_steps: ClassVar[int] = 300
     """T, the longest episode when a policy is evaluated from `evaluation_states`."""
 
@@ -59,18 +50,9 @@ class ControlSystem(ABC):
         """The space of one action."""
 
     @property
-    def inputs(self) -> FloatArray | None:
-        """The physical input of each action, `(n_actions, m)`; None: it is no number."""
-        return None
-
-    @property
     def signals(self) -> Signals | None:
         """Names of observations and inputs, and the inputs of each action, if known."""
-        inputs = self.inputs
-        if inputs is None:
-            return None
-        rows = tuple(map(tuple, inputs.tolist()))
-        return Signals(self.state_names, self.input_names, rows)
+        return None
 
     @property
     @abstractmethod

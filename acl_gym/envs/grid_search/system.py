@@ -50,7 +50,6 @@ class GridSearch(NumberedSystem):
     """
 
     state_hint: ClassVar[str] = "`cells` lists the cell of each state"
-    state_names: ClassVar[tuple[str, ...]] = ("cell",)
     directions: ClassVar[tuple[tuple[int, int], ...]]
     """Of each action: how many rows and columns it moves by."""
 
@@ -236,7 +235,6 @@ class GridSearch1D(GridSearch):
     """
 
     directions: ClassVar[tuple[tuple[int, int], ...]] = (WEST, EAST)
-    action_names: ClassVar[tuple[str, ...]] = ("west", "east")
 
     n_states: int = 10
     transition_probability: float = 1.0
@@ -272,7 +270,6 @@ class GridSearch2D(GridSearch):
     """
 
     directions: ClassVar[tuple[tuple[int, int], ...]] = (NORTH, SOUTH, EAST, WEST)
-    action_names: ClassVar[tuple[str, ...]] = ("north", "south", "east", "west")
 
     map_name: str = "11x11"
     desc: str | tuple[str, ...] | None = None

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 
 from acl_gym.envs.control import parameters, sampling
 from acl_gym.envs.control.families import BlockSystem
+from acl_gym.envs.control.signals import Signals
 from acl_gym.envs.navigation import kernels
 from acl_gym.envs.navigation.kernels import Peak, Row
 from acl_gym.utils import validation
@@ -49,7 +50,7 @@ class Navigation(BlockSystem):
             sigma_1, sigma_2): height, kg / s, >= 0; centre, m; widths, m, > 0.
         forces: U, N, the force (u1, u2) of each action, one or more.
         sampling_time: T_s, s, > 0; the force is constant over it.
-        substeps: Runge-Kutta steps in one sampling time, 1 to 10,000. Measured
+        substeps: Runge-Kutta steps in one sampling time, >= 1. Measured
             against DOP853 over the whole state space, one step of the default 0.2 s
             is off by at most 3e-2 m and 0.2 m/s with 1 substep, 8e-4 and 6e-3 with 2,
             4e-5 and 3e-4 with 4; most where the damping is strongest. 2 is as exact
@@ -73,13 +74,6 @@ class Navigation(BlockSystem):
     """
 
     evaluation_steps: ClassVar[int] = 150  # T of Table 4.1
-    state_names: ClassVar[tuple[str, ...]] = (
-        "c1 (m)",
-        "v1 (m/s)",
-        "c2 (m)",
-        "v2 (m/s)",
-    )
-    input_names: ClassVar[tuple[str, ...]] = ("u1 (N)", "u2 (N)")
     block_kernels = (kernels.advance, kernels.advance_in_parallel)
 
     mass: float = 1.0
@@ -107,9 +101,7 @@ class Navigation(BlockSystem):
             validation.number(name, getattr(self, name), above=0)
         for name in ("base_damping", "force_weight"):
             validation.number(name, getattr(self, name), at_least=0)
-        validation.integer(
-            "substeps", self.substeps, at_least=1, at_most=parameters.MOST_SUBSTEPS
-        )
+        validation.integer("substeps", self.substeps, at_least=1)
         validation.one_of("cost", self.cost, ("quadratic", "time"))
         validation.one_of("goal_rule", self.goal_rule, ("bounds", "membership"))
         canonical: dict[str, Any] = {
@@ -203,9 +195,18 @@ class Navigation(BlockSystem):
         return spaces.Discrete(len(self.forces))
 
     @property
-    def inputs(self) -> FloatArray:
-        """The force of each action, N, `(n_actions, 2)`."""
-        return np.array(self.forces)
+    def signals(self) -> Signals:
+        """Positions and velocities are observed, two forces are set."""
+        return Signals(
+            (
+                "position c1, m",
+                "velocity v1, m/s",
+                "position c2, m",
+                "velocity v2, m/s",
+            ),
+            ("force u1, N", "force u2, N"),
+            self.forces,
+        )
 
     @property
     def max_stage_cost(self) -> float:

@@ -13,6 +13,7 @@ from gymnasium import spaces
 
 from acl_gym.envs.control import parameters, sampling
 from acl_gym.envs.control.families import BlockSystem
+from acl_gym.envs.control.signals import Signals
 from acl_gym.envs.pendulum import kernels
 from acl_gym.envs.pendulum.kernels import TWO_PI
 from acl_gym.utils import validation
@@ -34,7 +35,7 @@ class Pendulum(BlockSystem):
         gravity: g, m / s^2, >= 0.
         torques: U, N m, the torque u of each action, one or more.
         sampling_time: T_s, s, > 0; the torque is constant over it.
-        substeps: Runge-Kutta steps in one sampling time, 1 to 10,000. Measured against
+        substeps: Runge-Kutta steps in one sampling time, >= 1. Measured against
             DOP853 over the whole state space, one step of the default 0.1 s is off
             by at most 5e-4 rad and 6e-3 rad/s with 1 substep, 3e-5 and 4e-4 with
             2, 2e-6 and 2e-5 with 4.
@@ -47,8 +48,6 @@ class Pendulum(BlockSystem):
     """
 
     circular: ClassVar[tuple[int, ...]] = (0,)
-    state_names: ClassVar[tuple[str, ...]] = ("theta (rad)", "omega (rad/s)")
-    input_names: ClassVar[tuple[str, ...]] = ("torque (N m)",)
     block_kernels = (kernels.advance, kernels.advance_in_parallel)
 
     inertia: float = 0.005
@@ -74,9 +73,7 @@ class Pendulum(BlockSystem):
         for name in ("damping", "gravity", "torque_weight"):
             validation.number(name, getattr(self, name), at_least=0)
         validation.number("omega_max", self.omega_max, above=0)
-        validation.integer(
-            "substeps", self.substeps, at_least=1, at_most=parameters.MOST_SUBSTEPS
-        )
+        validation.integer("substeps", self.substeps, at_least=1)
         torques = validation.real_array("torques", self.torques, ndim=1)
         bounds = self._checked_bounds()
         weight = _weight_matrix(self.state_weight)
@@ -128,9 +125,13 @@ class Pendulum(BlockSystem):
         return spaces.Discrete(len(self.torques))
 
     @property
-    def inputs(self) -> FloatArray:
-        """The torque of each action, N m, `(n_actions, 1)`."""
-        return np.array(self.torques)[:, None]
+    def signals(self) -> Signals:
+        """Angle and angular velocity are observed, the torque is set."""
+        return Signals(
+            ("angle theta, rad, 0 hangs down", "angular velocity omega, rad/s"),
+            ("torque u, N m",),
+            tuple((torque,) for torque in self.torques),
+        )
 
     @property
     def max_stage_cost(self) -> float:

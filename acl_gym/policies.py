@@ -245,8 +245,7 @@ class SoftPolicy(PartitionPolicy):
         if not (levels > 0.0).all():
             raise ValueError(f"levels must all be > 0, got {levels.min():g}.")
         exponent = validation.number("exponent", exponent, above=0)
-        if seed is not None:
-            seed = validation.integer("seed", seed, at_least=0)
+        seed = validation.seed(seed)
         self.partition = partition
         self.first_action = first_action
         n_cells, n_actions = levels.shape

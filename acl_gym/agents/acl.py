@@ -424,7 +424,7 @@ class ACL(TabularAgent):
         if self.cost is not None and episodes is not None:
             costs = solution_costs(self.cost, episodes)
         deposits = self._deposit(costs, self.tau0)
-        return TrialResult(solutions, costs, deposits, rollout.success, episodes)
+        return TrialResult(solutions, costs, deposits, rollout.terminated, episodes)
 
     def _allowed(
         self, rollout: Rollout, solutions: Solutions, index: CellArray

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from acl_gym.callbacks.base import Callbacks
 from acl_gym.colony.greedy import greedy_actions
+from acl_gym.envs.control.environments import ControlVectorEnv
 from acl_gym.evaluation.rollout import Rollout
 from acl_gym.partitions import Partition, check_cells, partition_from_settings
 from acl_gym.partitions.automatic import automatic_partition
@@ -40,7 +41,8 @@ class TabularAgent(PartitionPolicy):
         partition: turns observations into cells and degrees; None takes
             `automatic_partition(env)`.
         max_steps: T, the longest an episode may last, >= 1. None takes the time limit of
-            the environment, or 300 if it has none.
+            the environment, or 300 if it has none. A given T may exceed the limit that is
+            registered with an id of this package, but no limit of another environment.
         seed: the same seed gives the same run; None draws one from the system.
 
     Attributes:
@@ -48,9 +50,12 @@ class TabularAgent(PartitionPolicy):
         trials: trials finished, k.
         seconds: wall-clock time spent learning, without callbacks.
         history: one row per trial: `trial`, `env_steps`, `seconds` (all three
-            cumulated), `ants_cost` (mean J of the ants), `ants_success_rate`,
-            `policy_variation` (§3.6.1), what the agent adds in `measures`, and,
-            where a `PolicyEvaluation` ran, `policy_cost` (3.47) and `success_rate`.
+            cumulated), `ants_cost` (mean J of the ants), `policy_variation` (§3.6.1),
+            what the agent adds in `measures`, and, where a `PolicyEvaluation` ran,
+            `policy_cost` (3.47). In environments of other packages also the undiscounted
+            `ants_return` and `policy_return`. Where success is known, in environments
+            of this package and where infos contain `is_success`, also
+            `ants_success_rate` and `success_rate`.
         in_trial: whether a trial is under way, or was interrupted by an exception; the
             table is then not that after a complete trial.
         metadata: your own notes, JSON values under string keys, empty at first; saved
@@ -229,8 +234,7 @@ class TabularAgent(PartitionPolicy):
             TypeError: `seed` is not an integer.
             ValueError: it is negative.
         """
-        if seed is not None:
-            seed = validation.integer("seed", seed, at_least=0)
+        seed = validation.seed(seed)
         self.seed = seed
         learning, predicting, ties = np.random.SeedSequence(seed).spawn(3)
         self.rng = np.random.default_rng(learning)
@@ -383,6 +387,8 @@ def time_limit(env: Any) -> int | None:
     """The time limit that an environment was made or registered with, or None."""
     base = getattr(env, "unwrapped", None)
     limit = getattr(base, "max_episode_steps", None)
+    if limit is None and isinstance(base, ControlVectorEnv):
+        return None  # it was made without the limit that its id has
     # A vector of single environments may know its limit by those only.
     for each in (env, *getattr(base, "envs", ())[:1]):
         limit = limit or getattr(getattr(each, "spec", None), "max_episode_steps", None)

@@ -12,6 +12,7 @@ from tqdm.auto import tqdm
 
 from acl_gym.agents.base import TabularAgent
 from acl_gym.callbacks.base import Callbacks, as_callbacks, is_stop
+from acl_gym.evaluation import reports_returns
 from acl_gym.utils import validation
 from acl_gym.utils.typing import Row
 
@@ -53,6 +54,10 @@ class Training:
         if total_timesteps is None and trials is None:
             trials = DEFAULT_TRIALS
         self._agent = agent
+        cost = getattr(agent, "cost", None)
+        self._reported = (
+            "return" if reports_returns(agent.rollout.env, cost) else "cost"
+        )
         self._last_step = _end(agent.num_timesteps, total_timesteps)
         self._last_trial = _end(agent.trials, trials)
         self._callbacks = as_callbacks(callback)
@@ -113,7 +118,7 @@ class Training:
             "env_steps": agent.num_timesteps,
             "seconds": agent.seconds,
             "ants_cost": float((rollout.cost if costs is None else costs).mean()),
-            "ants_success_rate": float(rollout.success.mean()),
+            **self._outcomes(),
             "policy_variation": float(np.mean(policy != self._policy)),
             **agent.measures(policy),
         }
@@ -126,11 +131,24 @@ class Training:
         self._report(row, 1 if self._bar_counts_trials else steps)
         self._clock = time.perf_counter()
 
+    def _outcomes(self) -> Row:
+        """The measures of the ants that not every environment has."""
+        rollout = self._agent.rollout
+        found: Row = {}
+        if reports_returns(rollout.env):
+            found["ants_return"] = float(-rollout.cost.mean())
+        if rollout.success is not None:
+            found["ants_success_rate"] = float(rollout.success.mean())
+        return found
+
     def _report(self, row: Row, progress: int) -> None:
         self._bar.update(progress)
-        shown = {"ants' cost": f"{row['ants_cost']:.1f}"}
-        if "policy_cost" in row:
-            shown["policy cost"] = f"{row['policy_cost']:.1f}"
+        what = self._reported
+        shown = {f"ants' {what}": f"{row[f'ants_{what}']:.1f}"}
+        for each in (what, "cost"):  # the cost too if a user's callback added only that
+            if f"policy_{each}" in row:
+                shown[f"policy {each}"] = f"{row[f'policy_{each}']:.1f}"
+                break
         self._bar.set_postfix(shown, refresh=False)
         if self._log_interval and row["trial"] % self._log_interval == 0:
             words = "  ".join(f"{name} {value}" for name, value in shown.items())

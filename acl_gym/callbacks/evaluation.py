@@ -12,7 +12,12 @@ from gymnasium.vector import VectorEnv
 from numpy.typing import NDArray
 
 from acl_gym.callbacks.base import Agent, Callback
-from acl_gym.evaluation import PolicyCost, evaluate_policy_cost, with_slots_for
+from acl_gym.evaluation import (
+    PolicyCost,
+    evaluate_policy_cost,
+    policy_measures,
+    with_slots_for,
+)
 from acl_gym.policies import TablePolicy
 from acl_gym.utils import files, validation
 from acl_gym.utils.typing import Predictor, Row
@@ -22,13 +27,15 @@ from acl_gym.utils.vector_envs import require_vector_env
 class PolicyEvaluation(Callback):
     """Evaluates the policy every few trials and keeps the best one.
 
-    Adds `policy_cost` (eq. (3.47)) and `success_rate` to the trial's row. If the agent
-    has an episode cost of its own (`agent.cost`), that is the cost evaluated.
+    Adds `policy_cost` (eq. (3.47)) to the trial's row, `policy_return` in environments
+    of other packages, and `success_rate` where success is known. If the agent has an
+    episode cost of its own (`agent.cost`), that is the cost evaluated.
     Evaluation draws no numbers from the agent's generator and its time is not counted,
     so that learning is the same with it as without it.
 
     Args:
-        env: where to evaluate, see `evaluate_policy_cost`.
+        env: where to evaluate, see `evaluate_policy_cost`. An unwrapped environment of
+            this package is copied at the first evaluation and left alone.
         states: initial states, `(n, state_size)`; None takes those of the environment.
         every: trials between evaluations, >= 1; the last trial is always evaluated.
         max_steps: T of the evaluation; None takes that of the environment.
@@ -42,7 +49,8 @@ class PolicyEvaluation(Callback):
             learning replaces it only by a policy better than all in its `history`.
 
     Attributes:
-        best: the evaluation with the lowest cost so far.
+        best: the evaluation with the lowest cost so far; without `agent.cost` it is also
+            the one with the highest return.
         best_policy: the policy of that evaluation; further learning does not change
             it.
 
@@ -63,8 +71,7 @@ class PolicyEvaluation(Callback):
         save_best: str | Path | None = None,
     ) -> None:
         require_vector_env(env)
-        if seed is not None:
-            seed = validation.integer("seed", seed, at_least=0)
+        seed = validation.seed(seed)
         if policy is not None and not callable(policy):
             raise TypeError(
                 "policy must be a function of the agent that returns what to evaluate, "
@@ -120,8 +127,7 @@ class PolicyEvaluation(Callback):
             seed=self.seed,
             cost=getattr(agent, "cost", None),
         )
-        row["policy_cost"] = result.cost
-        row["success_rate"] = result.success_rate
+        row.update(policy_measures(result, self._env))
         if self.best is None or result.cost < self.best.cost:
             self.best = result
             self.best_policy = (
@@ -132,6 +138,10 @@ class PolicyEvaluation(Callback):
             self._saved_cost = result.cost
 
 
+_HIGHER_IS_BETTER = ("_return", "success_rate")
+"""Ends of the names of measures that are good where they are high."""
+
+
 class EarlyStop(Callback):
     """Stops when a measure has not improved for some time, or is good enough.
 
@@ -140,13 +150,14 @@ class EarlyStop(Callback):
 
     Args:
         patience: stop after this many such trials in a row without improvement, >= 1.
-        measure: a key of the rows of `history`; lower is better.
-        min_improvement: a value counts as an improvement only if it is lower than the
+        measure: a key of the rows of `history`; lower is better, except for
+            `policy_return`, `ants_return`, `success_rate` and `ants_success_rate`.
+        min_improvement: a value counts as an improvement only if it is better than the
             best so far by more than this, >= 0.
-        threshold: also stop once the measure is at most this; None sets no threshold.
+        threshold: also stop once the measure is this good; None sets no threshold.
 
     Attributes:
-        best: the lowest value so far, infinite before the first.
+        best: the best value so far, infinite before the first.
         waited: trials with the measure since the best one.
 
     Raises:
@@ -169,6 +180,7 @@ class EarlyStop(Callback):
         if not isinstance(measure, str):
             raise TypeError(f"measure must be the name of a measure, got {measure!r}.")
         self.measure = measure
+        self._sign = -1.0 if measure.endswith(_HIGHER_IS_BETTER) else 1.0
         self.min_improvement = validation.number(
             "min_improvement", min_improvement, at_least=0
         )
@@ -190,9 +202,10 @@ class EarlyStop(Callback):
             return True
         self._seen = True
         self.waited += 1
-        if value < self.best - self.min_improvement:
+        sign = self._sign
+        if sign * value < sign * self.best - self.min_improvement:
             self.best, self.waited = value, 0
-        reached = self.threshold is not None and value <= self.threshold
+        reached = self.threshold is not None and sign * value <= sign * self.threshold
         return not reached and self.waited < self.patience
 
     def on_training_end(self, agent: Agent) -> None:
@@ -210,7 +223,7 @@ class EarlyStop(Callback):
     def _begin(self, first: int) -> None:
         self._first = first
         self._seen = False
-        self.best = math.inf
+        self.best = self._sign * math.inf
         self.waited = 0
 
     def _check_order(self, rows: list[Row]) -> None:

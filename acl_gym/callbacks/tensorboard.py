@@ -14,6 +14,8 @@ from acl_gym.utils.typing import Row
 _TAGS = {
     "ants_cost": "cost/ants",
     "policy_cost": "cost/policy",
+    "ants_return": "return/ants",
+    "policy_return": "return/policy",
     "ants_success_rate": "success/ants",
     "success_rate": "success/policy",
     "policy_variation": "policy/variation",
@@ -26,8 +28,8 @@ _TAGS = {
 class TensorBoardLog(Callback):
     """Writes the measures of each trial as scalars over environment steps.
 
-    View them with `tensorboard --logdir DIRECTORY`. Tags are `cost/policy`,
-    `cost/ants`, `success/policy` and so on, and `other/NAME` for measures of your own.
+    View them with `tensorboard --logdir DIRECTORY`. Tags are `cost/policy`, `cost/ants`,
+    `return/policy`, `success/policy` and so on, and `other/NAME` for measures of your own.
     When a loaded agent continues learning, scalars of later steps from an earlier run
     are hidden. Place it after the callbacks that add measures.
 

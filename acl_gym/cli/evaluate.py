@@ -131,6 +131,7 @@ def figures(result: PolicyCost) -> dict[str, Any]:
     """The printed results of an evaluation, JSON types only."""
     return {
         "policy_cost": result.cost,
+        "mean_return": result.mean_return,
         "success_rate": result.success_rate,
         "mean_length": float(result.lengths.mean()),
         "cost_min": float(result.costs.min()),
@@ -165,7 +166,9 @@ def _print(settings: dict[str, Any], found: dict[str, Any]) -> None:
     table.add_column(style="bold")
     table.add_column(justify="right")
     table.add_row("policy cost", f"{found['policy_cost']:.4f}")
-    table.add_row("success", f"{found['success_rate']:.1%}")
+    table.add_row("mean return", f"{found['mean_return']:.4f}")
+    if found["success_rate"] is not None:
+        table.add_row("success", f"{found['success_rate']:.1%}")
     table.add_row("mean length", f"{found['mean_length']:.1f}")
     for name in ("min", "median", "max"):
         table.add_row(f"cost, {name}", f"{found[f'cost_{name}']:.4f}")

@@ -283,7 +283,8 @@ def _summary(learner: TabularAgent, name: str, ants: int, out: Path) -> dict[str
         "env_steps": learner.num_timesteps,
         "seconds": learner.seconds,
         "policy_cost": last["policy_cost"],
-        "success_rate": last["success_rate"],
+        "policy_return": last.get("policy_return"),
+        "success_rate": last.get("success_rate"),
         "file": str(out),
         "rows": learner.history,
     }
@@ -292,8 +293,12 @@ def _summary(learner: TabularAgent, name: str, ants: int, out: Path) -> dict[str
 def _print_rows(learner: TabularAgent, out: Path) -> None:
     from rich.table import Table
 
+    from acl_gym.evaluation import reports_returns
+
     table = Table(box=None, pad_edge=False, header_style="bold")
-    heads = ("trial", "steps", "seconds", "ants' cost", "policy cost", "success")
+    cost = getattr(learner, "cost", None)
+    what = "return" if reports_returns(learner.rollout.env, cost) else "cost"
+    heads = ("trial", "steps", "seconds", f"ants' {what}", f"policy {what}", "success")
     for head in heads:
         table.add_column(head, justify="right")
     for row in learner.history:
@@ -302,9 +307,9 @@ def _print_rows(learner: TabularAgent, out: Path) -> None:
                 f"{row['trial']}",
                 f"{row['env_steps']:,}",
                 f"{row['seconds']:.2f}",
-                f"{row['ants_cost']:.2f}",
-                f"{row['policy_cost']:.4f}",
-                f"{row['success_rate']:.1%}",
+                f"{row[f'ants_{what}']:.2f}",
+                f"{row[f'policy_{what}']:.4f}",
+                f"{row['success_rate']:.1%}" if "success_rate" in row else "",
             )
     target = console()
     target.print(table)

@@ -25,7 +25,7 @@ class TrialResult:
         solutions: S_trial, the cells, degrees and actions of every ant.
         costs: J of each ant, `(n_ants,)`.
         deposits: what each ant deposits, `(n_ants,)`, in the thesis 1 / J.
-        success: whether each ant ended in a terminal state, `(n_ants,)`.
+        terminated: whether each ant ended in a terminal state, `(n_ants,)`.
         episodes: observations, actions and stage costs, step by step; None unless
             the rule's `needs_episodes` is True.
     """
@@ -33,7 +33,7 @@ class TrialResult:
     solutions: Solutions
     costs: FloatArray
     deposits: FloatArray
-    success: BoolArray
+    terminated: BoolArray
     episodes: Episodes | None = None
 
 

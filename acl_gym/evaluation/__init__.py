@@ -6,7 +6,9 @@ from acl_gym.evaluation.policy_cost import (
     actions_in,
     control_env,
     evaluate_policy_cost,
+    policy_measures,
     record_trajectory,
+    reports_returns,
     require_predictor,
     with_slots_for,
 )
@@ -19,7 +21,9 @@ __all__ = [
     "actions_in",
     "control_env",
     "evaluate_policy_cost",
+    "policy_measures",
     "record_trajectory",
+    "reports_returns",
     "require_predictor",
     "with_slots_for",
 ]

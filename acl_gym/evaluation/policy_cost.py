@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
+from weakref import WeakSet
 
 import numpy as np
 from gymnasium.vector import VectorEnv
@@ -13,9 +14,10 @@ from numpy.typing import NDArray
 from acl_gym.colony.costs import Cost, as_cost, solution_costs
 from acl_gym.colony.episodes import Episode
 from acl_gym.envs.control.environments import ControlVectorEnv
+from acl_gym.envs.control.single import ControlEnv
 from acl_gym.evaluation.rollout import Rollout
 from acl_gym.policies import PartitionPolicy
-from acl_gym.utils.typing import FloatArray, Predictor
+from acl_gym.utils.typing import FloatArray, Predictor, Row
 from acl_gym.utils.vector_envs import require_vector_env
 
 
@@ -25,13 +27,17 @@ class PolicyCost:
 
     Attributes:
         costs: J of each episode, `(n,)`.
-        success: whether each episode ended in a terminal state, `(n,)`.
+        success: whether each episode was a success, `(n,)`: in environments of this
+            package whether it reached the goal, in others what `info["is_success"]` said
+            at its end. None if nothing says what success is.
         lengths: steps of each episode, `(n,)`.
+        returns: the sum of the rewards of each episode, undiscounted, `(n,)`.
     """
 
     costs: FloatArray
-    success: NDArray[np.bool_]
+    success: NDArray[np.bool_] | None
     lengths: NDArray[np.int64]
+    returns: FloatArray
 
     @property
     def cost(self) -> float:
@@ -39,9 +45,14 @@ class PolicyCost:
         return float(self.costs.mean())
 
     @property
-    def success_rate(self) -> float:
-        """The fraction of episodes that ended in a terminal state."""
-        return float(self.success.mean())
+    def success_rate(self) -> float | None:
+        """The fraction of episodes that were a success; None if that is not known."""
+        return None if self.success is None else float(self.success.mean())
+
+    @property
+    def mean_return(self) -> float:
+        """The mean return over the initial states; -J^h unless `cost=` was given."""
+        return float(self.returns.mean())
 
 
 @dataclass(frozen=True)
@@ -52,7 +63,7 @@ class Trajectory:
         states: x(0) .. x(n), `(n + 1, state_size)`.
         actions: u(0) .. u(n - 1) as indices, `(n,)`.
         costs: stage costs of the steps, `(n,)`.
-        success: whether it ended in a terminal state.
+        success: whether it reached the goal.
     """
 
     states: FloatArray
@@ -74,22 +85,26 @@ def evaluate_policy_cost(
 
     Args:
         model: an agent or policy with `predict(observation, deterministic=True)`.
-        env: where to run it. An unwrapped environment of this package is copied with
-            one slot per state; any other must have that many slots already.
+        env: where to run it. An unwrapped environment of this package is left alone: a
+            copy with one slot per state is run. Any other must have that many slots
+            already; it is run itself, and left as after a reset.
         states: initial states `(n, ...)`. None takes `evaluation_states()` of an
             environment of this package, and random states of any other.
         max_steps: T, >= 1. None takes the environment's `evaluation_steps`, 300 for
-            an environment of another package.
-        seed: of the environment's random numbers; None continues its stream.
+            an environment of another package. A limit that `env` was made with holds
+            too if it is less, one that was only registered with its id does not.
+        seed: of the environment's random numbers, >= 0; None continues its stream (a
+            copy of it, where a copy is run).
         cost: the cost of an episode, see `acl_gym.colony.costs`; None takes the sum
             of its stage costs.
 
     Returns:
-        Costs, successes and lengths, one per state.
+        Costs, successes, lengths and returns, one per state.
 
     Raises:
-        TypeError: `model` has no `predict`, or `env` is not a vector environment.
-        ValueError: `env` is wrapped and has not one slot per state, or is of another
+        TypeError: `model` has no `predict`, `env` is not a vector environment, or `seed`
+            is not an integer.
+        ValueError: `seed` is negative, `env` is wrapped and has not one slot per state, or is of another
             package and `states` are given.
     """
     require_predictor(model)
@@ -124,16 +139,17 @@ def evaluate_policy_cost(
     costs = rollout.cost
     if episode_cost is not None:
         costs = solution_costs(episode_cost, rollout.episodes())
-    return PolicyCost(costs, rollout.success, rollout.length)
+    rollout.release()
+    return PolicyCost(costs, rollout.success, rollout.length, -rollout.cost)
 
 
 def with_slots_for(
     env: VectorEnv[Any, Any, Any], states: FloatArray | None = None
 ) -> VectorEnv[Any, Any, Any]:
-    """An environment that has one slot per initial state of an evaluation.
+    """An environment for evaluations, with one slot per initial state.
 
     To evaluate often, call this once and pass the result to `evaluate_policy_cost`
-    each time.
+    each time: it is not copied again.
 
     Args:
         env: where to evaluate.
@@ -141,15 +157,67 @@ def with_slots_for(
             this package.
 
     Returns:
-        A new environment of the same system; or `env` itself if it has the right
-        number of slots already, is wrapped, or is of another package.
+        A new environment of the same system, whose random numbers continue a copy of
+        the stream of `env`; or `env` itself if it is wrapped or of another package, or
+        is such a new environment with the right number of slots.
     """
     base = env.unwrapped
     if base is not env or not isinstance(base, ControlVectorEnv):
         return env
     if states is None:
         states = base.system.evaluation_states()
-    return env if env.num_envs == len(states) else base.with_slots(len(states))
+    if base in _OWN and base.num_envs == len(states):
+        return base
+    copied = base.with_slots(len(states))
+    _OWN.add(copied)
+    return copied
+
+
+_OWN: WeakSet[ControlVectorEnv] = WeakSet()
+"""Environments that were made for evaluations, so that nobody else steps them."""
+
+
+def reports_returns(
+    env: VectorEnv[Any, Any, Any], cost: Cost | Callable[[Episode], float] | None = None
+) -> bool:
+    """Whether results in an environment are to be reported as returns, not as costs.
+
+    They are costs where rewards are negative stage costs by design, in the environments
+    of this package, and where a user has said what an episode costs.
+
+    Args:
+        env: any vector environment.
+        cost: the cost of an episode, if one was given.
+    """
+    return cost is None and not _is_own(env)
+
+
+def policy_measures(result: PolicyCost, env: VectorEnv[Any, Any, Any]) -> Row:
+    """The columns of a history that an evaluation adds.
+
+    Args:
+        result: of the evaluation.
+        env: where it took place.
+
+    Returns:
+        `policy_cost`; `policy_return` in environments of other packages, the mean
+        undiscounted return; `success_rate` where success is known.
+    """
+    row: Row = {"policy_cost": result.cost}
+    if reports_returns(env):
+        row["policy_return"] = result.mean_return
+    if result.success_rate is not None:
+        row["success_rate"] = result.success_rate
+    return row
+
+
+def _is_own(env: VectorEnv[Any, Any, Any]) -> bool:
+    """Whether an environment of this package is at the bottom, in either form."""
+    base = env.unwrapped
+    singles = getattr(base, "envs", None) or ()
+    return isinstance(base, ControlVectorEnv) or any(
+        isinstance(each.unwrapped, ControlEnv) for each in singles[:1]
+    )
 
 
 def _chosen(
@@ -178,7 +246,8 @@ def record_trajectory(
 
     Args:
         model: see `evaluate_policy_cost`.
-        env: an environment of this package with one slot, wrapped or not.
+        env: an environment of this package with one slot, wrapped or not. One that is
+            not wrapped is left alone, a wrapped one is left as after a reset.
         state: the initial state, `(state_size,)`.
         max_steps: T; None takes that of the environment.
 
@@ -190,10 +259,13 @@ def record_trajectory(
     base = control_env(env)
     if env.num_envs != 1:
         raise ValueError(f"env must have one slot, got {env.num_envs}.")
+    states_of_one = np.asarray(state)[None]
+    env = with_slots_for(env, states_of_one)
+    base = control_env(env)
     rollout = Rollout(
         env, base.system.evaluation_steps if max_steps is None else max_steps
     )
-    observation = rollout.start(states=np.asarray(state)[None])
+    observation = rollout.start(states=states_of_one)
     states, actions, costs = [base.states[0]], [], []
     memory = None
     while rollout.ants.size:
@@ -203,8 +275,12 @@ def record_trajectory(
         states.append(base.states[0])
         actions.append(int(action[0]))
         costs.append(float(step.cost[0]))
+    rollout.release()
     return Trajectory(
-        np.array(states), np.array(actions), np.array(costs), bool(rollout.success[0])
+        np.array(states),
+        np.array(actions),
+        np.array(costs),
+        bool(rollout.terminated[0]),
     )
 
 
@@ -215,7 +291,8 @@ def actions_in(
 
     Args:
         model: see `evaluate_policy_cost`.
-        env: an environment of this package with one slot per state, wrapped or not.
+        env: an environment of this package with one slot per state, wrapped or not. One
+            that is not wrapped is left alone, a wrapped one is left as after a reset.
         states: `(n, state_size)`.
 
     Raises:
@@ -223,6 +300,7 @@ def actions_in(
     """
     require_predictor(model)
     control_env(env)
+    env = with_slots_for(env, states)
     observation, _ = env.reset(options={"state": states})
     if isinstance(model, PartitionPolicy):
         return model.predict(observation, None, np.ones(len(observation), np.bool_))[0]

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from acl_gym.colony.episodes import Episodes
 from acl_gym.envs.control.environments import ControlVectorEnv
+from acl_gym.envs.wrappers.partial_reset import reset_slots
 from acl_gym.envs.wrappers.waiting import WaitingVectorEnv
 from acl_gym.utils import validation
 from acl_gym.utils.typing import BoolArray, FloatArray, IntArray
@@ -71,7 +72,7 @@ class Rollout:
         ants: the slots that are still walking.
         cost: J of each slot so far, the sum of its stage costs.
         length: steps of each slot so far.
-        success: whether the episode of each slot has ended in a terminal state.
+        terminated: whether the episode of each slot has ended in a terminal state.
         action_mask: which actions each slot may take now, `(num_envs, n_actions)`, the
             set U_q of the selection rule (3.4). None if the environment gives no
             `infos["action_mask"]`.
@@ -102,6 +103,7 @@ class Rollout:
         self._all = np.arange(env.num_envs)
         self._stale: BoolArray | None = None  # slots to reset before the next step
         self.action_mask: BoolArray | None = None
+        self._reported_success: BoolArray | None = None
 
     def start(
         self,
@@ -112,7 +114,7 @@ class Rollout:
         """Begin an episode in every slot.
 
         Args:
-            seed: seeds the environment; None continues its stream.
+            seed: seeds the environment, >= 0; None continues its stream.
             states: initial states `(num_envs, ...)`, for environments that take
                 `options["state"]`; None draws them.
             record: keep every step for `episodes`.
@@ -122,16 +124,19 @@ class Rollout:
         """
         options: dict[str, Any] = {}
         if self._asks_to_wait:
-            options["finished"] = "wait"
+            options |= {"finished": "wait", "max_steps": self.max_steps}
         if states is not None:
             options["state"] = states
-        observation, infos = self.env.reset(seed=seed, options=options or None)
+        observation, infos = self.env.reset(
+            seed=validation.seed(seed), options=options or None
+        )
         n = self.env.num_envs
         self._read_mask(infos)
         self.ants = self._all
         self.cost = np.zeros(n)
         self.length = np.zeros(n, dtype=np.int64)
-        self.success = np.zeros(n, dtype=np.bool_)
+        self.terminated = np.zeros(n, dtype=np.bool_)
+        self._reported_success = None
         self.steps = 0
         self._stale = None
         observation = np.asarray(observation)
@@ -152,7 +157,7 @@ class Rollout:
         """
         ants = self.ants
         if self._stale is not None:
-            self.env.reset(options={"reset_mask": self._stale})
+            reset_slots(self.env, self._stale)
             self._stale = None
         _spread(ants, actions, self.first_action, self._actions)
         # A copy, because an environment or a wrapper may keep its actions.
@@ -173,7 +178,7 @@ class Rollout:
             np.asarray(truncated, dtype=np.bool_),
             self.cost,
             self.length,
-            self.success,
+            self.terminated,
             cost,
             reached,
             stopped,
@@ -184,6 +189,8 @@ class Rollout:
                 f"rewards must be finite, got {reward[bad]} in slot {bad}; check the "
                 "environment's reward function."
             )
+        if not self._asks_to_wait:
+            self._note_success(infos, ants)
         if self._mode is AutoresetMode.DISABLED and not self._waits:
             # Idle slots that finish another episode are reset with the others.
             done = np.logical_or(terminated, truncated)
@@ -215,8 +222,27 @@ class Rollout:
             np.stack(record.actions),
             np.stack(record.costs),
             self.length,
-            self.success,
+            self.terminated,
         )
+
+    @property
+    def success(self) -> BoolArray | None:
+        """Whether each slot's episode has been a success so far, `(num_envs,)`.
+
+        In environments of this package: whether it has reached the goal. In others: what
+        `infos["is_success"]` said last; None if it was never there, as then nothing is
+        known of success.
+        """
+        return self.terminated if self._asks_to_wait else self._reported_success
+
+    def release(self) -> None:
+        """Leave the environment as after a reset.
+
+        Without this, slots that have finished would stand still for ever, or could not
+        be stepped. Environments that reset their slots themselves are left as they are.
+        """
+        if self._waits or self._mode is AutoresetMode.DISABLED:
+            self.env.reset()
 
     def allowed(self) -> BoolArray | None:
         """The actions that each walking ant may take, `(m, n_actions)`; None: all.
@@ -234,6 +260,19 @@ class Rollout:
                 "check the environment's action_mask."
             )
         return allowed
+
+    def _note_success(self, infos: dict[str, Any], ants: IntArray) -> None:
+        """Take over what the infos of a step say of the ants that took it."""
+        # Where slots are reset in the same step, the infos of their ends come last.
+        for part in (infos, infos.get("final_info")) if infos else ():
+            told = None if part is None else part.get("is_success")
+            if part is None or told is None:
+                continue
+            if self._reported_success is None:
+                self._reported_success = np.zeros(self.env.num_envs, dtype=np.bool_)
+            given = np.asarray(part.get("_is_success", True), dtype=np.bool_)
+            noted = ants[np.broadcast_to(given, self._reported_success.shape)[ants]]
+            self._reported_success[noted] = np.asarray(told)[noted] != 0
 
     def _read_mask(self, infos: dict[str, Any]) -> None:
         mask = infos.get("action_mask") if infos else None
@@ -284,7 +323,7 @@ def _account(
     truncated: BoolArray,
     total_cost: FloatArray,
     length: IntArray,
-    success: BoolArray,
+    ended: BoolArray,
     cost: FloatArray,
     reached: BoolArray,
     stopped: BoolArray,
@@ -299,7 +338,7 @@ def _account(
         truncated: of all slots.
         total_cost: J so far of all slots, updated.
         length: steps so far of all slots, updated.
-        success: whether each slot has ended in a terminal state, updated.
+        ended: whether each slot has ended in a terminal state, updated.
         cost: receives the stage cost of each walking ant, `(m,)`.
         reached: receives whether it is in a terminal state, `(m,)`.
         stopped: receives whether its episode has ended in any way, `(m,)`.
@@ -316,7 +355,7 @@ def _account(
         cost[j] = -reward[ant]
         total_cost[ant] += cost[j]
         length[ant] += 1
-        success[ant] |= terminated[ant]
+        ended[ant] |= terminated[ant]
         reached[j] = terminated[ant]
         stopped[j] = terminated[ant] | truncated[ant]
         left[n_left] = ants[j]

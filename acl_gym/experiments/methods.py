@@ -17,7 +17,7 @@ from acl_gym.agents.base import TabularAgent
 from acl_gym.agents.q_learning import QLearning
 from acl_gym.callbacks.base import Callback
 from acl_gym.envs.wrappers.perturbations import ReversedDraws, ReversedSlots
-from acl_gym.evaluation import Predictor, evaluate_policy_cost
+from acl_gym.evaluation import Predictor, evaluate_policy_cost, policy_measures
 from acl_gym.experiments.episode_costs import EPISODE_COSTS
 from acl_gym.experiments.results import Run
 from acl_gym.experiments.study import Study
@@ -105,8 +105,7 @@ class Evaluation(Callback):
         self.rows.append(
             {
                 **row,
-                "policy_cost": result.cost,
-                "success_rate": result.success_rate,
+                **policy_measures(result, self._env),
                 **{name: float(level) for name, level in levels.items()},
             }
         )
@@ -232,8 +231,7 @@ def _plan(study: Study, seed: int) -> Run:
     row = {
         "env_steps": 0.0,
         "seconds": seconds,
-        "policy_cost": best.cost,
-        "success_rate": best.success_rate,
+        **policy_measures(best, env),
         "discount": discount,
     }
     rows = pd.DataFrame([row], dtype=np.float64)

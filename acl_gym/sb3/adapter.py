@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import time
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
 import gymnasium as gym
 import numpy as np
-from gymnasium import spaces
 from gymnasium.vector import (
-    AsyncVectorEnv,
     AutoresetMode,
-    SyncVectorEnv,
     VectorEnv,
     VectorWrapper,
 )
@@ -23,18 +21,16 @@ from stable_baselines3.common.vec_env.base_vec_env import (
     VecEnvStepReturn,
 )
 
-from acl_gym.envs.control.environments import ControlVectorEnv
+from acl_gym.envs.wrappers.partial_reset import reset_slots
+from acl_gym.sb3.checks import (
+    check_action_space,
+    check_observation_space,
+    settle_mode,
+)
 from acl_gym.sb3.slots import SlotEnvs, slot_envs
 from acl_gym.utils.vector_envs import require_vector_env
 
-_SUPPORTED_MODES = (AutoresetMode.DISABLED, AutoresetMode.SAME_STEP)
 _FINAL_KEYS = ("final_obs", "_final_obs", "final_info", "_final_info")
-_ARRAY_SPACES = (
-    spaces.Box,
-    spaces.Discrete,
-    spaces.MultiDiscrete,
-    spaces.MultiBinary,
-)
 
 
 class VectorEnvAdapter(VecEnv):
@@ -46,7 +42,11 @@ class VectorEnvAdapter(VecEnv):
     with `reset(options={"reset_mask": ...})`; with SAME_STEP it takes the last
     observations from `infos["final_obs"]`.
 
-    Wrap it in a `VecMonitor` to log the returns of the episodes.
+    The info of a slot whose episode has ended has `"episode"`, its return `r`, length `l`
+    and time `t`, from which agents log `rollout/ep_rew_mean` and `ep_len_mean`, as with a
+    `Monitor`; and `"is_success"` if the environment gives it, for `rollout/success_rate`
+    and `EvalCallback`. A `VecMonitor` is needed for a log file only, and for
+    `evaluate_policy` not to warn that there is none.
 
     Args:
         env: a vector environment whose autoreset mode is DISABLED (preferred, because
@@ -77,12 +77,15 @@ class VectorEnvAdapter(VecEnv):
 
     def __init__(self, env: VectorEnv[Any, Any, Any]) -> None:
         require_vector_env(env)
-        _check_observation_space(env.single_observation_space)
-        _check_action_space(env.single_action_space)
+        check_observation_space(env.single_observation_space)
+        check_action_space(env.single_action_space)
         self.env = env
-        self._resets_itself = _settle_mode(env) is AutoresetMode.SAME_STEP
+        self._resets_itself = settle_mode(env) is AutoresetMode.SAME_STEP
         self._slot_envs = slot_envs(env)
         self._actions: NDArray[Any] | None = None
+        self._returns = np.zeros(env.num_envs)
+        self._lengths = np.zeros(env.num_envs, dtype=np.int64)
+        self._began = time.time()
         super().__init__(
             env.num_envs, env.single_observation_space, env.single_action_space
         )
@@ -106,6 +109,8 @@ class VectorEnvAdapter(VecEnv):
         self._reset_seeds()
         self._reset_options()
         self._actions = None
+        self._returns[:] = 0.0
+        self._lengths[:] = 0
         return _copy(observations)
 
     def set_options(
@@ -134,7 +139,7 @@ class VectorEnvAdapter(VecEnv):
         Returns:
             `(observations, rewards, dones, infos)`, the rewards as float32. Every
             info has `TimeLimit.truncated`; that of a slot that has finished also has
-            `terminal_observation`.
+            `terminal_observation` and `episode`.
 
         Raises:
             RuntimeError: `step_async` has not been called.
@@ -160,14 +165,33 @@ class VectorEnvAdapter(VecEnv):
         elif slots:
             for slot in slots:
                 rows[slot]["terminal_observation"] = _row(observations, slot)
-            # Some environments remove the mask from the dict, so make a new dict.
-            observations, infos = self.env.reset(options={"reset_mask": dones.copy()})
+            observations, infos = reset_slots(self.env, dones)
             first = _infos_per_slot(infos, self.num_envs)
             for slot in slots:
                 self.reset_infos[slot] = first[slot]
         for slot, cut in enumerate(np.greater(truncated, terminated).tolist()):
             rows[slot]["TimeLimit.truncated"] = cut
+        self._count(rewards, slots, rows)
         return _copy(observations), np.array(rewards, dtype=np.float32), dones, rows
+
+    def _count(
+        self, rewards: Any, slots: Iterable[int], rows: list[dict[str, Any]]
+    ) -> None:
+        """Add up rewards and steps; add those of the episodes that have ended."""
+        self._returns += rewards
+        self._lengths += 1
+        for slot in slots:
+            # What a wrapper has counted, such as RecordEpisodeStatistics, stays.
+            rows[slot].setdefault(
+                "episode",
+                {
+                    "r": float(self._returns[slot]),
+                    "l": int(self._lengths[slot]),
+                    "t": round(time.time() - self._began, 6),
+                },
+            )
+            self._returns[slot] = 0.0
+            self._lengths[slot] = 0
 
     def close(self) -> None:
         """Close the environment; calling it again is harmless."""
@@ -303,74 +327,6 @@ class VectorEnvAdapter(VecEnv):
                 f"{name!r} is shared by all {self.num_envs} slots, got indices "
                 f"{list(slots)}; leave indices out."
             )
-
-
-def _settle_mode(env: VectorEnv[Any, Any, Any]) -> AutoresetMode:
-    """The autoreset mode of `env`; an environment of this package is given one that fits.
-
-    Raises:
-        ValueError: a `VecEnv` does not support the mode, and it cannot be changed.
-    """
-    mode = AutoresetMode(env.metadata.get("autoreset_mode", AutoresetMode.NEXT_STEP))
-    if mode in _SUPPORTED_MODES:
-        return mode
-    # Not below wrappers, which may have read the mode already.
-    if isinstance(env, ControlVectorEnv):
-        env.set_autoreset_mode(AutoresetMode.DISABLED)
-        return AutoresetMode.DISABLED
-    raise ValueError(
-        f"env must have autoreset mode DISABLED or SAME_STEP, got {mode.name}, which "
-        "inserts a meaningless step between two episodes; make it with "
-        f"{_with_autoreset_disabled(env)}{'' if env.unwrapped is env else ', then wrap'}."
-    )
-
-
-def _with_autoreset_disabled(env: VectorEnv[Any, Any, Any]) -> str:
-    """The line of code that makes what `env` wraps, with autoreset disabled."""
-    base = env.unwrapped
-    mode, count = '"Disabled"', env.num_envs
-    env_id = "id" if base.spec is None else f'"{base.spec.id}"'
-    if isinstance(base, ControlVectorEnv):
-        return f"gym.make_vec({env_id}, num_envs={count}, autoreset_mode={mode})"
-    if isinstance(base, (SyncVectorEnv, AsyncVectorEnv)) and base.spec is None:
-        return f"{type(base).__name__}(env_fns, autoreset_mode={mode})"
-    how = "async" if isinstance(base, AsyncVectorEnv) else "sync"
-    return (
-        f'gym.make_vec({env_id}, num_envs={count}, vectorization_mode="{how}", '
-        f'vector_kwargs={{"autoreset_mode": {mode}}})'
-    )
-
-
-def _check_action_space(space: spaces.Space[Any]) -> None:
-    """Refuse what cannot be an array with one row for each slot."""
-    if not isinstance(space, _ARRAY_SPACES):
-        raise ValueError(
-            "actions must be a Box, Discrete, MultiDiscrete or MultiBinary, since a "
-            f"VecEnv takes them as one array with a row for each slot, got {space}; "
-            "rearrange them in each single environment with gymnasium's "
-            "TransformAction."
-        )
-    _check_start("actions", space)
-
-
-def _check_observation_space(space: spaces.Space[Any]) -> None:
-    parts = space.spaces.values() if isinstance(space, spaces.Dict) else [space]
-    for part in parts:
-        if not isinstance(part, _ARRAY_SPACES):
-            raise ValueError(
-                "observations must be a Box, Discrete, MultiDiscrete, MultiBinary or "
-                f"a Dict of those, got {part}; use gymnasium's FlattenObservation."
-            )
-        _check_start("observations", part)
-
-
-def _check_start(what: str, space: spaces.Space[Any]) -> None:
-    """Stable-Baselines3 assumes that discrete values start from 0."""
-    if np.any(getattr(space, "start", 0)):
-        raise ValueError(
-            f"{what} must start from 0, got {space}; shift them with gymnasium's "
-            f"{'TransformAction' if what == 'actions' else 'TransformObservation'}."
-        )
 
 
 def _infos_per_slot(infos: dict[str, Any], count: int) -> list[dict[str, Any]]:

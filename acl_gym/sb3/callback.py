@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from stable_baselines3.common.callbacks import BaseCallback
 from torch import Tensor
 
-from acl_gym.evaluation import PolicyCost, evaluate_policy_cost
+from acl_gym.evaluation import PolicyCost, evaluate_policy_cost, policy_measures
 from acl_gym.utils import validation
 from acl_gym.utils.typing import Row
 
@@ -35,8 +35,10 @@ class PolicyCostCallback(BaseCallback):
 
     Attributes:
         history: one row per evaluation: `env_steps`, `seconds` (spent in `learn`,
-            without the evaluations), `policy_cost` (eq. (3.47)) and `success_rate`.
-        best: the evaluation with the lowest cost so far.
+            without the evaluations) and `policy_cost` (eq. (3.47)); `policy_return` in
+            environments of other packages; `success_rate` where success is known, see
+            `PolicyCost`.
+        best: the evaluation with the lowest cost, which is the highest return, so far.
         best_parameters: the parameters of that policy, for `restore_best`.
     """
 
@@ -54,9 +56,7 @@ class PolicyCostCallback(BaseCallback):
         self.states = states
         self.every = validation.integer("every", every, at_least=1)
         self.max_steps = max_steps
-        if seed is not None:
-            seed = validation.integer("seed", seed, at_least=0)
-        self.seed = seed
+        self.seed = validation.seed(seed)
         self.history: list[Row] = []
         self.best: PolicyCost | None = None
         self.best_parameters: dict[str, Tensor] | None = None
@@ -111,8 +111,7 @@ class PolicyCostCallback(BaseCallback):
             {
                 "env_steps": self.num_timesteps,
                 "seconds": self._seconds,
-                "policy_cost": result.cost,
-                "success_rate": result.success_rate,
+                **policy_measures(result, self.env),
             }
         )
         if self.best is None or result.cost < self.best.cost:

@@ -105,6 +105,16 @@ def integer(name: str, value: Any, *, at_least: int) -> int:
     return int(value)
 
 
+def seed(value: Any, name: str = "seed") -> int | None:
+    """Return a seed as an int, Python's or NumPy's; None stays None.
+
+    Raises:
+        TypeError: it is not an integer.
+        ValueError: it is negative.
+    """
+    return None if value is None else integer(name, value, at_least=0)
+
+
 def real_array(
     name: str,
     values: Any,

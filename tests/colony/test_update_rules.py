@@ -199,7 +199,7 @@ class Counting(UpdateRule):
         assert episodes is not None
         costs = np.where(episodes.taken(), episodes.stage_costs, 0.0).sum(axis=0)
         np.testing.assert_allclose(costs, result.costs)
-        np.testing.assert_array_equal(episodes.success, result.success)
+        np.testing.assert_array_equal(episodes.terminated, result.terminated)
         np.testing.assert_array_equal(result.deposits, 1.0 / result.costs)
         self.log.append((gamma, rho))
         self.total += float(result.costs.sum())

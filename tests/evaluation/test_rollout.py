@@ -73,7 +73,7 @@ def test_every_mode_gives_plain_episodes(
             )
             assert rollout.cost[slot] == cost
             assert rollout.length[slot] == length
-            assert rollout.success[slot] == reached
+            assert rollout.terminated[slot] == reached
             assert last[slot] == observation
             assert [slot in ants for ants in walkers] == [
                 t < length for t in range(len(walkers))
@@ -84,8 +84,8 @@ def test_there_are_episodes_of_each_kind() -> None:
     """What the test above rests on: goals, limits and time-outs all happen in it."""
     rollout = Rollout(chains(50, slip=0.3, limit=8), 20)
     walk_through(rollout, 0, np.ones((50, 20), dtype=np.int64))
-    assert rollout.success.any()
-    assert (~rollout.success & (rollout.length == 8)).any()
+    assert rollout.terminated.any()
+    assert (~rollout.terminated & (rollout.length == 8)).any()
     assert (rollout.length < 8).any()
 
 
@@ -101,8 +101,8 @@ def test_native_modes_are_bit_identical(limit: int | None) -> None:
         env = native(mode, max_episode_steps=limit, goal_bounds=(1.0, 4.0))
         rollout = Rollout(env, 60)
         last, _ = walk_through(rollout, 5, actions)
-        results.append((last, rollout.cost, rollout.length, rollout.success))
-        assert 0 < rollout.success.sum() < 40
+        results.append((last, rollout.cost, rollout.length, rollout.terminated))
+        assert 0 < rollout.terminated.sum() < 40
     for other in results[1:]:
         for one, two in zip(results[0], other, strict=True):
             np.testing.assert_array_equal(one, two)
@@ -122,7 +122,7 @@ def test_native_slots_are_single_environments() -> None:
             cost -= reward
             length += 1
         assert rollout.cost[slot] == pytest.approx(cost, rel=1e-9)
-        assert (rollout.length[slot], rollout.success[slot]) == (length, reached)
+        assert (rollout.length[slot], rollout.terminated[slot]) == (length, reached)
         np.testing.assert_allclose(last[slot], observation, rtol=1e-7)
 
 
@@ -133,7 +133,7 @@ def test_a_wrapped_native_environment_walks_the_same(mode: str) -> None:
     for wrap in (lambda env: env, RecordEpisodeStatistics):
         rollout = Rollout(wrap(native(mode, goal_bounds=(1.0, 4.0))), 30)
         last, _ = walk_through(rollout, 3, actions)
-        results.append((last, rollout.cost, rollout.length, rollout.success))
+        results.append((last, rollout.cost, rollout.length, rollout.terminated))
     for one, two in zip(*results, strict=True):
         np.testing.assert_array_equal(one, two)
 
@@ -170,7 +170,7 @@ def test_slots_in_processes_of_their_own_walk_the_same(mode: str) -> None:
     for env in (processes, chains(3, mode, **parameters)):
         rollout = Rollout(env, 9)
         last, _ = walk_through(rollout, 4, actions)
-        results.append((last, rollout.cost, rollout.length, rollout.success))
+        results.append((last, rollout.cost, rollout.length, rollout.terminated))
     processes.close()
     for one, two in zip(*results, strict=True):
         np.testing.assert_array_equal(one, two)
@@ -193,7 +193,7 @@ def test_without_a_seed_the_streams_go_on(mode: str) -> None:
     np.testing.assert_array_equal(rollout.start(seed=1), first)
     assert (rollout.cost == 0).all()
     assert (rollout.length == 0).all()
-    assert not rollout.success.any()
+    assert not rollout.terminated.any()
     assert rollout.ants.tolist() == list(range(20))
 
 
@@ -246,7 +246,7 @@ def test_the_rewards_of_finished_slots_are_not_looked_at(mode: str) -> None:
         rollout.step(np.zeros(1, dtype=np.int64))
     assert rollout.cost.tolist() == [1.0, 12.0]
     assert rollout.length.tolist() == [1, 6]
-    assert rollout.success.tolist() == [True, False]
+    assert rollout.terminated.tolist() == [True, False]
 
 
 @pytest.mark.parametrize("bad", [-1, 2])
@@ -282,7 +282,7 @@ def test_costs_are_summed_in_double_precision() -> None:
             == float
         )
     np.testing.assert_array_equal(rollout.cost, -rollout.length)
-    assert rollout.success.all()
+    assert rollout.terminated.all()
     env.close()
 
 

@@ -33,6 +33,7 @@ from acl_gym.envs.control.bookkeeping import (
 from acl_gym.envs.control.rendering import Frame, Renderer
 from acl_gym.envs.control.stepping import PartialStep
 from acl_gym.envs.control.system import ControlSystem
+from acl_gym.envs.limits import checked_limit, trial_limit
 from acl_gym.utils import validation
 from acl_gym.utils.typing import BoolArray, FloatArray, IntArray
 
@@ -45,8 +46,8 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
 
     Args:
         num_envs: number of slots, >= 1.
-        max_episode_steps: an episode is truncated after this many steps; None sets
-            no limit, so that the agent's own T applies.
+        max_episode_steps: an episode is truncated after this many steps; None or -1
+            sets no limit. `gym.make_vec` passes the limit of the id if it is left out.
         autoreset_mode: what happens to a slot that has finished: "NextStep" (reset
             on the next step, whose action is ignored), "SameStep" (reset at once,
             last observation in `infos["final_obs"]`) or "Disabled" (the caller
@@ -80,10 +81,7 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
         **parameters: Any,
     ) -> None:
         self.num_envs = validation.integer("num_envs", num_envs, at_least=1)
-        if max_episode_steps is not None:
-            max_episode_steps = validation.integer(
-                "max_episode_steps", max_episode_steps, at_least=1
-            )
+        self._trial_steps: int | None = None  # T of the trial under way
         self.max_episode_steps = max_episode_steps
         self.set_autoreset_mode(autoreset_mode)
         self.render_mode = checked_render_mode(render_mode, self.metadata)
@@ -106,8 +104,17 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
         self._wait_when_finished = False
         self._walking: IntArray | None = None  # slots still walking; None means all
         self._all_slots = np.arange(self.num_envs)
-        limit = self.max_episode_steps or 0
-        self._step_some = PartialStep(self.system, self.num_envs, limit)
+        self._step_some = PartialStep(self.system, self.num_envs)
+
+    @property
+    def max_episode_steps(self) -> int | None:
+        """The steps after which an episode is truncated; None: there is no limit."""
+        return self._max_episode_steps
+
+    @max_episode_steps.setter
+    def max_episode_steps(self, value: int | None) -> None:
+        self._max_episode_steps = checked_limit(value)
+        self._limit = trial_limit(self._max_episode_steps, self._trial_steps)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -127,7 +134,10 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
                   full reset a slot that has finished is not stepped. Its finish is
                   reported once; after that its action is ignored, its observation
                   stays, its reward is 0 and its flags are False. This is a
-                  synchronous trial of a colony; idle slots cost nothing.
+                  synchronous trial of a colony; idle slots cost nothing;
+                - `"max_steps"`: T, an integer >= 1: to the next full reset an episode
+                  is truncated after T steps, or after `max_episode_steps` if that is
+                  less and was not just registered with the id.
 
         Returns:
             The observations of all slots, `(num_envs, ...)`, and the infos: empty,
@@ -135,11 +145,14 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
             `(num_envs, n_actions)` for the states that the slots are in now.
 
         Raises:
-            ValueError: a state, the mask or a key of `options` is not valid.
-            TypeError: the mask is not a bool array.
+            ValueError: the seed, a state, the mask or a key of `options` is not valid.
+            TypeError: the seed is not an integer, or the mask is not a bool array.
             ResetNeeded: a mask was given before the first full reset.
         """
-        options = checked_options(options, ("state", "reset_mask", "finished"))
+        seed = validation.seed(seed)
+        options = checked_options(
+            options, ("state", "reset_mask", "finished", "max_steps")
+        )
         mask = checked_reset_mask(
             options.get("reset_mask"), self.num_envs, begun=self._state is not None
         )
@@ -148,10 +161,13 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
         states = None if given is None else self._checked_states(given, slots)
         if "finished" in options:
             validation.one_of("options['finished']", options["finished"], ("wait",))
+        trial_steps = self._checked_trial_steps(options, mask)
 
         super().reset(seed=seed)
         if mask is None:
             self._wait_when_finished = False
+            self._trial_steps = trial_steps
+            self._limit = trial_limit(self._max_episode_steps, trial_steps)
         self._wait_when_finished |= "finished" in options
         self._start(slots, states)
         return self._observe(), self._infos()
@@ -164,6 +180,10 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
 
         Returns:
             `(observations, rewards, terminations, truncations, infos)`, new arrays.
+            The infos are those of `reset` and, when an episode ends, `"is_success"`,
+            whether that of each slot has reached the goal, under the mask
+            `"_is_success"` of the slots whose episodes have ended; with "SameStep"
+            they are in `infos["final_info"]`.
 
         Raises:
             ResetNeeded: there was no reset yet, or autoreset is disabled and a slot
@@ -184,10 +204,10 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
         uniforms = draw_uniforms(self.system, self.np_random, slots.size)
         if slots is self._all_slots:
             self.system.advance(self._state, checked, uniforms, rewards, terminated)
-            limit = self.max_episode_steps or 0
-            n_finished = count_step(limit, self._steps, terminated, truncated)
+            n_finished = count_step(self._limit, self._steps, terminated, truncated)
         elif slots.size:
             n_finished = self._step_some(
+                self._limit,
                 slots,
                 self._finished,
                 self._state,
@@ -203,12 +223,14 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
 
         last: dict[str, Any] = {}
         if n_finished:
+            finished = terminated | truncated
+            last = {"is_success": terminated.copy(), "_is_success": finished}
             if (
                 self.autoreset_mode is AutoresetMode.SAME_STEP
                 and not self._wait_when_finished
             ):
-                finished = terminated | truncated
-                last = final_infos(self._observe(), finished, self._infos())
+                last = {**self._infos(), **last}
+                last = final_infos(self._observe(), finished.copy(), last)
                 self._start(np.flatnonzero(finished), None)
             else:
                 walking = np.empty(self.num_envs, dtype=np.int64)
@@ -258,14 +280,21 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
         self.metadata = {**self.metadata, "autoreset_mode": self.autoreset_mode}
 
     def with_slots(self, num_envs: int) -> Self:
-        """Make a new environment that differs only in the number of slots."""
-        return type(self)(
+        """Make a new environment that differs only in the number of slots.
+
+        Its random numbers continue a copy of this environment's stream, if that was
+        seeded.
+        """
+        made = type(self)(
             num_envs,
             max_episode_steps=self.max_episode_steps,
             autoreset_mode=self.autoreset_mode,
             render_mode=self.render_mode,
             **self.parameters,
         )
+        made._np_random = copy.deepcopy(self._np_random)
+        made._np_random_seed = self._np_random_seed
+        return made
 
     def _slots_to_restart(self) -> IntArray | None:
         """The finished slots that this step must reset, None if there are none."""
@@ -313,6 +342,20 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
         if self._state is None:
             raise ResetNeeded("the slots have no states yet; call reset() first.")
         return self._state
+
+    def _checked_trial_steps(
+        self, options: dict[str, Any], mask: BoolArray | None
+    ) -> int | None:
+        if "max_steps" not in options:
+            return None
+        if mask is not None:
+            raise ValueError(
+                "options['max_steps'] is for a full reset, got it with 'reset_mask'; "
+                "leave one of them out."
+            )
+        return validation.integer(
+            "options['max_steps']", options["max_steps"], at_least=1
+        )
 
     def _observe(self) -> Observation:
         return self.system.observe(self._states)

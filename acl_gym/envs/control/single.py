@@ -25,7 +25,8 @@ from acl_gym.utils.typing import FloatArray
 class ControlEnv(gym.Env[NDArray[Any], np.int64]):
     """The single environment over a control system.
 
-    It has no time limit of its own: `gym.make(id, max_episode_steps=T)` adds one.
+    It has no time limit of its own: `gym.make(id)` adds the one registered with the id,
+    `gym.make(id, max_episode_steps=T)` another, `max_episode_steps=-1` none.
 
     Args:
         render_mode: "human" shows a window, "rgb_array" lets `render` return frames,
@@ -69,8 +70,10 @@ class ControlEnv(gym.Env[NDArray[Any], np.int64]):
             array `(n_actions,)`, if not all actions are always available.
 
         Raises:
-            ValueError: the state or a key of `options` is not valid.
+            ValueError: the seed, the state or a key of `options` is not valid.
+            TypeError: the seed is not an integer.
         """
+        seed = validation.seed(seed)
         options = checked_options(options, ("state",))
         given = options.get("state")
         state = None
@@ -95,7 +98,7 @@ class ControlEnv(gym.Env[NDArray[Any], np.int64]):
         Returns:
             `(observation, reward, terminated, truncated, info)` with reward
             = -(stage cost), `terminated` once the goal is reached and the info that
-            `reset` describes.
+            `reset` describes with `"is_success"`, whether this step reached the goal.
 
         Raises:
             ResetNeeded: there was no `reset` yet, or the goal was reached after it.
@@ -116,7 +119,8 @@ class ControlEnv(gym.Env[NDArray[Any], np.int64]):
         if self.render_mode == "human":
             self.render()
         observation = self.system.observe(self._state)[0]
-        info = self._info(self._state)
+        # In every step: whether it is the last, only a wrapper with a limit knows.
+        info = {**self._info(self._state), "is_success": self._finished}
         return observation, float(rewards[0]), self._finished, False, info
 
     def render(self) -> Frame | None:

@@ -21,11 +21,10 @@ class PartialStep:
     Args:
         system: whose states are advanced.
         num_envs: number of slots.
-        limit: steps after which a slot is truncated; 0 means none.
     """
 
-    def __init__(self, system: ControlSystem, num_envs: int, limit: int) -> None:
-        self._system, self._limit = system, limit
+    def __init__(self, system: ControlSystem, num_envs: int) -> None:
+        self._system = system
         self._states: FloatArray = np.empty(0)
         self._actions: IntArray = np.empty(num_envs, dtype=np.int64)
         self._rewards: FloatArray = np.empty(num_envs)
@@ -35,6 +34,7 @@ class PartialStep:
 
     def __call__(
         self,
+        limit: int,
         slots: IntArray,
         idle: BoolArray,
         states: FloatArray,
@@ -48,6 +48,7 @@ class PartialStep:
         """Step some slots; the entries of the others stay as they are.
 
         Args:
+            limit: steps after which a slot is truncated; 0 means none.
             slots: those that step, `(m,)`.
             idle: whether each slot does not step, `(num_envs,)`.
             states: of all slots, `(state_size, num_envs)`, replaced by the next ones.
@@ -70,7 +71,7 @@ class PartialStep:
                 put_idle_back(
                     idle,
                     self._before,
-                    self._limit,
+                    limit,
                     states,
                     steps,
                     rewards,
@@ -88,7 +89,7 @@ class PartialStep:
             part,
             part_rewards,
             part_reached,
-            self._limit,
+            limit,
             states,
             steps,
             rewards,

@@ -50,7 +50,8 @@ class NavigationEnv(ControlEnv):
     Terminated in the goal region: with `goal_rule="bounds"` when |c1|, |c2| <= 0.25 m
     and |v1|, |v2| <= 0.05 m/s; with `goal_rule="membership"` when the degree of the
     goal's membership function, `prod_i max(1 - |x_i| / spacing_i, 0)`, exceeds 0.5.
-    There is no time limit unless `max_episode_steps` sets one.
+    Truncated after 150 steps, T of Table 4.1, unless `max_episode_steps` sets another
+    limit (-1: none). `info["is_success"]` says whether the goal was reached.
 
     ## Arguments
     Every parameter of `Navigation` is a keyword of `gym.make` and `gym.make_vec`:

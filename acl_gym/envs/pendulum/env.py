@@ -45,8 +45,9 @@ class PendulumEnv(ControlEnv):
     Uniform over the state space without the goal region.
 
     ## Episode End
-    Terminated when |theta - pi| <= 0.1 rad and |omega| <= 0.1 rad/s. There is no
-    time limit unless `max_episode_steps` sets one.
+    Terminated when |theta - pi| <= 0.1 rad and |omega| <= 0.1 rad/s; truncated after
+    300 steps, T of Table 5.2, unless `max_episode_steps` sets another limit (-1: none).
+    `info["is_success"]` says whether the goal was reached.
 
     ## Arguments
     Every parameter of `Pendulum` is a keyword of `gym.make` and `gym.make_vec`:

@@ -31,8 +31,9 @@ class TwoStateEnv(ControlEnv):
     q.
 
     ## Episode End
-    Terminated in the goal, after two steps. There is no time limit unless
-    `max_episode_steps` sets one.
+    Terminated in the goal, after two steps, which are also the registered limit;
+    `max_episode_steps` sets another (-1: none). `info["is_success"]` says whether the
+    goal was reached.
 
     ## Arguments
     >>> import gymnasium as gym, acl_gym

@@ -21,6 +21,7 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import ArrayLike, NDArray
 
 from acl_gym.envs.control.environments import ControlVectorEnv
+from acl_gym.utils import validation
 from acl_gym.utils.typing import FloatArray, IntArray
 
 Element = TypeVar("Element", bound=np.generic)
@@ -91,6 +92,7 @@ class ActionNoise(VectorActionWrapper[Any, Any, Any, Any]):
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Any, dict[str, Any]]:
         """Start episodes; a seed also restarts the random numbers of this wrapper."""
+        seed = validation.seed(seed)
         if seed is not None:
             self._rng = _generator(seed)
         return super().reset(seed=seed, options=options)
@@ -132,6 +134,7 @@ class ObservationNoise(VectorObservationWrapper[FloatArray, Any, Any, Any]):
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[FloatArray, dict[str, Any]]:
         """Start episodes; a seed also restarts the random numbers of this wrapper."""
+        seed = validation.seed(seed)
         if seed is not None:
             self._rng = _generator(seed)
         return super().reset(seed=seed, options=options)

@@ -63,7 +63,14 @@ class WaitingVectorEnv(SyncVectorEnv):
         options: dict[str, Any] | None = None,
     ) -> tuple[NDArray[Any], dict[str, Any]]:
         """Start episodes in all slots, or in those of `options["reset_mask"]`."""
+        if isinstance(seed, Sequence):
+            seed = [validation.seed(each) for each in seed]
+        else:
+            seed = validation.seed(seed)
         mask = None if options is None else options.get("reset_mask")
+        # A copy: the base class takes the mask out, and wrappers around this one would
+        # then see a full reset.
+        options = None if options is None else dict(options)
         observation, infos = super().reset(seed=seed, options=options)
         if mask is None:
             self._finished[:] = False

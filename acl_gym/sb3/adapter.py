@@ -8,11 +8,8 @@ from typing import Any
 
 import gymnasium as gym
 import numpy as np
-from gymnasium import spaces
 from gymnasium.vector import (
-    AsyncVectorEnv,
     AutoresetMode,
-    SyncVectorEnv,
     VectorEnv,
     VectorWrapper,
 )
@@ -25,19 +22,16 @@ from stable_baselines3.common.vec_env.base_vec_env import (
 )
 
 from acl_gym.envs import received
-from acl_gym.envs.control.environments import ControlVectorEnv
 from acl_gym.envs.wrappers.partial_reset import reset_slots
+from acl_gym.sb3.checks import (
+    check_action_space,
+    check_observation_space,
+    settle_mode,
+)
 from acl_gym.sb3.slots import SlotEnvs, slot_envs
 from acl_gym.utils.vector_envs import require_vector_env
 
-_SUPPORTED_MODES = (AutoresetMode.DISABLED, AutoresetMode.SAME_STEP)
 _FINAL_KEYS = ("final_obs", "_final_obs", "final_info", "_final_info")
-_ARRAY_SPACES = (
-    spaces.Box,
-    spaces.Discrete,
-    spaces.MultiDiscrete,
-    spaces.MultiBinary,
-)
 
 
 class VectorEnvAdapter(VecEnv):
@@ -84,10 +78,10 @@ class VectorEnvAdapter(VecEnv):
 
     def __init__(self, env: VectorEnv[Any, Any, Any]) -> None:
         require_vector_env(env)
-        _check_observation_space(env.single_observation_space)
-        _check_action_space(env.single_action_space)
+        check_observation_space(env.single_observation_space)
+        check_action_space(env.single_action_space)
         self.env = env
-        self._resets_itself = _settle_mode(env) is AutoresetMode.SAME_STEP
+        self._resets_itself = settle_mode(env) is AutoresetMode.SAME_STEP
         self._slot_envs = slot_envs(env)
         self._actions: NDArray[Any] | None = None
         self._returns = np.zeros(env.num_envs)
@@ -343,86 +337,8 @@ class VectorEnvAdapter(VecEnv):
             )
 
 
-def _settle_mode(env: VectorEnv[Any, Any, Any]) -> AutoresetMode:
-    """The autoreset mode of `env`; an environment of this package is given one that fits.
-
-    Raises:
-        ValueError: a `VecEnv` does not support the mode, and it cannot be changed.
-    """
-    mode = received.autoreset_mode_of(env)
-    if mode in _SUPPORTED_MODES:
-        return mode
-    # Not below wrappers, which may have read the mode already.
-    if isinstance(env, ControlVectorEnv):
-        env.set_autoreset_mode(AutoresetMode.DISABLED)
-        return AutoresetMode.DISABLED
-    raise ValueError(
-        f"env must have autoreset mode DISABLED or SAME_STEP, got {mode.name}, which "
-        "inserts a meaningless step between two episodes; make it with "
-        f"{_with_autoreset_disabled(env)}{'' if env.unwrapped is env else ', then wrap'}."
-    )
-
-
-def _with_autoreset_disabled(env: VectorEnv[Any, Any, Any]) -> str:
-    """The line of code that makes what `env` wraps, with autoreset disabled."""
-    base = env.unwrapped
-    mode, count = '"Disabled"', env.num_envs
-    env_id = "id" if base.spec is None else f'"{base.spec.id}"'
-    if isinstance(base, ControlVectorEnv):
-        return f"gym.make_vec({env_id}, num_envs={count}, autoreset_mode={mode})"
-    if isinstance(base, (SyncVectorEnv, AsyncVectorEnv)) and base.spec is None:
-        return f"{type(base).__name__}(env_fns, autoreset_mode={mode})"
-    how = "async" if isinstance(base, AsyncVectorEnv) else "sync"
-    return (
-        f'gym.make_vec({env_id}, num_envs={count}, vectorization_mode="{how}", '
-        f'vector_kwargs={{"autoreset_mode": {mode}}})'
-    )
-
-
-def _check_action_space(space: spaces.Space[Any]) -> None:
-    """Refuse what cannot be an array with one row for each slot."""
-    if not isinstance(space, _ARRAY_SPACES):
-        raise ValueError(
-            "actions must be a Box, Discrete, MultiDiscrete or MultiBinary, since a "
-            f"VecEnv takes them as one array with a row for each slot, got {space}; "
-            "rearrange them in each single environment with gymnasium's "
-            "TransformAction."
-        )
-    _check_start("actions", space)
-
-
-def _check_observation_space(space: spaces.Space[Any]) -> None:
-    parts = space.spaces.values() if isinstance(space, spaces.Dict) else [space]
-    for part in parts:
-        if not isinstance(part, _ARRAY_SPACES):
-            raise ValueError(
-                "observations must be a Box, Discrete, MultiDiscrete, MultiBinary or "
-                f"a Dict of those, got {part}; use gymnasium's FlattenObservation."
-            )
-        _check_start("observations", part)
-
-
-def _check_start(what: str, space: spaces.Space[Any]) -> None:
-    """Stable-Baselines3 assumes that discrete values start from 0."""
-    if np.any(getattr(space, "start", 0)):
-        raise ValueError(
-            f"{what} must start from 0, got {space}; shift them with gymnasium's "
-            f"{'TransformAction' if what == 'actions' else 'TransformObservation'}."
-        )
-
-
-def _infos_per_slot(infos: Any, count: int) -> list[dict[str, Any]]:
-    """Split batched infos into one dict per slot, following the mask of each key.
-
-    Infos that are a list with a dict for each slot already are taken as they are.
-
-    Raises:
-        ValueError: they are neither.
-    """
-    if isinstance(infos, list):
-        received.infos(infos, count)
-        return [dict(row) for row in infos]
-    infos = received.infos(infos, count)
+def _infos_per_slot(infos: dict[str, Any], count: int) -> list[dict[str, Any]]:
+    """Split batched infos into one dict per slot, following the mask of each key."""
     rows: list[dict[str, Any]] = [{} for _ in range(count)]
     for key, values in infos.items():
         if key.startswith("_") and key[1:] in infos:

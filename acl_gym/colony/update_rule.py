@@ -220,7 +220,7 @@ class WatchedRule(UpdateRule):
             result,
             costs=result.costs.copy(),
             deposits=result.deposits.copy(),
-            success=result.success.copy(),
+            terminated=result.terminated.copy(),
         )
         self._rule.global_update(pheromone, own, local_decay, global_decay)
 

@@ -162,14 +162,14 @@ class VectorEnvAdapter(VecEnv):
             {key: row[key] for key in row if key not in _FINAL_KEYS}
             for row in _infos_per_slot(infos, n)
         ]
-        infos = received.infos(infos, n)
+        batched = received.infos(infos, n)
         if slots and self._resets_itself:
             # Entries missing from final_info were written by the reset or a wrapper.
-            last = _infos_per_slot(infos.get("final_info", {}), self.num_envs)
+            last = _infos_per_slot(batched.get("final_info", {}), n)
             for slot in slots:
                 self.reset_infos[slot] = rows[slot]
                 rows[slot] = {**rows[slot], **last[slot]}
-                rows[slot]["terminal_observation"] = _copy(infos["final_obs"][slot])
+                rows[slot]["terminal_observation"] = _copy(batched["final_obs"][slot])
         elif slots:
             for slot in slots:
                 rows[slot]["terminal_observation"] = _row(observations, slot)
@@ -337,8 +337,18 @@ class VectorEnvAdapter(VecEnv):
             )
 
 
-def _infos_per_slot(infos: dict[str, Any], count: int) -> list[dict[str, Any]]:
-    """Split batched infos into one dict per slot, following the mask of each key."""
+def _infos_per_slot(infos: Any, count: int) -> list[dict[str, Any]]:
+    """Split batched infos into one dict per slot, following the mask of each key.
+
+    Infos that are a list with a dict for each slot already are taken as they are.
+
+    Raises:
+        ValueError: they are neither.
+    """
+    if isinstance(infos, list):
+        received.infos(infos, count)
+        return [dict(row) for row in infos]
+    infos = received.infos(infos, count)
     rows: list[dict[str, Any]] = [{} for _ in range(count)]
     for key, values in infos.items():
         if key.startswith("_") and key[1:] in infos:

@@ -8,7 +8,7 @@ import numpy as np
 from gymnasium import spaces
 from gymnasium.vector import AsyncVectorEnv, AutoresetMode, SyncVectorEnv, VectorEnv
 
-from acl_gym.envs.control.bookkeeping import checked_autoreset_mode
+from acl_gym.envs import received
 from acl_gym.envs.control.environments import ControlVectorEnv
 
 _SUPPORTED_MODES = (AutoresetMode.DISABLED, AutoresetMode.SAME_STEP)
@@ -26,9 +26,7 @@ def settle_mode(env: VectorEnv[Any, Any, Any]) -> AutoresetMode:
     Raises:
         ValueError: a `VecEnv` does not support the mode, and it cannot be changed.
     """
-    mode = checked_autoreset_mode(
-        env.metadata.get("autoreset_mode", AutoresetMode.NEXT_STEP)
-    )
+    mode = received.autoreset_mode_of(env)
     if mode in _SUPPORTED_MODES:
         return mode
     # Not below wrappers, which may have read the mode already.

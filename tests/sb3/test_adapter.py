@@ -142,6 +142,8 @@ def test_the_same_as_sb3s_own_vector_environment(mode: str) -> None:
             # With SAME_STEP, Gymnasium adds the info of the reset.
             assert ("begun" in mine) == (mode == "SameStep" and last is not None)
             mine.pop("begun", None)
+            assert ("episode" in mine) == (last is not None)
+            mine.pop("episode", None)
             assert mine == other
 
 

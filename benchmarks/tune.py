@@ -42,12 +42,12 @@ from optuna.distributions import FloatDistribution as Real
 from optuna.distributions import IntDistribution as Whole
 
 from acl_gym.experiments.comparison.tasks import (
-    METHODS,
     SETTINGS_FILE,
     TASKS,
     TunedTask,
 )
 from acl_gym.experiments.methods import run
+from acl_gym.experiments.names import METHODS
 from acl_gym.experiments.provenance import versions
 from acl_gym.experiments.study import Study
 from acl_gym.utils.files import write_atomically

@@ -30,8 +30,6 @@ from acl_gym.experiments.study import Study
 
 logger = logging.getLogger("acl_gym")
 
-EXECUTORS = ("local", "ray")
-
 
 class FolderInUseError(RuntimeError):
     """Another runner works on the folder."""

@@ -313,8 +313,9 @@ def _failed(error: Exception, learner: Any, begun: int, target: Path) -> Excepti
     words = in_words(error)
     deposit = getattr(learner, "deposit", None)
     if isinstance(deposit, InverseCost) and getattr(learner, "cost", None) is None:
-        costs = learner.rollout.cost + deposit.offset
-        if (costs <= 0.0).any():
+        rollout = learner.rollout
+        costs = rollout.cost + deposit.offset
+        if not rollout.ants.size and (costs <= 0.0).any():  # all walks are complete
             words = (
                 "ants deposit 1 / cost, and costs must be > 0, but an ant has cost "
                 f"{costs.min():g}: the rewards are not negative costs. Add --param "

@@ -31,6 +31,7 @@ from acl_gym.experiments.provenance import circumstances, code_of_runs, versions
 from acl_gym.partitions.automatic import automatic_partition
 from acl_gym.utils.files import write_atomically
 from acl_gym.utils.hashing import hashed
+from acl_gym.utils.text import replace_unprintable_letters
 
 Run = dict[str, Any]
 
@@ -439,4 +440,5 @@ def _names(known: Iterable[str]) -> Callable[[str], list[str]]:
 
 
 if __name__ == "__main__":
+    replace_unprintable_letters()
     raise SystemExit(main())

@@ -26,6 +26,7 @@ from tqdm.auto import tqdm
 from acl_gym import ACL, Fuzzy, evaluate_policy_cost
 from acl_gym.evaluation import actions_in, record_trajectory
 from acl_gym.policies import TablePolicy
+from acl_gym.utils.text import replace_unprintable_letters
 
 TRIALS = 100
 FIRST_TRIAL = 51
@@ -194,4 +195,5 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
+    replace_unprintable_letters()
     raise SystemExit(main())

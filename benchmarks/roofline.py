@@ -32,6 +32,7 @@ from acl_gym.envs import navigation, pendulum
 from acl_gym.partitions import Fuzzy
 from acl_gym.partitions.kernels import written_out
 from acl_gym.plotting.style import WIDTH, in_style
+from acl_gym.utils.text import replace_unprintable_letters
 
 ANTS = 2_000
 
@@ -387,4 +388,5 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
+    replace_unprintable_letters()
     raise SystemExit(main())

@@ -19,6 +19,7 @@ from tqdm.auto import tqdm
 from acl_gym import ACL, QLearning, evaluate_policy_cost
 from acl_gym.colony.costs import Cost, Overshoot, RiseTime, SettlingTime, Steps
 from acl_gym.partitions.automatic import thesis_partition
+from acl_gym.utils.text import replace_unprintable_letters
 
 TURN = 2 * math.pi
 ANGLE = {"variable": 0, "target": math.pi, "period": TURN}
@@ -81,4 +82,5 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
+    replace_unprintable_letters()
     sys.exit(main())

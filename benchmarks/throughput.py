@@ -32,6 +32,7 @@ from speed_criteria import complete_run_row, criteria
 from tqdm.auto import tqdm
 
 import acl_gym
+from acl_gym.utils.text import replace_unprintable_letters
 
 SIZES = (1, 16, 250, 2_000, 20_000)
 PEERS_PYTHON = Path(__file__).resolve().parents[1] / ".venv-peers" / "bin" / "python"
@@ -377,4 +378,5 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
+    replace_unprintable_letters()
     raise SystemExit(main())

@@ -42,15 +42,16 @@ from optuna.distributions import FloatDistribution as Real
 from optuna.distributions import IntDistribution as Whole
 
 from acl_gym.experiments.comparison.tasks import (
-    METHODS,
     SETTINGS_FILE,
     TASKS,
     TunedTask,
 )
 from acl_gym.experiments.methods import run
+from acl_gym.experiments.names import METHODS
 from acl_gym.experiments.provenance import versions
 from acl_gym.experiments.study import Study
 from acl_gym.utils.files import write_atomically
+from acl_gym.utils.text import replace_unprintable_letters
 
 FOLDER = Path(__file__).with_name("tuning")
 
@@ -386,4 +387,5 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
+    replace_unprintable_letters()
     sys.exit(main())

@@ -21,6 +21,7 @@ from tqdm import tqdm
 
 from acl_gym.sb3.callback import PolicyCostCallback
 from acl_gym.sb3.dqn import DQNSettings, make_dqn, scaled_env
+from acl_gym.utils.text import replace_unprintable_letters
 
 ENV_ID = "acl_gym/Pendulum-v0"
 NEAR_OPTIMUM = 1.1 * 38.4
@@ -184,4 +185,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
+    replace_unprintable_letters()
     main()

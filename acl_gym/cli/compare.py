@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from acl_gym.cli.common import DebugOption, JsonOption, console
+from acl_gym.cli.common import DebugOption, JsonOption, check_name, console
+from acl_gym.cli.environments import Environment
 from acl_gym.cli.errors import (
     Command,
     InterruptedRunError,
@@ -17,6 +18,7 @@ from acl_gym.cli.errors import (
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from acl_gym.experiments.comparison.tasks import System
     from acl_gym.experiments.results import Results
     from acl_gym.experiments.study import Experiment
 
@@ -26,11 +28,17 @@ Trains ACL, Q-learning, Q(lambda) and Stable-Baselines3's DQN over several seeds
 evaluates them alike, and writes results.json, results.parquet, figures and report.html.
 A run that was killed goes on where it stopped when the same command is given again.
 
+The environment may be any with Discrete actions, also "module:id", which imports a
+module. For those listed below settings were chosen; others get general settings that
+were not tuned: an automatic partition, and deposits by rank where rewards are not
+negative costs. Policies are then judged by their return in 100 random episodes.
+
 \b
 Examples:
   acl-gym compare
   acl-gym compare --agents acl-fuzzy,q-fuzzy --seeds 5 --out results/tables
   acl-gym compare --env acl_gym/GridSearch2D-v0 --out results/grid
+  acl-gym compare --env CartPole-v1 --seeds 3
   acl-gym compare --preset full --out results/full
 """
 
@@ -40,7 +48,8 @@ class CompareCommand(Command):
 
     def format_help(self, ctx: Any, formatter: Any) -> None:
         """Write the help."""
-        from acl_gym.experiments.comparison.tasks import PRESETS, SYSTEMS
+        from acl_gym.experiments.comparison.tasks import SYSTEMS
+        from acl_gym.experiments.names import PRESETS
 
         presets = "\n".join(
             f"  {name:8} runs of each method: {seeds}"
@@ -77,7 +86,7 @@ def compare(
         str | None,
         typer.Option(
             metavar="ID",
-            help="Environment, see below.  [default: the first]",
+            help="Environment, any id.  [default: the first of those below]",
             show_default=False,
         ),
     ] = None,
@@ -130,25 +139,33 @@ def compare(
     debug: DebugOption = False,
 ) -> None:
     """Compare; see `HELP`."""
+    from acl_gym.experiments.names import PRESETS, agent_names
+
+    # Names first: a wrong one is answered before anything slow is imported.
+    check_name("--preset", preset, PRESETS)
+    chosen = None if env is None else Environment(env)
+    if chosen is not None:
+        chosen.check_id()
+    wanted = None
+    if agents is not None:
+        wanted = [name.strip() for name in agents.split(",") if name.strip()]
+        for name in wanted or [""]:
+            check_name("--agents", name, agent_names(finite=False))
+    if chosen is not None:
+        chosen.import_module()
     from acl_gym.experiments.comparison.compare import compare as run_comparison
-    from acl_gym.experiments.comparison.tasks import BY_ENV_ID, PRESETS
-    from acl_gym.utils.validation import one_of
+    from acl_gym.experiments.comparison.tasks import BY_ENV_ID
 
     default, *_ = BY_ENV_ID
     env = env or default
-    with bad_arguments():
-        one_of("--preset", preset, PRESETS)
-        one_of("--env", env, BY_ENV_ID)
-    system = BY_ENV_ID[env]
+    system = BY_ENV_ID.get(env) or _foreign(env)
     if out is None:
         name = "" if env == default else f"-{system.colony.task.short_name}"
         out = Path(f"results/compare{name}")
     names = list(system.agents)
-    if agents is not None:
-        wanted = [name.strip() for name in agents.split(",") if name.strip()]
-        with bad_arguments():
-            for name in wanted or [""]:
-                one_of(f"--agents for {env}", name, names)
+    if wanted is not None:
+        for name in wanted:
+            check_name(f"--agents for {env}", name, names)
         names = list(dict.fromkeys(wanted))
     terminal = console(stderr=as_json)
     try:
@@ -171,6 +188,16 @@ def compare(
     terminal.print(f"\nReport: {out / 'report.html'}\nResults: {out / 'results.json'}")
     if as_json:
         typer.echo((out / "results.json").read_text())
+
+
+def _foreign(env_id: str) -> System:
+    """An environment for which no settings were chosen."""
+    from acl_gym.experiments.comparison.foreign import foreign_system
+
+    # The same words on continuous actions as those of the other commands.
+    Environment(env_id).vector(1)
+    with bad_arguments():
+        return foreign_system(env_id)
 
 
 def _print_summary(experiment: Experiment, results: Results, terminal: Console) -> None:

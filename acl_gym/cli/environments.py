@@ -64,6 +64,11 @@ class Environment:
         """The module that registers the id; "" if none is named."""
         return self.env_id.rpartition(":")[0]
 
+    @property
+    def is_own(self) -> bool:
+        """Whether it is of this package."""
+        return self.name in ENVIRONMENTS
+
     def check_id(self) -> None:
         """Check that there is such an id, without importing anything.
 
@@ -151,11 +156,17 @@ class Environment:
         if isinstance(space, spaces.Box):
             twin = _twin(self.name)
             hint = f"; {twin} of this package has discrete ones" if twin else ""
+            count = math.prod(space.shape)
+            of_each = f" of each of its {count} dimensions" if count > 1 else ""
             raise BadArgumentError(
                 f"{self.name} must have Discrete actions, but has continuous ones, "
-                f"{space}; add --discretize 5 for five values of each of its "
-                f"{math.prod(space.shape)} dimensions, or --discretize 5,3,... for one "
-                f"number for each (gymnasium.wrappers.DiscretizeAction){hint}."
+                f"{space}; add --discretize 5 for five values{of_each} "
+                f"(gymnasium.wrappers.DiscretizeAction){hint}."
+            )
+        if not isinstance(space, spaces.Discrete):
+            raise BadArgumentError(
+                f"{self.name} must have Discrete actions, got {space}; give it a wrapper "
+                "that numbers its actions, in a module of your own."
             )
 
 

@@ -146,7 +146,10 @@ def evaluate(
     if as_json:
         print_json({**settings, **figures(result)})
     else:
-        _print(settings, figures(result))
+        from acl_gym.evaluation import reports_returns
+
+        returns = reports_returns(agent.env, getattr(agent, "cost", None))
+        _print(settings, figures(result), returns)
 
 
 def _chosen(
@@ -257,19 +260,22 @@ def figures(result: PolicyCost) -> dict[str, Any]:
     }
 
 
-def _print(settings: dict[str, Any], found: dict[str, Any]) -> None:
+def _print(settings: dict[str, Any], found: dict[str, Any], returns: bool) -> None:
     from rich.table import Table
 
+    what, sign, low, high = "cost", 1.0, "min", "max"
+    if returns:
+        what, sign, low, high = "return", -1.0, "max", "min"
     table = Table(box=None, pad_edge=False, show_header=False)
     table.add_column(style="bold")
     table.add_column(justify="right")
-    table.add_row("policy cost", f"{found['policy_cost']:.4f}")
-    table.add_row("mean return", f"{found['mean_return']:.4f}")
+    mean = found["mean_return"] if returns else found["policy_cost"]
+    table.add_row("mean return" if returns else "policy cost", f"{mean:.4f}")
     if found["success_rate"] is not None:
         table.add_row("success", f"{found['success_rate']:.1%}")
     table.add_row("mean length", f"{found['mean_length']:.1f}")
-    for name in ("min", "median", "max"):
-        table.add_row(f"cost, {name}", f"{found[f'cost_{name}']:.4f}")
+    for name, key in (("min", low), ("median", "median"), ("max", high)):
+        table.add_row(f"{what}, {name}", f"{sign * found[f'cost_{key}']:.4f}")
     screen = console()
     screen.print(
         f"{settings['env_id']}, {settings['episodes']} episodes of at most "

@@ -7,9 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from acl_gym import Crisp, CSVLog, Fuzzy, PolicyEvaluation, TensorBoardLog
+from acl_gym.agents.suitable import BY_RANK, PROBES, suitable_deposit
 from acl_gym.callbacks import Callback
 from acl_gym.cli.agents import AGENTS, name_of
 from acl_gym.cli.common import console, print_json
@@ -22,13 +21,14 @@ from acl_gym.cli.errors import (
 )
 from acl_gym.cli.interrupts import Interruption
 from acl_gym.cli.keeping import EqualCosts, Keeper, PlainProgress
-from acl_gym.colony.deposits import InverseCost, Rank
+from acl_gym.colony.deposits import InverseCost
 from acl_gym.envs.control.environments import ControlVectorEnv
 from acl_gym.evaluation import reports_returns
-from acl_gym.evaluation.rollout import Rollout
 from acl_gym.partitions.automatic import automatic_partition
 
-ANTS = 250
+ANTS, FOREIGN_ANTS = 250, 200
+"""Of the thesis's pendulum; in other packages' environments found on CartPole."""
+
 TRIALS = 100
 EVALUATE_EVERY = 10
 FOREIGN_EVALUATE_EVERY = 2
@@ -39,12 +39,6 @@ FOREIGN_EPISODES = 100
 
 RANDOM_STEPS = 10_000
 """Random steps from which missing bounds of observations are estimated."""
-
-PROBES = 20
-"""Random episodes from which it is seen whether rewards are negative costs."""
-
-FOREIGN_DEPOSIT = Rank(5)
-"""Where rewards are not negative costs; found on CartPole, see docs/gymnasium.md."""
 
 
 class Shown(NamedTuple):
@@ -86,7 +80,7 @@ def begin(
     kind: str,
     settings: dict[str, Any],
     *,
-    ants: int,
+    ants: int | None,
     partition: str,
     cells: list[int] | None,
     max_steps: int | None,
@@ -99,6 +93,8 @@ def begin(
     Raises:
         BadArgumentError: an argument does not suit the environment or the agent.
     """
+    if ants is None:
+        ants = ANTS if environment.is_own else FOREIGN_ANTS
     env = environment.vector(ants)
     steps = max_steps or default_steps(env)
     with bad_arguments():
@@ -109,10 +105,10 @@ def begin(
             random_steps=max(RANDOM_STEPS, env.num_envs),
         )
     if AGENTS[kind].deposits and not {"deposit", "cost"} & settings.keys():
-        settings = {**settings, **_deposit(environment, env, steps, seed)}
+        settings = {**settings, **_deposit(environment, steps, seed)}
     with bad_arguments():
         learner = AGENTS[kind].load()(env, grid, max_steps=steps, seed=seed, **settings)
-    own = isinstance(env.unwrapped, ControlVectorEnv)
+    own = environment.is_own
     every = evaluate_every or (EVALUATE_EVERY if own else FOREIGN_EVALUATE_EVERY)
     evaluation = _evaluation(environment, env, every, steps)
     learner.metadata = {
@@ -152,7 +148,9 @@ def go_on(
         BadArgumentError: a parameter is fixed, or the environment does not fit.
     """
     known = learner.metadata
-    ants = ants or _count(known.get("ants"), ANTS)
+    ants = ants or _count(
+        known.get("ants"), ANTS if environment.is_own else FOREIGN_ANTS
+    )
     how = known.get("evaluation", {})
     how = how if isinstance(how, dict) else {}
     every = evaluate_every or _count(how.get("every"), EVALUATE_EVERY)
@@ -203,33 +201,18 @@ def _count(value: Any, default: int) -> int:
     return value if usable else default
 
 
-def _deposit(
-    environment: Environment, env: Any, steps: int, seed: int
-) -> dict[str, Any]:
-    """A deposit for rewards that are no negative costs, with a word; else nothing.
-
-    Ants that walk at random show of which sign costs are.
-    """
-    if isinstance(env.unwrapped, ControlVectorEnv):
-        return {}
-    rollout = Rollout(environment.vector(PROBES), steps)
-    rng = np.random.default_rng(seed)
-    rollout.start(seed=seed)
-    while rollout.ants.size:
-        allowed = rollout.allowed()
-        chances = rng.random((rollout.ants.size, rollout.n_actions))
-        if allowed is not None:
-            chances[~allowed] = -1.0
-        rollout.step(chances.argmax(axis=1))
-    if (rollout.cost > 0.0).all():
+def _deposit(environment: Environment, steps: int, seed: int) -> dict[str, Any]:
+    """A deposit for rewards that are no negative costs, with a word; else nothing."""
+    deposit = suitable_deposit(environment.vector(PROBES), steps, seed)
+    if deposit is None:
         return {}
     report(
         "acl-gym",
         f"note: the rewards of {environment.name} are not negative costs, so the ants "
-        f"deposit by their rank, --param deposit=rank:{FOREIGN_DEPOSIT.exponent:g}; "
+        f"deposit by their rank, --param deposit=rank:{BY_RANK.exponent:g}; "
         "deposit=return and deposit=inverse_cost:OFFSET are other choices.",
     )
-    return {"deposit": FOREIGN_DEPOSIT}
+    return {"deposit": deposit}
 
 
 def _evaluation(
@@ -330,8 +313,9 @@ def _failed(error: Exception, learner: Any, begun: int, target: Path) -> Excepti
     words = in_words(error)
     deposit = getattr(learner, "deposit", None)
     if isinstance(deposit, InverseCost) and getattr(learner, "cost", None) is None:
-        costs = learner.rollout.cost + deposit.offset
-        if (costs <= 0.0).any():
+        rollout = learner.rollout
+        costs = rollout.cost + deposit.offset
+        if not rollout.ants.size and (costs <= 0.0).any():  # all walks are complete
             words = (
                 "ants deposit 1 / cost, and costs must be > 0, but an ant has cost "
                 f"{costs.min():g}: the rewards are not negative costs. Add --param "

@@ -100,13 +100,18 @@ def reproduce(
     debug: DebugOption = False,
 ) -> None:
     """Reproduce; see `HELP`."""
-    from acl_gym.experiments import reproduce as engine
+    from acl_gym.experiments.names import EXECUTORS, EXPERIMENTS
     from acl_gym.utils.validation import one_of
 
+    # Names first: a wrong one is answered before anything slow is imported.
     wanted = names or ["all"]
     with bad_arguments():
-        experiments = engine.chosen(wanted)
-        one_of("--executor", executor, engine.EXECUTORS)
+        for name in wanted:
+            one_of("experiment", name, ("all", "claims", *EXPERIMENTS))
+        one_of("--executor", executor, EXECUTORS)
+    from acl_gym.experiments import reproduce as engine
+
+    experiments = engine.chosen(wanted)
     if only_list:
         _list(experiments, as_json)
         return

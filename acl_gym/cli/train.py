@@ -102,8 +102,8 @@ def train(
         typer.Option(
             min=1,
             metavar="M",
-            help="Number of ants: slots of the vector environment.  [default: 250; with "
-            "--resume: as before]",
+            help="Number of ants: slots of the vector environment.  [default: 250, or 200 "
+            "in environments of other packages; with --resume: as before]",
             show_default=False,
         ),
     ] = None,
@@ -273,7 +273,7 @@ def train(
             typed,
             kind,
             settings,
-            ants=ants or learning.ANTS,
+            ants=ants,
             partition=partition,
             cells=wanted_cells,
             max_steps=max_steps,

@@ -16,6 +16,7 @@ from acl_gym.agents.acl import ACL, PheromoneBoundWarning
 from acl_gym.agents.base import TabularAgent
 from acl_gym.agents.q_learning import QLearning
 from acl_gym.callbacks.base import Callback
+from acl_gym.colony.deposits import deposit_from_settings
 from acl_gym.envs.wrappers.perturbations import ReversedDraws, ReversedSlots
 from acl_gym.evaluation import Predictor, evaluate_policy_cost, policy_measures
 from acl_gym.experiments.episode_costs import EPISODE_COSTS
@@ -28,7 +29,7 @@ from acl_gym.utils.typing import Row
 
 
 class Method(NamedTuple):
-    """A way to come to a policy. Its label in figures is in `comparison.tasks.METHODS`.
+    """A way to come to a policy. Its label in figures is in `names.METHODS`.
 
     Attributes:
         run: makes one run of a study.
@@ -79,8 +80,7 @@ class Evaluation(Callback):
     def __init__(self, study: Study) -> None:
         self.rows: list[Row] = []
         self._study, self._task = study, study.task
-        self._states = study.task.evaluation_states()
-        self._env = study.task.make_env(len(self._states))
+        self._env, self._states = study.task.evaluation_env()
         self._due = 0.0
 
     def on_trial_end(self, agent: Any, row: Row) -> bool | None:
@@ -123,6 +123,8 @@ def make_agent(study: Study, seed: int) -> TabularAgent:
         env = TransformReward(env, lambda reward: np.full_like(reward, -1.0))
     if study.method == "acl" and task.cost is not None:
         settings["cost"] = EPISODE_COSTS[task.cost].cost
+    if isinstance(settings.get("deposit"), dict):
+        settings["deposit"] = deposit_from_settings(settings["deposit"])
     kind: type[ACL | QLearning] = ACL if study.method == "acl" else QLearning
     with warnings.catch_warnings():
         # Table 4.1 has a tau_0 above 1 / J_max: the thesis wants it so.
@@ -164,12 +166,11 @@ def _learn_dqn(study: Study, seed: int) -> Run:
     import torch
 
     from acl_gym.sb3.callback import PolicyCostCallback
-    from acl_gym.sb3.dqn import scaled_env
 
     torch.set_num_threads(1)  # the fastest for such small networks
-    task = study.task
+    env, states, longest = study.task.dqn_evaluation()
     evaluation = PolicyCostCallback(
-        scaled_env(task.env_id, **task.env), every=study.evaluate_every or 1_000
+        env, states, every=study.evaluate_every or 1_000, max_steps=longest
     )
     model = _make_dqn(study, seed)
     model.learn(study.steps, callback=evaluation)
@@ -180,15 +181,12 @@ def _learn_dqn(study: Study, seed: int) -> Run:
 
 
 def _make_dqn(study: Study, seed: int) -> Any:
-    from acl_gym.sb3.dqn import DQNSettings, make_dqn
-
     if study.task.perturbations or study.task.cost is not None:
         raise ValueError(
             "DQN needs a task without perturbations and judged by its stage costs, got "
             f"{study.task}."
         )
-    settings = DQNSettings(**study.settings)
-    return make_dqn(study.task.env_id, settings, seed, **study.task.env)
+    return study.task.make_dqn(study.settings, seed)
 
 
 def _restore_dqn(study: Study, run: Run) -> Predictor:

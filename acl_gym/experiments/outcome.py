@@ -78,7 +78,9 @@ def _study(label: str, study: Study, results: Results) -> Outcome:
             "min": float(costs.min()),
             "max": float(costs.max()),
         },
-        "success_rate": float(results.last(study, "success_rate").mean()),
+        "success_rate": float(results.last(study, "success_rate").mean())
+        if results.knows(study, "success_rate")
+        else None,
         "seconds": float(np.median(seconds)),
         "every": every,
         "positions": points and points[::every],

@@ -48,6 +48,8 @@ def write_report(
         animation: the file name of a GIF among the figures.
     """
     files = {figure["file"] for each in experiments for figure in each["figures"]}
+    # Results may come from anywhere: no name in them leads out of the folder.
+    files = {file for file in files if Path(file).name == file}
     counts = Counter(claim["verdict"] for claim in claims)
     _render(
         path,

@@ -11,11 +11,12 @@ from pathlib import Path
 from rich.console import Console
 
 from acl_gym.experiments import comparison, outcome, plots, thesis
+from acl_gym.experiments.names import EXECUTORS
 from acl_gym.experiments.outcome import Outcome, without_curves
 from acl_gym.experiments.provenance import ROOT, circumstances
 from acl_gym.experiments.report import write_claims, write_report
 from acl_gym.experiments.results import Results
-from acl_gym.experiments.runner import EXECUTORS, exclusive_lock, list_jobs, run_studies
+from acl_gym.experiments.runner import exclusive_lock, list_jobs, run_studies
 from acl_gym.experiments.store import Job, Store
 from acl_gym.experiments.study import Experiment
 from acl_gym.experiments.thesis import CLAIMS, RUNS

@@ -78,6 +78,10 @@ class Results:
             [hold_last_value(r["env_steps"], r[measure], points) for r in rows]
         )
 
+    def knows(self, study: Study, measure: str) -> bool:
+        """Whether the runs of a study have a measure."""
+        return all(measure in run.rows for run in self.runs(study))
+
     def last(self, study: Study, measure: str = "policy_cost") -> FloatArray:
         """A measure at the end of each run, `(runs,)`."""
         return np.array([run.rows[measure].iloc[-1] for run in self.runs(study)])

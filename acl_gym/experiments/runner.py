@@ -31,8 +31,6 @@ from acl_gym.utils.files import remove_stale
 
 logger = logging.getLogger("acl_gym")
 
-EXECUTORS = ("local", "ray")
-
 
 class FolderInUseError(RuntimeError):
     """Another runner works on the folder."""

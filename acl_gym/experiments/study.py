@@ -83,6 +83,28 @@ class Task:
         states = self.make_system_env(1).system.evaluation_states()
         return np.repeat(states, self.repeats, axis=0)
 
+    def evaluation_env(self) -> tuple[VectorEnv[Any, Any, Any], FloatArray | None]:
+        """The environment of an evaluation, a slot for each episode, and its states.
+
+        The states are None where an evaluation starts from random ones.
+        """
+        states = self.evaluation_states()
+        return self.make_env(len(states)), states
+
+    def dqn_evaluation(
+        self,
+    ) -> tuple[VectorEnv[Any, Any, Any], FloatArray | None, int | None]:
+        """As `evaluation_env` for DQN, whose observations are scaled; and T."""
+        from acl_gym.sb3.dqn import scaled_env  # which imports torch
+
+        return scaled_env(self.env_id, **self.env), None, None
+
+    def make_dqn(self, settings: dict[str, Any], seed: int) -> Any:
+        """The DQN that learns here."""
+        from acl_gym.sb3.dqn import DQNSettings, make_dqn
+
+        return make_dqn(self.env_id, DQNSettings(**settings), seed, **self.env)
+
     @cached_property
     def longest_evaluation(self) -> int:
         """T of an evaluation."""

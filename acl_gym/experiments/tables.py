@@ -65,9 +65,12 @@ class Table:
 
 
 class Reference(NamedTuple):
-    """What policies are measured against: a study, its cost, and whether that is J*."""
+    """What policies are measured against: a study, its cost, and whether that is J*.
 
-    study: Study
+    Without a model there is no such study; the cost is then the lowest of all runs.
+    """
+
+    study: Study | None
     cost: float
     optimal: bool
 
@@ -76,13 +79,30 @@ class Reference(NamedTuple):
         """What the cost is called."""
         return "J*" if self.optimal else "best known"
 
+    def within(self, percent: float) -> float:
+        """The cost that is so much above this one; costs may be below 0."""
+        if self.cost >= 0.0:
+            return self.cost * (1 + percent / 100)
+        return self.cost * (1 - percent / 100)
+
+    def gap(self, costs: FloatArray) -> FloatArray:
+        """Percent above this cost; NaN where it is 0."""
+        if self.cost == 0.0:
+            return np.full_like(costs, np.nan)
+        gap = 100 * (costs / self.cost - 1)
+        return gap if self.cost > 0.0 else -gap
+
 
 def reference(experiment: Experiment, results: Results) -> Reference:
-    """The first reference; an option says whether it is the optimum."""
+    """The first reference; an option says whether it is the optimum.
+
+    Without one, the best policy of all runs.
+    """
     for study in experiment.references.values():
         cost = float(results.last(study)[0])
         return Reference(study, cost, experiment.options["optimum"])
-    raise LookupError(f"{experiment.name} must have a reference, got none.")
+    costs = [results.best(study).min() for study in experiment.studies.values()]
+    return Reference(None, float(min(costs)), optimal=False)
 
 
 class Comparison(NamedTuple):
@@ -145,20 +165,28 @@ def _compared(
     ]
 
 
-def _measured(study: Study, results: Results, cost: float) -> dict[str, FloatArray]:
-    """All that tables say of a study, one value a run; `cost` is the reference's."""
+def _measured(
+    study: Study, results: Results, known: Reference
+) -> dict[str, FloatArray]:
+    """All that tables say of a study, one value a run.
+
+    NaN where nothing is known: of success in environments of other packages.
+    """
     final, best = results.last(study), results.best(study)
+    rates = [np.full(len(final), np.nan)] * 2
+    if results.knows(study, "success_rate"):
+        rates = [f(study, "success_rate") for f in (results.last, results.best)]
     return {
         "final_policy_cost": final,
-        "final_gap_percent": 100 * (final / cost - 1),
-        "final_success_rate": results.last(study, "success_rate"),
+        "final_gap_percent": known.gap(final),
+        "final_success_rate": rates[0],
         "best_policy_cost": best,
-        "best_gap_percent": 100 * (best / cost - 1),
-        "best_success_rate": results.best(study, "success_rate"),
+        "best_gap_percent": known.gap(best),
+        "best_success_rate": rates[1],
         "env_steps": results.last(study, "env_steps"),
         "seconds": results.last(study, "seconds"),
         **{
-            f"{x}_to_{mark}": results.first_within(study, cost * (1 + mark / 100), x)
+            f"{x}_to_{mark}": results.first_within(study, known.within(mark), x)
             for mark in MARKS
             for x in _UNITS
         },
@@ -169,7 +197,7 @@ def system(experiment: Experiment, results: Results) -> Table:
     """One system: costs, and what learning takes in interactions and in time."""
     known, rows = reference(experiment, results), []
     studies = experiment.studies.items()
-    found = {label: _measured(each, results, known.cost) for label, each in studies}
+    found = {label: _measured(each, results, known) for label, each in studies}
     for label, own in found.items():
         last, runs = own["final_policy_cost"], results.runs(experiment.studies[label])
         rows.append(
@@ -230,7 +258,8 @@ def overview(experiment: Experiment, results: Results) -> Table:
     table, found = harder(experiment, results), {}
     for where, row in experiment.options["rows"].items():
         cost = float(results.last(experiment.references[where])[0])
-        found[where] = {LABELS[n]: _measured(row[n], results, cost) for n in row}
+        known = Reference(experiment.references[where], cost, optimal=False)
+        found[where] = {LABELS[n]: _measured(row[n], results, known) for n in row}
     for key, text in _TIMES.items():
         for where, row in found.items():
             values = {name: own[key] for name, own in row.items()}
@@ -291,15 +320,18 @@ def summarise(experiment: Experiment, results: Results) -> list[dict[str, Any]]:
         `_COLUMNS`, gaps being percent above the reference; of the times until policies
         are close to it also how many `reached` it.
     """
-    cost, summary = reference(experiment, results).cost, []
+    known, summary = reference(experiment, results), []
     for label, study in experiment.studies.items():
         entry: dict[str, Any] = {
             "agent": experiment.options["agents"][label],
             "label": label,
             "seeds": len(results.runs(study)),
         }
-        for key, values in _measured(study, results, cost).items():
-            entry[key] = estimate(values, median).as_json("median")
+        for key, values in _measured(study, results, known).items():
+            if np.isnan(values).any():
+                entry[key] = dict.fromkeys(("median", "low", "high"))
+            else:
+                entry[key] = estimate(values, median).as_json("median")
             if key in _TIMES:
                 entry[key]["reached"] = int(np.isfinite(values).sum())
         summary.append(entry)
@@ -341,6 +373,8 @@ def summary(experiment: Experiment, results: Results, *, brief: bool = False) ->
         if brief and best is None:
             continue
         medians = [entry[key]["median"] for entry in entries]
+        if key.endswith(("gap_percent", "success_rate")) and set(medians) == {None}:
+            continue  # of which nothing is known
         known = [value for value in medians if value is not None]
         if best and known and len(set(medians)) > 1:
             found, place = best(known), len(headings)

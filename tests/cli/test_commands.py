@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import inspect
 import json
 import os
 import subprocess
@@ -18,11 +19,12 @@ import pytest
 import acl_gym
 from acl_gym import ACL, Crisp, Fuzzy, PolicyEvaluation, QLearning, evaluate_policy_cost
 from acl_gym.cli.agents import AGENTS
+from acl_gym.cli.agents import parameters as declared
 from acl_gym.cli.envs import describe, parameters
 from acl_gym.cli.settings import parse_settings
-from acl_gym.cli.train import agent_class, parameter_names
 from acl_gym.envs import ENVIRONMENTS
 from acl_gym.envs.pendulum import Pendulum
+from acl_gym.utils.parameters import parameters_of
 from tests.cli.runner import (
     COMMANDS,
     MODULE,
@@ -60,7 +62,8 @@ def test_help_and_version() -> None:
 
 
 def test_help_of_compare_lists_what_there_is() -> None:
-    from acl_gym.experiments.comparison.tasks import BY_ENV_ID, PRESETS, SYSTEMS
+    from acl_gym.experiments.comparison.tasks import BY_ENV_ID, SYSTEMS
+    from acl_gym.experiments.names import PRESETS
 
     text = invoke("compare", "--help").stdout
     for name in (*SYSTEMS["pendulum"].agents, *PRESETS, *BY_ENV_ID):
@@ -120,7 +123,7 @@ def test_a_file_evaluates_to_what_training_ended_with(
     out = str(tmp_path / "x.npz")
     arguments = [*SMALL, "--agent", agent, "--ants", ants, "--out", out]
     trained = figures(*arguments, "--max-steps", "60")
-    assert [path.name for path in tmp_path.iterdir()] == ["x.npz"]
+    assert {path.name for path in tmp_path.iterdir()} == {"x.npz", "x-best.npz"}
     assert trained["file"] == out
     assert trained["policy_cost"] == trained["rows"][-1]["policy_cost"]
     evaluated = figures("evaluate", out)
@@ -170,6 +173,13 @@ def test_the_table_has_the_evaluated_rows_and_the_last() -> None:
     assert [line.split()[0] for line in lines[1:4]] == ["2", "4", "5"]
     assert f"{rows[-1]['policy_cost']:.4f}" in lines[3]
     assert lines[4].startswith("Saved Pendulum-v0.npz. To evaluate it again: acl-gym")
+    best = min(
+        (row for row in rows if "policy_cost" in row), key=lambda r: r["policy_cost"]
+    )
+    assert lines[5] == (
+        f"The best policy, after trial {best['trial']} with a cost of "
+        f"{best['policy_cost']:.4f}: Pendulum-v0-best.npz"
+    )
 
 
 def test_quiet_prints_nothing() -> None:
@@ -223,7 +233,13 @@ def test_an_environment_of_a_module_in_this_folder(tmp_path: Path) -> None:
     assert done.stderr == ""
     trained = json.loads(done.stdout)
     assert trained["parameters"]["max_steps"] == 80
-    again = run("evaluate", "c.npz", "--json", cwd=tmp_path)
+    refused = run("evaluate", "c.npz", "--json", cwd=tmp_path)
+    assert (refused.returncode, refused.stdout) == (2, "")
+    assert "add --env-id my_corridor:Corridor-v0" in refused.stderr
+    again = run(
+        *("evaluate", "c.npz", "--json", "--env", "my_corridor:Corridor-v0"),
+        cwd=tmp_path,
+    )
     assert again.returncode == 0, again.stderr
     evaluated = json.loads(again.stdout)
     assert evaluated["policy_cost"] == trained["policy_cost"]
@@ -327,7 +343,16 @@ def test_values_are_json_where_they_are() -> None:
 @pytest.mark.parametrize("agent", list(AGENTS))
 def test_every_parameter_in_a_file_can_be_set(agent: str) -> None:
     """What an agent saves is what `--param` takes, less what has an option."""
-    kind = agent_class(agent)
+    kind = AGENTS[agent].load()
     grid = Crisp([[0.0, 1.0]])
     saved = set(kind(None, grid, n_actions=2).parameters()) - {"max_steps", "seed"}
-    assert saved == set(parameter_names(kind))
+    assert saved == set(declared(agent))
+    signature = inspect.signature(kind).parameters
+    for name, each in declared(agent).items():
+        assert each.default == signature[name].default
+        if name in parameters_of(kind):
+            number = parameters_of(kind)[name]
+            assert (each.range, each.scheduled) == (
+                number.range.in_words(),
+                number.scheduled,
+            )

@@ -10,12 +10,11 @@ from typing import Any
 
 from acl_gym.experiments.comparison.tasks import (
     HARDER,
-    METHODS,
     PLAIN,
-    TABLE_METHODS,
     TASKS,
     tuned,
 )
+from acl_gym.experiments.names import METHODS, TABLE_METHODS
 from acl_gym.experiments.study import Experiment, Study
 
 LONG = "acl-long"

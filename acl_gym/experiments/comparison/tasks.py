@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from acl_gym.experiments import systems
+from acl_gym.experiments.names import METHODS, TABLE_METHODS, agent_names
 from acl_gym.experiments.study import Study, Task
 from acl_gym.utils.validation import one_of
 
@@ -25,28 +26,6 @@ Settings = Mapping[str, Any]
 
 SETTINGS_FILE = Path(__file__).with_name("settings.json")
 """The tuned settings: task -> method -> what its search has found."""
-
-
-class Method(NamedTuple):
-    """A method: its label, and the key of `methods.METHODS` that runs it."""
-
-    label: str
-    key: str
-
-
-METHODS = {
-    "acl": Method("ACL", "acl"),
-    "q": Method("Q-learning", "q-learning"),
-    "q-lambda": Method("Q(λ)", "q-learning"),
-    "dqn": Method("DQN", "dqn"),
-}
-"""The methods by the names that commands and files have for them."""
-
-TABLE_METHODS = tuple(name for name, each in METHODS.items() if each.key != "dqn")
-"""Those that keep a table over a partition."""
-
-PRESETS = {"smoke": 1, "quick": 3, "full": 10}
-"""How many runs of each method `acl-gym compare` makes; a system has its budgets."""
 
 
 class Agent(NamedTuple):
@@ -105,6 +84,16 @@ class System:
         return self.colony.task.env_id
 
     @property
+    def task(self) -> Task:
+        """What the learners meet."""
+        return Task(env_id=self.env_id)
+
+    @property
+    def has_model(self) -> bool:
+        """Whether dynamic programming can be held against the methods."""
+        return True
+
+    @property
     def max_steps(self) -> int:
         """T, the longest episode."""
         return int(self.colony.settings["max_steps"])
@@ -112,14 +101,16 @@ class System:
     @property
     def agents(self) -> dict[str, Agent]:
         """What `acl-gym compare` runs, by name, in order."""
-        found = {
-            f"{name}-{kind}": Agent(
-                METHODS[name].label + ("" if self.finite else f", {kind}"), name, kind
+        found = {}
+        for each in agent_names(self.finite):
+            name, _, kind = (
+                each.rpartition("-") if each not in METHODS else (each, "", "")
             )
-            for name in TABLE_METHODS
-            for kind in (("crisp",) if self.finite else ("fuzzy", "crisp"))
-        }
-        return {**found, "dqn": Agent(METHODS["dqn"].label, "dqn", "")}
+            words = METHODS[name].label
+            if kind and not self.finite:
+                words += f", {kind}"
+            found[each] = Agent(words, name, kind)
+        return found
 
     def settings_of(self, method: str, suffix: str) -> dict[str, Any]:
         """What a method runs with, for a kind of partition or a length of run."""
@@ -134,7 +125,7 @@ class System:
             preset: a key of `PRESETS`.
         """
         _, method, kind = self.agents[one_of("agent", name, tuple(self.agents))]
-        budget, task = self.budgets[preset], Task(env_id=self.env_id)
+        budget, task = self.budgets[preset], self.task
         if method == "dqn":
             settings = self.settings_of("dqn", budget.length)
             return _dqn(task, settings, budget.dqn_steps, budget.evaluate_every)
@@ -153,8 +144,7 @@ class System:
 
     def planned(self, cells: Any) -> Study:
         """Dynamic programming on some cells."""
-        task = Task(env_id=self.env_id)
-        return Study(task=task, method="planning", cells=cells, most_runs=1)
+        return Study(task=self.task, method="planning", cells=cells, most_runs=1)
 
 
 def _dqn(task: Task, settings: dict[str, Any], steps: int, every: int) -> Study:

@@ -36,6 +36,7 @@ PLOTS: dict[str, Callable[[Experiment, Results], Figure]] = {
     "order": dots.order,
     "summary": dots.summary,
     "learning_curves": curves.learning_curves,
+    "returns": curves.returns,
     "policy_maps": policies.policy_maps,
     "trajectories": policies.trajectories,
 }

@@ -171,6 +171,25 @@ def learning_curves(experiment: Experiment, results: Results) -> Figure:
     return figure
 
 
+def returns(experiment: Experiment, results: Results) -> Figure:
+    """The return of the policy over interactions and seconds."""
+    figure, axes = style.small_multiples(2, 2, 2.6, sharey=True)
+    studies = experiment.studies
+    logs = {
+        name: [
+            run.rows.assign(policy_cost=-run.rows["policy_cost"])
+            for run in results.runs(study)
+        ]
+        for name, study in studies.items()
+    }
+    lines = [look_of(study).line for study in studies.values()]
+    for x, ax in zip(AXES, axes, strict=True):
+        draw_learning_curves(ax, logs, lines, x)
+        ax.set_yscale("linear")
+    axes[0].set_ylabel("return of the policy")
+    return figure
+
+
 def _curves(
     ax: Axes, experiment: Experiment, results: Results, x: str, **options: Any
 ) -> None:

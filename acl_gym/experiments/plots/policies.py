@@ -57,6 +57,8 @@ def _with_reference(experiment: Experiment, results: Results) -> list[Shown]:
     name, symbol = (
         ("Optimum", "J* =") if known.optimal else ("Best policy known", "cost")
     )
+    if known.study is None:
+        raise ValueError("there is no policy of a reference; leave this figure out.")
     first = _shown(name, known.study, results, 0)
     return [
         replace(first, title=f"{name}\n{symbol} {digits(known.cost)}"),

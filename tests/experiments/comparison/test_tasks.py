@@ -12,17 +12,15 @@ from acl_gym.colony.episodes import Episodes
 from acl_gym.experiments.comparison import EXPERIMENTS
 from acl_gym.experiments.comparison.experiments import LONG
 from acl_gym.experiments.comparison.tasks import (
-    METHODS,
     PLAIN,
-    PRESETS,
     SYSTEMS,
-    TABLE_METHODS,
     TASKS,
     tuned,
     tuned_settings,
 )
 from acl_gym.experiments.episode_costs import EPISODE_COSTS, Peak, Switches
 from acl_gym.experiments.methods import make_agent, run
+from acl_gym.experiments.names import METHODS, PRESETS, TABLE_METHODS
 from acl_gym.experiments.study import Study
 from acl_gym.partitions import Crisp, Discrete, Fuzzy
 

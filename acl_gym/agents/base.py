@@ -482,7 +482,7 @@ class TabularAgent(PartitionPolicy):
             raise TypeError(f"first_action must be an integer, got {first_action!r}")
         self.first_action = first_action
         for name in ("num_timesteps", "trials"):
-            count = validation.integer(name, header[name], at_least=0)
+            count = validation.integer(name, header[name], at_least=0, at_most=2**62)
             setattr(self, name, count)
         self.seconds = validation.number("seconds", header["seconds"], at_least=0)
         history = from_json(header["history"])

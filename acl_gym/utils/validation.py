@@ -108,9 +108,10 @@ def integer(name: str, value: Any, *, at_least: int, at_most: int | None = None)
         )
     if value < at_least:
         raise ValueError(f"{name} must be at least {at_least}, got {value}.")
-    if at_most is not None and value > at_most:
+    result = int(value)
+    if at_most is not None and result > at_most:
         raise ValueError(f"{name} must be at most {at_most}, got {value}.")
-    return int(value)
+    return result
 
 
 def real_array(

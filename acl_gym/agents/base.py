@@ -382,9 +382,17 @@ class TabularAgent(PartitionPolicy):
         """Check that nothing is missing that the file of the agent could not hold.
 
         Raises:
-            ValueError: something is; the message says what is to be given.
+            TypeError: the parameters could not be saved.
+            ValueError: something is missing; the message says what is to be given.
         """
-        parts = (getattr(self, name, None) for name in self.parameters())
+        try:
+            names = self.parameters()
+        except RecursionError as error:
+            raise TypeError(
+                "cost must lie at most some hundred costs deep, or it cannot be saved; "
+                "multiply the factors first."
+            ) from error
+        parts = (getattr(self, name, None) for name in names)
         for part in (self.partition, *parts):
             if (missing := missing_in(part)) is not None:
                 raise missing.error()

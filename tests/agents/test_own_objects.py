@@ -288,6 +288,26 @@ def test_settings_of_numpy_are_settings_of_python() -> None:
         Sum((Steps(), length))  # type: ignore[arg-type]
 
 
+def test_a_sum_of_many_costs_is_saved(tmp_path: Path) -> None:
+    """As `sum` makes it, term by term."""
+    agent = colony(cost=sum([Steps()] * 400, start=Steps())).learn(trials=1)
+    loaded = ACL.load(agent.save(tmp_path / "agent"), chains(4, slip=0.2))
+    assert loaded.cost == agent.cost
+    assert (
+        loaded.learn(trials=1).table.tobytes() == agent.learn(trials=1).table.tobytes()
+    )
+
+
+def test_what_cannot_be_saved_at_all_is_refused_before_learning() -> None:
+    cost = Steps()
+    for _ in range(500):
+        cost = 1.001 * cost
+    agent = colony(cost=cost)
+    with pytest.raises(TypeError, match=r"cost must lie at most .* deep"):
+        agent.learn(trials=1)
+    assert agent.trials == 0
+
+
 @pytest.mark.parametrize("kind", [ACL, QLearning])
 def test_files_that_are_open(kind: type[TabularAgent], tmp_path: Path) -> None:
     agent: Any = kind(chains(4), ROW, max_steps=9, seed=0).learn(trials=2)

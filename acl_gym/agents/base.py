@@ -470,9 +470,17 @@ class TabularAgent(PartitionPolicy):
         """Check that nothing is missing that the file of the agent could not hold.
 
         Raises:
-            ValueError: something is; the message says what is to be given.
+            TypeError: the parameters could not be saved.
+            ValueError: something is missing; the message says what is to be given.
         """
-        parts = (getattr(self, name, None) for name in self.parameters())
+        try:
+            names = self.parameters()
+        except RecursionError as error:
+            raise TypeError(
+                "cost must lie at most some hundred costs deep, or it cannot be saved; "
+                "multiply the factors first."
+            ) from error
+        parts = (getattr(self, name, None) for name in names)
         for part in (self.partition, *parts):
             if (missing := missing_in(part)) is not None:
                 raise missing.error()
@@ -570,7 +578,7 @@ class TabularAgent(PartitionPolicy):
             raise TypeError(f"first_action must be an integer, got {first_action!r}")
         self.first_action = first_action
         for name in ("num_timesteps", "trials"):
-            count = validation.integer(name, header[name], at_least=0)
+            count = validation.integer(name, header[name], at_least=0, at_most=2**62)
             setattr(self, name, count)
         self.seconds = validation.number("seconds", header["seconds"], at_least=0)
         history = from_json(header["history"])

@@ -280,6 +280,7 @@ class _Traces:
         self._trace: FloatArray = np.empty((slots, first))
         self._count: IntArray = np.zeros(slots, dtype=np.int64)
         self._mark: FloatArray = np.zeros(n_pairs)
+        self._at_most = 0  # no slot has more traces than this
 
     @property
     def greedy(self) -> BoolArray:
@@ -289,19 +290,24 @@ class _Traces:
     def clear(self) -> None:
         """Forget all traces."""
         self._count[:] = 0
+        self._at_most = 0
 
     def with_room(self, more: int) -> tuple[Any, ...]:
         """The arrays that `_update_traced` changes, with room for `more` in each slot."""
-        room = self._pair.shape[1]
-        needed = min(int(self._count.max()) + more, self._most)
-        if needed > room:
-            wider = min(max(2 * room, needed), self._most)
-            for name in ("_pair", "_trace"):
-                array = getattr(self, name)
-                copy = np.empty((len(array), wider), dtype=array.dtype)
-                copy[:, :room] = array
-                setattr(self, name, copy)
+        self._at_most += more
+        if self._at_most > (room := self._pair.shape[1]):
+            self._at_most = int(self._count.max()) + more
+            if min(self._at_most, self._most) > room:
+                self._widen(min(max(2 * room, self._at_most), self._most))
         return self._greedy, self._pair, self._trace, self._count, self._mark
+
+    def _widen(self, width: int) -> None:
+        """Make room for more traces of each slot; those that are there stay."""
+        for name in ("_pair", "_trace"):
+            array = getattr(self, name)
+            wider = np.empty((len(array), width), dtype=array.dtype)
+            wider[:, : array.shape[1]] = array
+            setattr(self, name, wider)
 
 
 def _next_allowed(rollout: Rollout, step: Step) -> BoolArray:

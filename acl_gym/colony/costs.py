@@ -31,7 +31,8 @@ class Cost(Savable, ABC):
     def __add__(self, other: Cost | float) -> Cost:
         """The sum of two costs, or of a cost and a constant."""
         term = other if isinstance(other, Cost) else Constant(other)
-        return Sum((self, term))
+        # One sum of many terms, not sums in sums, which Python limits.
+        return Sum((*self.terms, term) if type(self) is Sum else (self, term))
 
     __radd__ = __add__
 

@@ -110,7 +110,7 @@ def _saved(partition: Partition) -> dict[str, Any]:
     """The saved form of a user's own partition."""
     try:
         settings = to_json(partition.settings(), "settings")
-    except TypeError:
+    except Exception:  # of a user's code: the table is worth more than the settings
         settings = None
     return MissingPartition(
         own_name(partition),

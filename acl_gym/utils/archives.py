@@ -32,6 +32,7 @@ tables of 20 million (cell, action) pairs. An agent takes about five times as mu
 _BYTES_A_VALUE = 64
 """What a value in the JSON counts at least, being an object in memory."""
 
+_PART = 2**20
 _SUFFIX = ".npy"
 _MOST_ARRAYS = 1_000
 
@@ -120,8 +121,8 @@ class TooLargeError(ValueError):
 
     def __init__(self, what: str, size: int, most: int) -> None:
         super().__init__(
-            f"holds {what} of {size:,} bytes, where {most:,} bytes are left of what a "
-            "file may hold; if you trust it pass load(path, max_bytes=...)."
+            f"holds {what} of {size:,} bytes or more, where {most:,} bytes are left of "
+            "what a file may hold; if you trust it pass load(path, max_bytes=...)."
         )
 
 
@@ -231,7 +232,7 @@ def _is_file(doing: str, target: Any, method: str) -> bool:
     if not hasattr(target, method) or isinstance(target, io.TextIOBase):
         raise TypeError(
             f"the place to {doing} must be a path or a file open in binary mode, got "
-            f'{target!r}; pass a path, io.BytesIO() or open(path, "wb" or "rb").'
+            f"{target!r:.80}; pass a path, io.BytesIO(), or a file opened in binary mode."
         )
     return True
 
@@ -240,27 +241,33 @@ def _content(source: Target, most: int) -> tuple[str, bytes]:
     """The name and the bytes of a file."""
     if _is_file("load from", source, "read"):
         name = str(getattr(source, "name", "the file"))
-        content = source.read(most + 1)  # type: ignore[union-attr]
-        if not isinstance(content, bytes):
+        return name, _read(source, name, most)  # type: ignore[arg-type]
+    path = with_suffix(source)  # type: ignore[arg-type]
+    if not path.is_file():
+        path = Path(source)  # type: ignore[arg-type]
+    if not path.is_file():
+        raise FileNotFoundError(
+            f"no agent file at {with_suffix(source)}."  # type: ignore[arg-type]
+        )
+    with path.open("rb") as file:
+        return str(path), _read(file, str(path), most)
+
+
+def _read(file: BinaryIO, name: str, most: int) -> bytes:
+    """The rest of a file, in parts: `read(most)` would make room for all of `most`."""
+    parts: list[bytes] = []
+    left = most
+    while part := file.read(min(_PART, left + 1)):
+        if not isinstance(part, bytes):
             raise TypeError(
-                f"{name} must be open in binary mode, but gives "
-                f'{type(content).__name__}; open(path, "rb") does it.'
+                f"{name} must be open in binary mode, but gives {type(part).__name__}; "
+                "open it in the mode 'rb'."
             )
-    else:
-        path = with_suffix(source)  # type: ignore[arg-type]
-        if not path.is_file():
-            path = Path(source)  # type: ignore[arg-type]
-        if not path.is_file():
-            raise FileNotFoundError(
-                f"no agent file at {with_suffix(source)}."  # type: ignore[arg-type]
-            )
-        name = str(path)
-        with path.open("rb") as file:
-            content = file.read(most + 1)
-    if len(content) > most:
-        size = os.path.getsize(name) if Path(name).is_file() else len(content)
-        raise ValueError(f"{name} {TooLargeError('an agent', size, most)}")
-    return name, content
+        left -= len(part)
+        if left < 0:
+            raise ValueError(f"{name} {TooLargeError('an agent', most - left, most)}")
+        parts.append(part)
+    return b"".join(parts)
 
 
 def _json(text: bytes, most: int) -> dict[str, Any]:

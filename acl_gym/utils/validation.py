@@ -115,9 +115,10 @@ def integer(
         )
     if value < at_least:
         raise ValueError(f"{name} must be at least {at_least}, got {shown(value)}.")
-    if at_most is not None and value > at_most:
+    result = int(value)
+    if at_most is not None and result > at_most:
         raise ValueError(f"{name} must be at most {at_most}, got {shown(value)}.")
-    return int(value)
+    return result
 
 
 def seed(value: Any, name: str = "seed") -> int | None:

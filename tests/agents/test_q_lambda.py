@@ -458,3 +458,21 @@ def test_moves_that_fail_with_a_falling_rate(trace_decay: float) -> None:
         agent.learning_rate = 1 / (1 + 0.2 * trial)
         agent.learn(trials=1)
     np.testing.assert_allclose(agent.table[:, 0], -(6 - np.arange(7)) / 0.7, rtol=0.1)
+
+
+@pytest.mark.parametrize("traces", q_learning.TRACES)
+def test_memory_that_grows_changes_nothing(
+    traces: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """From room for one trace on, to the last bit; and none is made beforehand."""
+    whole = on_chain(traces=traces).learn(trials=5)
+    monkeypatch.setattr(q_learning, "FIRST_TRACES", 1)
+    grown = on_chain(traces=traces)
+    grown._max_steps = 10**12
+    grown.set_env(grown.env)
+    grown.rollout.max_steps = whole.max_steps
+    grown.learn(trials=5)
+    assert grown.table.tobytes() == whole.table.tobytes()
+    memory = grown._traces
+    assert memory is not None
+    assert memory.with_room(0)[1].shape[1] <= grown.table.size

@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import io
 import json
+import math
 import os
 import pickle
+import time
+import tracemalloc
+import warnings
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
@@ -367,3 +371,267 @@ def test_arrays_of_another_shape_are_refused(
     other = np.ones(shape, dtype=arrays.pop(name).dtype)
     for content in (packed(**arrays, **{name: other}), packed(**arrays)):
         assert not refuse_or_load(tmp_path / "a.npz", content)
+
+
+# --- files that would fill the memory --------------------------------------------
+
+
+def archive(*members: tuple[str, bytes], packing: int = zipfile.ZIP_DEFLATED) -> bytes:
+    """A zip file of these members, in this order, though a name comes twice."""
+    buffer = io.BytesIO()
+    with warnings.catch_warnings(), zipfile.ZipFile(buffer, "w", packing) as file:
+        warnings.simplefilter("ignore")
+        for name, content in members:
+            file.writestr(name, content)
+    return buffer.getvalue()
+
+
+def array(shape: Any, kind: str = "<f8", content: bytes = b"") -> bytes:
+    """An `.npy` file that claims to be of some shape."""
+    buffer = io.BytesIO()
+    description = {"descr": kind, "fortran_order": False, "shape": shape}
+    np.lib.format.write_array_header_1_0(buffer, description)
+    return buffer.getvalue() + content
+
+
+def members_of(content: bytes) -> dict[str, bytes]:
+    with zipfile.ZipFile(io.BytesIO(content)) as file:
+        return {name: file.read(name) for name in file.namelist()}
+
+
+def with_header(saved: bytes, text: bytes) -> bytes:
+    members = members_of(saved)
+    members["header.npy"] = array((len(text),), "|u1", text)
+    return archive(*members.items())
+
+
+def loaded_in(path: Path, content: bytes) -> tuple[Exception | None, float]:
+    """What loading raises, and how many bytes it has taken at most."""
+    path.write_bytes(content)
+    tracemalloc.start()
+    try:
+        ACL.load(path)
+    except (TypeError, ValueError, OSError) as error:
+        return error, tracemalloc.get_traced_memory()[1]
+    else:
+        return None, tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+
+
+MEGABYTE = 2**20
+
+
+@pytest.mark.parametrize("name", ["more", "update_total", "heuristic"])
+def test_an_array_nobody_asks_for_is_not_read(
+    name: str, saved: bytes, tmp_path: Path
+) -> None:
+    """Those of a rule, or the heuristic, are read and count: zeros pack to nothing."""
+    zeros = array((2**25,), "<f8", bytes(2**28))  # 256 MiB, the most a file may hold
+    content = archive(*members_of(saved).items(), (f"{name}.npy", zeros))
+    assert len(content) < MEGABYTE
+    del zeros
+    error, most = loaded_in(tmp_path / "a.npz", content)
+    assert most < 20 * MEGABYTE
+    if name == "more":
+        assert error is None
+    else:
+        assert "holds " + name in str(error)
+        assert "load(path, max_bytes=...)" in str(error)
+
+
+@pytest.mark.parametrize("name", ["table", "ranks", "header"])
+@pytest.mark.parametrize(
+    "shape", [(2**40,), (6, 2**33), (2**62, 2**62), (-1, -1), (6, -2)]
+)
+def test_a_shape_alone_reserves_nothing(
+    name: str, shape: Any, saved: bytes, tmp_path: Path
+) -> None:
+    members = members_of(saved) | {f"{name}.npy": array(shape)}
+    error, most = loaded_in(tmp_path / "a.npz", archive(*members.items()))
+    assert isinstance(error, ValueError)
+    assert most < 20 * MEGABYTE
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"n_actions": 10**12},
+        {"n_actions": 2.5},
+        {"partition": {"type": "Discrete", "sizes": [2**15] * 2, "starts": 0}},
+        {"partition": {"type": "Crisp", "centres": [[0.0, 1.0]] * 30, "periods": None}},
+        {
+            "partition": {
+                "type": "own",
+                "name": "a",
+                "n_cells": 10**12,
+                "cells_per_state": 1,
+                "state_ndim": 1,
+                "settings": None,
+            }
+        },
+        {"trials": 10**400},
+        {"history": {"a": 1}},
+        {"history": [{"seconds": "1"}]},
+        {"parameters": []},
+        {"unsaved": 3},
+    ],
+    ids=lambda change: next(iter(change)),
+)
+def test_a_header_that_asks_for_much_or_nonsense(
+    change: dict[str, Any], saved: bytes, tmp_path: Path
+) -> None:
+    content = rewrite(saved, lambda header: header.update(change))
+    error, most = loaded_in(tmp_path / "a.npz", content)
+    assert isinstance(error, ValueError)
+    assert "a.npz" in str(error)
+    assert most < 20 * MEGABYTE
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        b"[" * 10**6,
+        b'{"a":' * 10**6,
+        b"[" + b"[]," * 5 * 10**6 + b"[]]",
+        b'{"a": ' + b"9" * 10**6 + b"}",
+        b"\xff" * 1000,
+        b'{"format": "acl-gym agent", "version": 1}',
+    ],
+    ids=["lists", "dicts", "many", "digits", "no text", "nothing else"],
+)
+def test_json_that_is_deep_or_long(text: bytes, saved: bytes, tmp_path: Path) -> None:
+    error, most = loaded_in(tmp_path / "a.npz", with_header(saved, text))
+    assert isinstance(error, ValueError)
+    assert most < 60 * MEGABYTE
+
+
+def test_members_that_come_twice_or_are_no_arrays(saved: bytes, tmp_path: Path) -> None:
+    members = list(members_of(saved).items())
+    for content in (
+        archive(*members, members[1]),
+        archive(*members, ("notes.txt", b"hello")),
+        archive(*members, ("objects.npy", array((1,), "|O", b"x"))),
+        archive(*members, *((f"m{i}.npy", array((0,))) for i in range(1_100))),
+        archive(*members, packing=zipfile.ZIP_LZMA),
+        archive(*members, packing=zipfile.ZIP_BZIP2),
+    ):
+        error, _ = loaded_in(tmp_path / "a.npz", content)
+        assert isinstance(error, ValueError)
+
+
+def test_the_limit_can_be_raised(saved: bytes, tmp_path: Path) -> None:
+    path = tmp_path / "a.npz"
+    path.write_bytes(saved)
+    with pytest.raises(ValueError, match=r"a\.npz holds .*max_bytes"):
+        ACL.load(path, max_bytes=100)
+    with pytest.raises(ValueError, match=r"the file holds an agent of .*max_bytes"):
+        ACL.load(io.BytesIO(saved), max_bytes=100)
+    assert ACL.load(path, max_bytes=10**9).trials == 2
+
+
+# --- hostile files ---------------------------------------------------------------
+
+HOSTILE_FILES = int(os.environ.get("ACL_GYM_HOSTILE_FILES", "60"))
+"""How many files the fuzz test makes; a thousand take a minute or two."""
+
+
+def json_noise(rng: np.random.Generator, depth: int = 0) -> Any:
+    """A value of JSON, often one that is nearly right."""
+    words = ["type", "function", "Crisp", "own", "Sum", "__array__", "__tuple__", ""]
+    numbers = [0, -1, 1, 2.5, 1e308, 10**30, math.nan, -math.inf, True, None, "1"]
+    kind = rng.integers(6 if depth < 4 else 3)
+    if kind < 2:
+        return numbers[rng.integers(len(numbers))]
+    if kind == 2:
+        return words[rng.integers(len(words))]
+    items = [json_noise(rng, depth + 1) for _ in range(rng.integers(4))]
+    if kind == 3:
+        return items
+    return {words[rng.integers(len(words))]: each for each in items}
+
+
+def changed_somewhere(value: Any, rng: np.random.Generator) -> Any:
+    """The value with one part, at any depth, replaced, lost or doubled."""
+    if not isinstance(value, (dict, list)) or not value or rng.random() < 0.15:
+        return json_noise(rng)
+    keys = list(value) if isinstance(value, dict) else range(len(value))
+    key = keys[rng.integers(len(keys))]
+    copy: Any = dict(value) if isinstance(value, dict) else list(value)
+    if rng.random() < 0.1:
+        del copy[key]
+    elif rng.random() < 0.1 and isinstance(copy, list):
+        copy.extend(copy * 50)
+    else:
+        copy[key] = changed_somewhere(value[key], rng)
+    return copy
+
+
+def hostile(saved: bytes, rng: np.random.Generator) -> bytes:
+    """A file that a stranger may have made."""
+    kind = rng.integers(5)
+    if kind == 0:  # bytes, changed, cut or doubled
+        content = bytearray(saved)
+        for _ in range(rng.integers(1, 6)):
+            start = rng.integers(len(content))
+            noise = rng.integers(
+                256, size=rng.integers(1, 20), dtype=np.uint8
+            ).tobytes()
+            content[start : start + rng.integers(20)] = noise
+        return bytes(
+            content[: rng.integers(len(content)) if rng.random() < 0.2 else None]
+        )
+    members = members_of(saved)
+    if kind <= 2:  # a header with checksums that fit
+        start = 128
+        header = json.loads(members["header.npy"][start:])
+        for _ in range(rng.integers(1, 4)):
+            header = changed_somewhere(header, rng)
+        return with_header(saved, json.dumps(header).encode())
+    name = ["table.npy", "ranks.npy", "header.npy", "heuristic.npy", "update_a.npy"]
+    shape = tuple(
+        int(n) for n in rng.choice([0, 1, 2, 6, 12, 2**20, 2**40], rng.integers(4))
+    )
+    dtypes = [
+        "<f8",
+        ">f8",
+        "<f4",
+        "|u1",
+        "<i4",
+        "|b1",
+        "<c16",
+        "|O",
+        "<U3",
+        "|V8",
+        "<m8",
+    ]
+    dtype = str(rng.choice(dtypes))
+    size = rng.choice([0, 6, 12, 96, 1000])
+    content = rng.integers(256, size=size, dtype=np.uint8).tobytes()
+    if kind == 3:
+        content = array(shape, dtype, content)
+    members[str(rng.choice(name))] = content
+    return archive(*members.items(), packing=int(rng.choice([0, 8, 12, 14])))
+
+
+def test_hostile_files_are_refused_or_harmless(saved: bytes, tmp_path: Path) -> None:
+    """No crash, no hang, nothing but ValueError, OSError and TypeError."""
+    rng = np.random.default_rng(0)
+    outcomes = dict.fromkeys(["refused", "loaded"], 0)
+    for number in range(HOSTILE_FILES):
+        content = hostile(saved, rng)
+        path = tmp_path / "hostile.npz"
+        path.write_bytes(content)
+        began = time.monotonic()
+        try:
+            agent = ACL.load(path, chains(2))
+            agent.predict(agent.partition.cell_states()[:5])
+            agent.learn(total_timesteps=5)
+        except (ValueError, TypeError, OSError):
+            outcomes["refused"] += 1
+        except Exception as error:
+            pytest.fail(f"file {number}: {error!r:.200}")
+        else:
+            outcomes["loaded"] += 1
+        assert time.monotonic() - began < 20, f"file {number}"
+    assert outcomes["refused"] > HOSTILE_FILES / 4

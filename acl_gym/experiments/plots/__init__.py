@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import tomllib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -67,32 +67,23 @@ def file_name(experiment: Experiment, plot: str) -> str:
     return experiment.name if len(experiment.plots) == 1 else plot
 
 
-@in_style()
-def save(
-    experiment: Experiment,
-    results: Results,
-    directory: Path,
-    kinds: tuple[str, ...] = ("png", "svg"),
-) -> None:
-    """Draw all figures of an experiment and write them, see `file_name`.
+class FigureFailedError(RuntimeError):
+    """Figures could not be drawn or written; the results are there.
 
     Args:
-        experiment: which.
-        results: its runs.
-        directory: where; each file appears complete or not at all.
-        kinds: endings of files.
+        directory: where the results are.
+        failures: what the figures raised.
     """
-    for plot in experiment.plots:
-        figure = draw(plot, experiment, results)
-        for kind in kinds:
-            buffer = io.BytesIO()
-            figure.savefig(buffer, format=kind)
-            path = directory / f"{file_name(experiment, plot)}.{kind}"
-            write_atomically(path, buffer.getvalue())
 
-
-class FigureFailedError(RuntimeError):
-    """A figure could not be drawn or written; the results are there."""
+    def __init__(self, directory: Path, failures: Sequence[Exception]) -> None:
+        first = failures[0]
+        super().__init__(
+            f"figures of {directory} failed ({len(failures)}), the first with "
+            f"{type(first).__name__}: {str(first).rstrip('.')}; all results are written, "
+            "and the report without these figures. Give the same command again when the "
+            "cause is removed."
+        )
+        self.failures = failures
 
 
 @contextmanager
@@ -108,22 +99,57 @@ def drawing(directory: Path) -> Iterator[Callable[..., None]]:
     Raises:
         FigureFailedError: at the end, if a call has failed.
     """
-    failed: list[Exception] = []
+    failures: list[Exception] = []
 
     def attempt(draw: Callable[..., None], *arguments: Any) -> None:
         try:
             draw(*arguments)
+        except FigureFailedError as error:
+            failures.extend(error.failures)
         except Exception as error:
-            failed.append(error)
+            failures.append(error)
 
     yield attempt
-    if failed:
-        raise FigureFailedError(
-            f"{len(failed)} of the figures in {directory} failed, the first with "
-            f"{type(failed[0]).__name__}: {str(failed[0]).rstrip('.')}; all results are "
-            "written, and the report without these figures. Give the same command again "
-            "when the cause is removed."
-        ) from failed[0]
+    if failures:
+        raise FigureFailedError(directory, failures) from failures[0]
+
+
+def save(
+    experiment: Experiment,
+    results: Results,
+    directory: Path,
+    kinds: tuple[str, ...] = ("png", "svg"),
+) -> None:
+    """Draw all figures of an experiment and write them, see `file_name`.
+
+    Args:
+        experiment: which.
+        results: its runs.
+        directory: where; each file appears complete or not at all.
+        kinds: endings of files.
+
+    Raises:
+        FigureFailedError: a figure failed; the others are written.
+    """
+    with drawing(directory) as attempt:
+        for plot in experiment.plots:
+            attempt(_save_figure, plot, experiment, results, directory, kinds)
+
+
+@in_style()
+def _save_figure(
+    plot: str,
+    experiment: Experiment,
+    results: Results,
+    directory: Path,
+    kinds: tuple[str, ...],
+) -> None:
+    figure = draw(plot, experiment, results)
+    for kind in kinds:
+        buffer = io.BytesIO()
+        figure.savefig(buffer, format=kind)
+        path = directory / f"{file_name(experiment, plot)}.{kind}"
+        write_atomically(path, buffer.getvalue())
 
 
 def write_animation(path: Path, trials: tuple[int, ...] = SHOWN) -> None:

@@ -242,7 +242,9 @@ class TabularAgent(PartitionPolicy):
         self._rollout = rollout
         slots, k = rollout.num_envs, self.partition.cells_per_state
         validation.check_memory(
-            f"the cells of {slots} slots", 12 * slots * k, "use fewer slots or variables"
+            f"the cells of {slots} slots",
+            12 * slots * k,
+            "use fewer slots or variables",
         )
         self._index: CellArray = np.zeros((slots, k), dtype=np.int32)
         self._degree: FloatArray = np.zeros((slots, k))

@@ -89,11 +89,15 @@ class Quadratic(Cost):
         if self.inputs is not None:
             inputs = validation.real_array("inputs", self.inputs, ndim=2)
             _weight("input_weight", self.input_weight, inputs.shape[1])
-        if self.periods is not None and len(self.periods) != size:
-            raise ValueError(
-                f"periods must hold one entry for each of the {size} variables, got "
-                f"{self.periods!r}."
-            )
+        if self.periods is not None:
+            if np.ndim(self.periods) != 1 or len(self.periods) != size:
+                raise ValueError(
+                    f"periods must hold one entry for each of the {size} variables, got "
+                    f"{validation.shown(self.periods)}."
+                )
+            for axis, period in enumerate(self.periods):
+                if period is not None:
+                    validation.number(f"periods[{axis}]", period, above=0)
 
     def __call__(self, episodes: Episodes) -> FloatArray:
         """See `Cost`."""
@@ -265,6 +269,13 @@ class Sum(Cost):
 
     terms: tuple[Cost, ...]
 
+    def __post_init__(self) -> None:
+        terms = self.terms
+        if not isinstance(terms, (tuple, list)) or not terms:
+            raise TypeError(f"terms must be costs, got {validation.shown(terms)}.")
+        for term in terms:
+            _require_cost("a term", term)
+
     def __call__(self, episodes: Episodes) -> FloatArray:
         """See `Cost`."""
         return np.asarray(sum(term(episodes) for term in self.terms))
@@ -284,6 +295,7 @@ class Weighted(Cost):
 
     def __post_init__(self) -> None:
         validation.number("factor", self.factor, above=0)
+        _require_cost("cost", self.cost)
 
     def __call__(self, episodes: Episodes) -> FloatArray:
         """See `Cost`."""
@@ -326,6 +338,13 @@ _KINDS = (
 )
 
 
+def _require_cost(name: str, cost: Any) -> None:
+    if not isinstance(cost, Cost):
+        raise TypeError(
+            f"{name} must be a Cost such as Steps(), got {validation.shown(cost)}."
+        )
+
+
 def as_cost(cost: Cost | Callable[[Episode], float] | None) -> Cost | None:
     """Bring every accepted form of `cost` into an object; None stays None.
 
@@ -338,7 +357,7 @@ def as_cost(cost: Cost | Callable[[Episode], float] | None) -> Cost | None:
         return FunctionCost(cost)
     raise TypeError(
         "cost must be a Cost such as Steps(), or a function of one solution, got "
-        f"{cost!r}."
+        f"{validation.shown(cost)}."
     )
 
 
@@ -394,6 +413,6 @@ def _weight(name: str, values: Any, size: int) -> FloatArray:
     if not (valid and np.linalg.eigvalsh(weight)[0] >= -1e-12 * np.abs(weight).max()):
         raise ValueError(
             f"{name} must be a diagonal of {size} numbers or a symmetric positive "
-            f"semi-definite ({size}, {size}) matrix, got {values!r}."
+            f"semi-definite ({size}, {size}) matrix, got {validation.shown(values)}."
         )
     return weight

@@ -14,7 +14,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from acl_gym.colony.greedy import ALL, NUMBERS_PER_ACTION, check_choice
+from acl_gym.colony.greedy import ALL, check_choice, drawn_numbers
 from acl_gym.colony.pheromone import Pheromone
 from acl_gym.colony.solutions import Solutions
 from acl_gym.colony.update_kernels import (
@@ -103,8 +103,7 @@ class Reinforcement:
 def _check_deposits(deposits: FloatArray) -> None:
     if not isinstance(deposits, np.ndarray) or deposits.dtype != np.float64:
         raise ValueError(
-            "deposits must be an array of float64, got "
-            f"{validation.shown(deposits)}."
+            f"deposits must be an array of float64, got {validation.shown(deposits)}."
         )
     with np.errstate(over="ignore"):
         total = deposits.sum()
@@ -200,7 +199,7 @@ class InTurn(_DepositAtEnd):
             pheromone.greedy_weights if greedy else pheromone.weights,
             index,
             degree,
-            rng.random((NUMBERS_PER_ACTION, index.shape[0])),
+            drawn_numbers(rng, len(index)),
             0.0 if selection == "boltzmann" else epsilon,
             greedy,
             ALL if allowed is None else allowed,
@@ -310,14 +309,16 @@ def as_update(update: str | UpdateRule) -> UpdateRule:
     if not isinstance(update, UpdateRule):
         raise TypeError(
             f"update must be one of {', '.join(map(repr, UPDATE_RULES))} or an UpdateRule, "
-            f"got {update!r}."
+            f"got {validation.shown(update)}."
         )
     return copy.deepcopy(update)
 
 
 def watched(rule: UpdateRule, n_actions: int) -> UpdateRule:
     """The rule itself if it is one of this package, else behind a `WatchedRule`."""
-    own = type(rule) in map(type, UPDATE_RULES.values()) or isinstance(rule, MissingRule)
+    own = type(rule) in map(type, UPDATE_RULES.values()) or isinstance(
+        rule, MissingRule
+    )
     return rule if own else WatchedRule(rule, n_actions)
 
 

@@ -211,7 +211,11 @@ def action_mask(value: Any, n_slots: int, n_actions: int) -> BoolArray | None:
 
 def _stacked(mask: Any, shape: tuple[int, int]) -> Any:
     """An array of one mask for each slot; slots with None may take any action."""
-    if isinstance(mask, np.ndarray) and mask.dtype == object and mask.shape[:1] == shape[:1]:
+    if (
+        isinstance(mask, np.ndarray)
+        and mask.dtype == object
+        and mask.shape[:1] == shape[:1]
+    ):
         every = np.ones(shape[1], dtype=np.bool_)
         mask = [every if row is None else row for row in mask]
     array = validation.as_array(mask)

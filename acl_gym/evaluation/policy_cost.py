@@ -269,6 +269,7 @@ def actions_in(
     """
     require_predictor(model)
     control_env(env)
+    states = validation.real_array("states", states)
     observation, _ = env.reset(options={"state": states})
     space = env.single_action_space
     if isinstance(model, PartitionPolicy):
@@ -288,7 +289,7 @@ def require_predictor(model: Any) -> None:
     if not callable(getattr(model, "predict", None)) or isinstance(model, type):
         raise TypeError(
             "model must be an agent or a policy with "
-            f"predict(observation, deterministic=True), got {model!r}."
+            f"predict(observation, deterministic=True), got {validation.shown(model)}."
         )
 
 
@@ -298,7 +299,7 @@ def control_env(env: VectorEnv[Any, Any, Any]) -> ControlVectorEnv:
     Raises:
         TypeError: it is of another package.
     """
-    base = env.unwrapped
+    base = getattr(env, "unwrapped", env)
     if not isinstance(base, ControlVectorEnv):
         raise TypeError(
             "env must be a vector environment of acl_gym, which can start from any "

@@ -119,6 +119,7 @@ class Rollout:
         self._stale: BoolArray | None = None  # slots to reset before the next step
         self._mask: BoolArray | None = None
         self._ants = self._all
+        self._stepping = False
 
     @property
     def num_envs(self) -> int:
@@ -157,6 +158,7 @@ class Rollout:
             ValueError: it is negative, or the environment does not return what it
                 should.
         """
+        self._check_idle("start")
         seed, n = validation.seed(seed), self.num_envs
         options: dict[str, Any] = {}
         if self._asks_to_wait:
@@ -193,6 +195,7 @@ class Rollout:
             ValueError: the actions are not one for each of `ants`; a reward is NaN or
                 infinite; or the environment does not return what it should.
         """
+        self._check_idle("step")
         ants = self.ants
         m, n = ants.size, self.num_envs
         if type(actions) is not np.ndarray:
@@ -214,7 +217,11 @@ class Rollout:
                 f"slot {ants[bad]}."
             )
         # A copy, because an environment or a wrapper may keep its actions.
-        given = self.env.step(self._actions.copy())
+        self._stepping = True
+        try:
+            given = self.env.step(self._actions.copy())
+        finally:
+            self._stepping = False
         observation, reward, terminated, truncated, infos = received.parts(
             "step", given, 5
         )
@@ -301,6 +308,14 @@ class Rollout:
                 "check the environment's action_mask."
             )
         return allowed
+
+    def _check_idle(self, what: str) -> None:
+        """Refuse calls from within `env.step`, which would disturb the step."""
+        if self._stepping:
+            raise RuntimeError(
+                f"{what} must not be called while the environment makes a step; let "
+                "env.step return first."
+            )
 
     def _read_mask(self, infos: Any) -> None:
         """Take the action masks from checked infos."""

@@ -15,13 +15,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from acl_gym.utils import validation
+
 FORMAT = "acl-gym agent"
 VERSION = 1
 
 
 def with_suffix(path: str | Path) -> Path:
     """Add `.npz` to a path that lacks it."""
-    path = Path(path)
+    path = validation.path("path", path)
     return path if path.suffix == ".npz" else path.with_name(path.name + ".npz")
 
 

@@ -9,6 +9,7 @@ from collections.abc import Collection
 from dataclasses import dataclass
 from difflib import get_close_matches
 from numbers import Integral, Real
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -178,6 +179,25 @@ def as_array(values: Any) -> NDArray[Any] | None:
         return np.asarray(values)
     except (TypeError, ValueError, OverflowError):
         return None
+
+
+def path(name: str, value: Any) -> Path:
+    """Return the path of a file or folder.
+
+    Raises:
+        TypeError: `value` is neither text nor a path.
+        ValueError: `value` is empty or holds a NUL, which no name does.
+    """
+    try:
+        text = os.fsdecode(value)
+    except TypeError:
+        raise TypeError(
+            f"{name} must be a path, text or pathlib.Path, got {shown(value)} of type "
+            f"{type(value).__name__}."
+        ) from None
+    if not text or "\0" in text:
+        raise ValueError(f"{name} must be the name of a file, got {shown(value)}.")
+    return Path(text)
 
 
 def read_only(array: NDArray[Any]) -> NDArray[Any]:

@@ -20,6 +20,11 @@ def checked_options(
     options: dict[str, Any] | None, allowed: tuple[str, ...]
 ) -> dict[str, Any]:
     """Refuse reset options that would otherwise be ignored silently."""
+    if options is not None and not isinstance(options, dict):
+        raise TypeError(
+            f"reset options must be a dict, got {validation.shown(options)} of type "
+            f"{type(options).__name__}."
+        )
     unknown = sorted(set(options or ()) - set(allowed), key=str)
     if unknown:
         raise ValueError(

@@ -90,7 +90,8 @@ class Quadratic(Cost):
             inputs = validation.real_array("inputs", self.inputs, ndim=2)
             _weight("input_weight", self.input_weight, inputs.shape[1])
         if self.periods is not None:
-            if np.ndim(self.periods) != 1 or len(self.periods) != size:
+            periods: Any = self.periods
+            if np.ndim(periods) != 1 or len(self.periods) != size:
                 raise ValueError(
                     f"periods must hold one entry for each of the {size} variables, got "
                     f"{validation.shown(self.periods)}."

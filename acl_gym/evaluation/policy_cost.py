@@ -271,7 +271,7 @@ def actions_in(
     control_env(env)
     states = validation.real_array("states", states)
     observation, _ = env.reset(options={"state": states})
-    space = env.single_action_space
+    space: Any = env.single_action_space
     if isinstance(model, PartitionPolicy):
         found = model.predict(observation, None, np.ones(len(observation), np.bool_))
     else:

@@ -141,7 +141,7 @@ class Rollout:
         seed: int | None = None,
         states: FloatArray | None = None,
         record: bool = False,
-    ) -> NDArray[Any]:
+    ) -> Any:
         """Begin an episode in every slot.
 
         Args:
@@ -151,7 +151,8 @@ class Rollout:
             record: keep every step for `episodes`.
 
         Returns:
-            The first observations, `(num_envs, ...)`.
+            The first observations, `(num_envs, ...)`; of a Dict or Tuple space a dict
+            or tuple of such arrays.
 
         Raises:
             TypeError: `seed` is not an integer.

@@ -151,6 +151,7 @@ class VectorEnvAdapter(VecEnv):
         actions, self._actions = self._actions, None
         observations, rewards, terminated, truncated, infos = self.env.step(actions)
         n = self.num_envs
+        received.observations(observations, n)
         rewards = received.rewards(rewards, n)
         terminated = received.flags("terminated", terminated, n)
         truncated = received.flags("truncated", truncated, n)
@@ -160,14 +161,20 @@ class VectorEnvAdapter(VecEnv):
             {key: row[key] for key in row if key not in _FINAL_KEYS}
             for row in _infos_per_slot(infos, n)
         ]
-        infos = received.infos(infos, n)
+        batched = received.infos(infos, n)
         if slots and self._resets_itself:
+            if "final_obs" not in batched:
+                raise ValueError(
+                    "infos['final_obs'] must hold the last observation of each slot "
+                    f"that has finished, got infos with {list(batched)}; check the "
+                    "environment and its wrappers."
+                )
             # Entries missing from final_info were written by the reset or a wrapper.
-            last = _infos_per_slot(infos.get("final_info", {}), self.num_envs)
+            last = _infos_per_slot(batched.get("final_info"), n)
             for slot in slots:
                 self.reset_infos[slot] = rows[slot]
                 rows[slot] = {**rows[slot], **last[slot]}
-                rows[slot]["terminal_observation"] = _copy(infos["final_obs"][slot])
+                rows[slot]["terminal_observation"] = _copy(batched["final_obs"][slot])
         elif slots:
             for slot in slots:
                 rows[slot]["terminal_observation"] = _row(observations, slot)

@@ -115,9 +115,11 @@ def integer(
             f"{type(value).__name__}."
         )
     if value < at_least:
-        raise ValueError(f"{name} must be at least {at_least}, got {shown(value)}.")
-    if at_most is not None and value > at_most:
-        raise ValueError(f"{name} must be at most {at_most}, got {shown(value)}.")
+        raise ValueError(
+            f"{name} must be at least {at_least}, got {shown(int(value))}."
+        )
+    if at_most is not None and int(value) > at_most:
+        raise ValueError(f"{name} must be at most {at_most}, got {shown(int(value))}.")
     return int(value)
 
 

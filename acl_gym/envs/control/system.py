@@ -11,6 +11,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from acl_gym.utils import compiling as _compiling  # noqa: F401 - it says what the wait is for
+from acl_gym.utils import validation
 from acl_gym.utils.typing import BoolArray, FloatArray, IntArray
 
 BLOCK = 512
@@ -117,7 +118,7 @@ class ControlSystem(ABC):
         if cells is not None:
             raise ValueError(
                 f"cells must be None for {type(self).__name__}, for which the thesis "
-                f"has no centres, got {cells!r}."
+                f"has no centres, got {validation.shown(cells)}."
             )
         return None
 

@@ -278,8 +278,8 @@ class TablePolicy(PartitionPolicy):
 
     Raises:
         TypeError: `partition` is no partition, or `first_action` not an integer.
-        ValueError: `table` or `ranks` do not fit the partition, or an entry is not
-            finite.
+        ValueError: `table` or `ranks` do not fit the partition, or an entry is
+            NaN.
     """
 
     _fixed = ("partition", "table", "ranks", "first_action")
@@ -296,10 +296,10 @@ class TablePolicy(PartitionPolicy):
             got = getattr(table, "dtype", type(table).__name__)
             raise ValueError(f"table must be an array of float64, got {got}.")
         self._check_fits("table", table, partition)
-        if not np.isfinite(table).all():
-            cell = int(np.argmin(np.isfinite(table).all(axis=1)))
+        if np.isnan(table).any():
+            cell = int(np.argmax(np.isnan(table).any(axis=1)))
             raise ValueError(
-                f"table must be finite, got {validation.shown(table[cell].tolist())} in "
+                f"table must not hold NaN, got {validation.shown(table[cell].tolist())} in "
                 f"cell {cell}."
             )
         n_cells, n_actions = table.shape

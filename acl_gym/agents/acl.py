@@ -160,7 +160,9 @@ class ACL(TabularAgent):
             env, partition, max_steps=max_steps, seed=seed, n_actions=n_actions
         )
         if not isinstance(tabu, bool):
-            raise TypeError(f"tabu must be True or False, got {tabu!r}.")
+            raise TypeError(
+                f"tabu must be True or False, got {validation.shown(tabu)}."
+            )
         if tabu and self.partition.cells_per_state > 1:
             raise ValueError(
                 "tabu needs a partition with one cell per state, such as Crisp or "

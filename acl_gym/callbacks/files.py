@@ -40,7 +40,7 @@ class Checkpoint(Callback):
     def __init__(
         self, directory: str | Path, every: int = 10, keep: int | None = None
     ) -> None:
-        self.directory = Path(directory)
+        self.directory = validation.path("directory", directory)
         self.every = validation.integer("every", every, at_least=1)
         if keep is not None:
             keep = validation.integer("keep", keep, at_least=1)
@@ -92,7 +92,7 @@ class CSVLog(Callback):
     """
 
     def __init__(self, path: str | Path) -> None:
-        self.path = files.checked_target(Path(path))
+        self.path = files.checked_target(validation.path("path", path))
         if self.path.exists() and not _is_log(self.path):
             raise ValueError(
                 f"{self.path} exists and is not a log of acl-gym, whose first column "

@@ -91,11 +91,16 @@ class Quadratic(Cost):
         if self.inputs is not None:
             inputs = validation.real_array("inputs", self.inputs, ndim=2)
             _weight("input_weight", self.input_weight, inputs.shape[1])
-        if self.periods is not None and len(self.periods) != size:
-            raise ValueError(
-                f"periods must hold one entry for each of the {size} variables, got "
-                f"{self.periods!r}."
-            )
+        if self.periods is not None:
+            periods: Any = self.periods
+            if np.ndim(periods) != 1 or len(self.periods) != size:
+                raise ValueError(
+                    f"periods must hold one entry for each of the {size} variables, got "
+                    f"{validation.shown(self.periods)}."
+                )
+            for axis, period in enumerate(self.periods):
+                if period is not None:
+                    validation.number(f"periods[{axis}]", period, above=0)
 
     def __call__(self, episodes: Episodes) -> FloatArray:
         """See `Cost`."""
@@ -271,6 +276,8 @@ class Sum(Cost):
 
     def __post_init__(self) -> None:
         make_plain(self)
+        if not isinstance(self.terms, (tuple, list)) or not self.terms:
+            raise TypeError(f"terms must be Costs, got {validation.shown(self.terms)}.")
         _check_costs("terms", self.terms)
 
     def __call__(self, episodes: Episodes) -> FloatArray:
@@ -352,7 +359,7 @@ def as_cost(cost: Cost | Callable[[Episode], float] | None) -> Cost | None:
         return FunctionCost(cost)
     raise TypeError(
         "cost must be a Cost such as Steps(), or a function of one solution, got "
-        f"{cost!r}."
+        f"{validation.shown(cost)}."
     )
 
 
@@ -401,10 +408,10 @@ def _first_crossing(progress: FloatArray, level: float) -> FloatArray:
 
 
 def _check_costs(name: str, costs: Any) -> None:
-    for cost in costs if isinstance(costs, tuple) else (costs,):
+    for cost in costs if isinstance(costs, (tuple, list)) else (costs,):
         if not isinstance(cost, Cost):
             raise TypeError(
-                f"{name} must be made of Costs such as Steps(), got {cost!r:.80}; make "
+                f"{name} must be made of Costs such as Steps(), got {validation.shown(cost)}; make "
                 "a Cost of a function with FunctionCost(function)."
             )
 
@@ -417,6 +424,6 @@ def _weight(name: str, values: Any, size: int) -> FloatArray:
     if not (valid and np.linalg.eigvalsh(weight)[0] >= -1e-12 * np.abs(weight).max()):
         raise ValueError(
             f"{name} must be a diagonal of {size} numbers or a symmetric positive "
-            f"semi-definite ({size}, {size}) matrix, got {values!r}."
+            f"semi-definite ({size}, {size}) matrix, got {validation.shown(values)}."
         )
     return weight

@@ -183,7 +183,7 @@ def as_deposit(deposit: str | Deposit | Function) -> Deposit:
         return FunctionDeposit(deposit)
     raise TypeError(
         f"deposit must be one of {', '.join(map(repr, NAMED))}, a Deposit such as "
-        f"InverseCost(offset=20), or a function of the costs, got {deposit!r}."
+        f"InverseCost(offset=20), or a function of the costs, got {validation.shown(deposit)}."
     )
 
 

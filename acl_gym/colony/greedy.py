@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from acl_gym.utils import validation
 from acl_gym.utils.compiling import njit
 from acl_gym.utils.typing import BoolArray, CellArray, FloatArray, IntArray, RankArray
 
@@ -33,11 +34,36 @@ def epsilon_greedy_actions(
     See `choose_actions`.
     """
     check_choice(index, degree, table, allowed)
-    draws = rng.random((NUMBERS_PER_ACTION, index.shape[0]))
+    draws = drawn_numbers(rng, len(index))
     actions = np.empty(index.shape[0], dtype=np.int64)
     any_action = ALL if allowed is None else allowed
     _epsilon_greedy(table, weights, index, degree, draws, epsilon, any_action, actions)
     return actions
+
+
+def drawn_numbers(rng: np.random.Generator, count: int) -> FloatArray:
+    """The random numbers from which `count` actions are chosen, `(2, count)`.
+
+    Args:
+        rng: a generator, or an object with the same `random`.
+        count: how many actions.
+
+    Raises:
+        ValueError: what another object than a generator gives is not uniform in [0, 1).
+    """
+    shape = NUMBERS_PER_ACTION, count
+    draws = rng.random(shape)
+    if type(rng) is not np.random.Generator and (
+        not isinstance(draws, np.ndarray)
+        or draws.shape != shape
+        or draws.dtype != _FLOAT
+        or not ((draws >= 0.0) & (draws < 1.0)).all()
+    ):
+        raise ValueError(
+            f"rng.random({shape}) must give numbers in [0, 1), got "
+            f"{validation.shown(draws)}."
+        )
+    return draws
 
 
 def check_choice(
@@ -59,6 +85,11 @@ def check_choice(
     Raises:
         ValueError: a shape or type is wrong, or a cell is not one of the table.
     """
+    if not (isinstance(index, np.ndarray) and isinstance(degree, np.ndarray)):
+        raise TypeError(
+            "index and degree must be arrays, got "
+            f"{type(index).__name__} and {type(degree).__name__}."
+        )
     good = (
         index.ndim == 2
         and index.shape == degree.shape
@@ -72,10 +103,11 @@ def check_choice(
         )
     if allowed is not None:
         shape = (len(index), table.shape[1])
-        if allowed.shape != shape or allowed.dtype != _BOOL:
+        array = isinstance(allowed, np.ndarray)
+        if not array or allowed.shape != shape or allowed.dtype != _BOOL:
             raise ValueError(
-                f"allowed must be bool of shape {shape}, got {allowed.dtype} "
-                f"{allowed.shape}."
+                f"allowed must be a bool array of shape {shape}, got "
+                f"{validation.shown(allowed)}."
             )
         cells = True
     if cells and not _all_below(index, len(table)):

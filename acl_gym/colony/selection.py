@@ -11,15 +11,15 @@ from numba import prange
 
 from acl_gym.colony.greedy import (
     ALL,
-    NUMBERS_PER_ACTION,
     any_action,
     best_action,
     check_choice,
+    drawn_numbers,
     epsilon_greedy_actions,
 )
 from acl_gym.colony.pheromone import Pheromone
 from acl_gym.partitions.kernels import written_out
-from acl_gym.utils import threads
+from acl_gym.utils import threads, validation
 from acl_gym.utils.compiling import njit
 from acl_gym.utils.typing import BoolArray, CellArray, FloatArray, IntArray
 
@@ -60,6 +60,13 @@ def choose_actions(
     Returns:
         Indices of actions, `(m,)`.
     """
+    if rule not in RULES:
+        validation.one_of("rule", rule, RULES)
+    if not (isinstance(pheromone, Pheromone) and hasattr(rng, "random")):
+        raise TypeError(
+            "choose_actions needs a Pheromone and a numpy.random.Generator, got "
+            f"{type(pheromone).__name__} and {type(rng).__name__}."
+        )
     if rule == "epsilon_greedy":
         return epsilon_greedy_actions(
             pheromone.levels,
@@ -72,7 +79,7 @@ def choose_actions(
         )
     # `repair` looks at the cells.
     check_choice(index, degree, pheromone.levels, allowed, cells=False)
-    draws = rng.random((NUMBERS_PER_ACTION, index.shape[0]))
+    draws = drawn_numbers(rng, len(index))
     actions = np.empty(index.shape[0], dtype=np.int64)
     columns, corners = written_out(pheromone.n_actions), written_out(index.shape[1])
     if rule != "max_boltzmann":

@@ -14,7 +14,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from acl_gym.colony.greedy import ALL, NUMBERS_PER_ACTION, check_choice
+from acl_gym.colony.greedy import ALL, check_choice, drawn_numbers
 from acl_gym.colony.pheromone import Pheromone
 from acl_gym.colony.solutions import Solutions
 from acl_gym.colony.update_kernels import (
@@ -199,7 +199,7 @@ class InTurn(_DepositAtEnd):
             pheromone.greedy_weights if greedy else pheromone.weights,
             index,
             degree,
-            rng.random((NUMBERS_PER_ACTION, index.shape[0])),
+            drawn_numbers(rng, len(index)),
             0.0 if selection == "boltzmann" else epsilon,
             greedy,
             ALL if allowed is None else allowed,
@@ -309,7 +309,7 @@ def as_update(update: str | UpdateRule) -> UpdateRule:
     if not isinstance(update, UpdateRule):
         raise TypeError(
             f"update must be one of {', '.join(map(repr, UPDATE_RULES))} or an UpdateRule, "
-            f"got {update!r}."
+            f"got {validation.shown(update)}."
         )
     return copy.deepcopy(update)
 

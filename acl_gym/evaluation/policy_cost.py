@@ -347,9 +347,10 @@ def actions_in(
     """
     require_predictor(model)
     control_env(env)
+    states = validation.real_array("states", states)
     env = with_slots_for(env, states)
     observation, _ = env.reset(options={"state": states})
-    space = env.single_action_space
+    space: Any = env.single_action_space
     if isinstance(model, PartitionPolicy):
         found = model.predict(observation, None, np.ones(len(observation), np.bool_))
     else:
@@ -367,7 +368,7 @@ def require_predictor(model: Any) -> None:
     if not callable(getattr(model, "predict", None)) or isinstance(model, type):
         raise TypeError(
             "model must be an agent or a policy with "
-            f"predict(observation, deterministic=True), got {model!r}."
+            f"predict(observation, deterministic=True), got {validation.shown(model)}."
         )
 
 

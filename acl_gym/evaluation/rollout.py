@@ -121,6 +121,7 @@ class Rollout:
         self._mask: BoolArray | None = None
         self._ants = self._all
         self._reported_success: BoolArray | None = None
+        self._stepping = False
 
     @property
     def num_envs(self) -> int:
@@ -142,7 +143,7 @@ class Rollout:
         seed: int | None = None,
         states: FloatArray | None = None,
         record: bool = False,
-    ) -> NDArray[Any]:
+    ) -> Any:
         """Begin an episode in every slot.
 
         Args:
@@ -152,13 +153,15 @@ class Rollout:
             record: keep every step for `episodes`.
 
         Returns:
-            The first observations, `(num_envs, ...)`.
+            The first observations, `(num_envs, ...)`; of a Dict or Tuple space a dict
+            or tuple of such arrays.
 
         Raises:
             TypeError: `seed` is not an integer.
             ValueError: it is negative, or the environment does not return what it
                 should.
         """
+        self._check_idle("start")
         seed, n = validation.seed(seed), self.num_envs
         options: dict[str, Any] = {}
         if self._asks_to_wait:
@@ -197,6 +200,7 @@ class Rollout:
             ValueError: the actions are not one for each of `ants`; a reward is NaN or
                 infinite; or the environment does not return what it should.
         """
+        self._check_idle("step")
         ants = self.ants
         m, n = ants.size, self.num_envs
         if type(actions) is not np.ndarray:
@@ -218,7 +222,11 @@ class Rollout:
                 f"slot {ants[bad]}."
             )
         # A copy, because an environment or a wrapper may keep its actions.
-        given = self.env.step(self._actions.copy())
+        self._stepping = True
+        try:
+            given = self.env.step(self._actions.copy())
+        finally:
+            self._stepping = False
         observation, reward, terminated, truncated, infos = received.parts(
             "step", given, 5
         )
@@ -340,6 +348,14 @@ class Rollout:
                 self._reported_success = np.zeros(self.num_envs, dtype=np.bool_)
             noted = ants[given[ants]]
             self._reported_success[noted] = success[noted]
+
+    def _check_idle(self, what: str) -> None:
+        """Refuse calls from within `env.step`, which would disturb the step."""
+        if self._stepping:
+            raise RuntimeError(
+                f"{what} must not be called while the environment makes a step; let "
+                "env.step return first."
+            )
 
     def _read_mask(self, infos: Any) -> None:
         """Take the action masks from checked infos."""

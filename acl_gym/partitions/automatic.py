@@ -17,6 +17,7 @@ from acl_gym.partitions.base import Partition
 from acl_gym.partitions.bounds import Env, complete_bounds, observation_space, real_box
 from acl_gym.partitions.discrete import FINITE_SPACES, Discrete
 from acl_gym.partitions.grid import Fuzzy, Grid, checked_kind
+from acl_gym.utils import validation
 from acl_gym.utils.typing import FloatArray
 
 CENTRES = {1: 101, 2: 41, 3: 15, 4: 7, 5: 5, 6: 3}
@@ -58,7 +59,7 @@ def thesis_partition(
         if cells is not None:
             raise ValueError(
                 "cells must be None where observations are cells already, got "
-                f"{cells!r} for {space}."
+                f"{validation.shown(cells)} for {space}."
             )
         return Discrete.from_space(space)
     shown = _shown_variables(env, system)
@@ -140,7 +141,7 @@ def automatic_partition(
         if cells is not None or bounds is not None:
             raise ValueError(
                 "cells and bounds must be None where observations are cells already, "
-                f"got cells={cells!r} and bounds={bounds!r} for {space}."
+                f"got cells={validation.shown(cells)} and bounds={validation.shown(bounds)} for {space}."
             )
         return Discrete.from_space(space)
     box = real_box(space)

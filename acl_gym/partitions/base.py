@@ -197,6 +197,19 @@ def checked_partition(partition: Any) -> Partition:
     return partition
 
 
+def check_states(states: Any) -> None:
+    """Check that states are an array.
+
+    Raises:
+        TypeError: they are not.
+    """
+    if not isinstance(states, np.ndarray):
+        raise TypeError(
+            f"states must be an array with a row for each state, got "
+            f"{validation.shown(states)} of type {type(states).__name__}."
+        )
+
+
 def check_targets(
     slots: IntArray, index: CellArray, degree: FloatArray, cells_per_state: int
 ) -> None:
@@ -205,12 +218,17 @@ def check_targets(
     Raises:
         ValueError: the arrays have not the types and shapes of `Partition.locate`.
     """
+    arrays = (slots, index, degree)
+    if not all(isinstance(array, np.ndarray) for array in arrays):
+        kinds = ", ".join(type(array).__name__ for array in arrays)
+        raise TypeError(f"slots, index and degree must be arrays, got {kinds}.")
     m = slots.size
     good = (
         slots.ndim == 1
         and slots.dtype == np.int64
         and index.dtype == np.int32
         and degree.dtype == np.float64
+        and index.ndim == 2
         and index.shape == degree.shape
         and len(index) >= m
         and index.shape[1] == cells_per_state

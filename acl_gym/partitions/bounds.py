@@ -160,7 +160,7 @@ def _checked_bounds(
     if not isinstance(bounds, Mapping):
         raise TypeError(
             "bounds must map variables to pairs (low, high), got "
-            f"{bounds!r}; write bounds={{0: (-1.0, 1.0)}}."
+            f"{validation.shown(bounds)}; write bounds={{0: (-1.0, 1.0)}}."
         )
     pairs = {}
     for axis, pair in bounds.items():
@@ -176,7 +176,7 @@ def _checked_bounds(
         ends = validation.real_array(f"bounds[{axis}]", pair, ndim=1)
         if ends.size != 2 or ends[0] >= ends[1]:
             raise ValueError(
-                f"bounds[{axis}] must be (low, high) with low < high, got {pair!r}."
+                f"bounds[{axis}] must be (low, high) with low < high, got {validation.shown(pair)}."
             )
         pairs[int(axis)] = (float(ends[0]), float(ends[1]))
     return pairs

@@ -13,6 +13,7 @@ from acl_gym.partitions.base import (
     MOST_CELLS,
     FixedPartition,
     check_memory_of_states,
+    check_states,
     check_targets,
     trusted,
 )
@@ -121,6 +122,7 @@ class Discrete(FixedPartition):
     ) -> None:
         """See `Partition.locate`; int64 and float64 states are not copied."""
         shape = self.sizes.shape
+        check_states(states)
         if states.ndim == 0 or states.shape[1:] != shape:
             wanted = ", ".join(["n", *map(str, shape)]) + ("" if shape else ",")
             raise ValueError(f"states must have shape ({wanted}), got {states.shape}.")

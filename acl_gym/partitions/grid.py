@@ -15,6 +15,7 @@ from acl_gym.partitions.base import (
     MOST_CELLS,
     FixedPartition,
     check_memory_of_states,
+    check_states,
     check_targets,
     trusted,
 )
@@ -64,7 +65,7 @@ class Grid(FixedPartition):
         ):
             raise ValueError(
                 "centres must be one sequence for each state variable, got "
-                f"{centres!r}; pass [sequence] for a single variable."
+                f"{validation.shown(centres)}; pass [sequence] for a single variable."
             )
         axes = [_checked_centres(axis, values) for axis, values in enumerate(centres)]
         if not axes:
@@ -142,14 +143,15 @@ class Grid(FixedPartition):
         if len(counts) != low.size:
             raise ValueError(
                 f"cells must be an int or {low.size} ints, one a variable, "
-                f"got {cells!r}."
+                f"got {validation.shown(cells)}."
             )
         round_axes = list(circular) if isinstance(circular, Iterable) else [None]
         for axis in round_axes:
             whole = isinstance(axis, Integral) and not isinstance(axis, bool)
             if not whole or not 0 <= axis < low.size:
                 raise ValueError(
-                    f"circular must hold variables 0..{low.size - 1}, got {circular!r}."
+                    f"circular must hold variables 0..{low.size - 1}, got "
+                    f"{validation.shown(circular)}."
                 )
         centres, periods = [], []
         for axis, count in enumerate(counts):
@@ -210,6 +212,7 @@ class Grid(FixedPartition):
     ) -> None:
         """See `Partition.locate`."""
         dimensions = len(self.centres)
+        check_states(states)
         if states.ndim != 2 or states.shape[1] != dimensions:
             raise ValueError(
                 f"states must have shape (n, {dimensions}), got {states.shape}."
@@ -306,7 +309,9 @@ def checked_kind(kind: Any) -> type[Grid]:
         TypeError: it is not `Crisp`, `Fuzzy` or a subclass of one of them.
     """
     if not (isinstance(kind, type) and issubclass(kind, (Crisp, Fuzzy))):
-        raise TypeError(f"kind must be the class Crisp or Fuzzy, got {kind!r}.")
+        raise TypeError(
+            f"kind must be the class Crisp or Fuzzy, got {validation.shown(kind)}."
+        )
     return kind
 
 
@@ -338,7 +343,7 @@ def _checked_centres(axis: int, values: ArrayLike) -> FloatArray:
     if not usable.all():
         raise ValueError(
             f"centres[{axis}] must be further apart than 1e-307 and closer than "
-            f"1e307, got {values!r}."
+            f"1e307, got {validation.shown(values)}."
         )
     return centres
 
@@ -351,7 +356,7 @@ def _checked_periods(
     if not isinstance(periods, Sequence) or len(periods) != len(axes):
         raise ValueError(
             f"periods must hold one entry for each of the {len(axes)} variables, "
-            f"got {periods!r}."
+            f"got {validation.shown(periods)}."
         )
     lengths: list[float | None] = []
     for axis, period in enumerate(periods):

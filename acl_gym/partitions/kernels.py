@@ -160,10 +160,10 @@ def locate_block(
     """
     start = block * BLOCK
     size = min(BLOCK, slots.size - start)
-    rows, inside = np.uint64(states.shape[0]), True
+    rows, outside = np.uint64(states.shape[0]), 0
     for i in range(size):
-        inside &= np.uint64(slots[start + i]) < rows  # negative ones become huge
-    if not inside:
+        outside += np.uint64(slots[start + i]) >= rows  # negative ones become huge
+    if outside > 0:
         return OUTSIDE
     first, count, cells, period, rate = axes
     dimensions = len(cells)

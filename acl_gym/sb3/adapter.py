@@ -153,6 +153,7 @@ class VectorEnvAdapter(VecEnv):
         actions, self._actions = self._actions, None
         observations, rewards, terminated, truncated, infos = self.env.step(actions)
         n = self.num_envs
+        received.observations(observations, n)
         rewards = received.rewards(rewards, n)
         terminated = received.flags("terminated", terminated, n)
         truncated = received.flags("truncated", truncated, n)
@@ -164,8 +165,14 @@ class VectorEnvAdapter(VecEnv):
         ]
         batched = received.infos(infos, n)
         if slots and self._resets_itself:
+            if "final_obs" not in batched:
+                raise ValueError(
+                    "infos['final_obs'] must hold the last observation of each slot "
+                    f"that has finished, got infos with {list(batched)}; check the "
+                    "environment and its wrappers."
+                )
             # Entries missing from final_info were written by the reset or a wrapper.
-            last = _infos_per_slot(batched.get("final_info", {}), n)
+            last = _infos_per_slot(batched.get("final_info"), n)
             for slot in slots:
                 self.reset_infos[slot] = rows[slot]
                 rows[slot] = {**rows[slot], **last[slot]}

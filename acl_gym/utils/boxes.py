@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from gymnasium import spaces
 
@@ -28,10 +30,11 @@ def declared_bounds(space: spaces.Box) -> tuple[FloatArray, FloatArray]:
     """
     low, high = space.low.astype(np.float64), space.high.astype(np.float64)
     no_low, no_high = ~space.bounded_below, ~space.bounded_above
-    if space.dtype.kind in "iu" and space.dtype.itemsize >= _WIDE:
-        extremes = np.iinfo(space.dtype)
+    kind: Any = space.dtype
+    if kind.kind in "iu" and kind.itemsize >= _WIDE:
+        extremes = np.iinfo(kind)
         # The smallest unsigned integer, 0, is a bound like any other.
-        no_low |= (space.low == extremes.min) & (space.dtype.kind == "i")
+        no_low |= (space.low == extremes.min) & (kind.kind == "i")
         no_high |= space.high == extremes.max
     low[no_low | (low < -INFINITE)] = -np.inf
     high[no_high | (high > INFINITE)] = np.inf

@@ -14,6 +14,8 @@ import time
 from functools import cache
 from pathlib import Path
 
+from acl_gym.utils import validation
+
 _TEMPORARY = re.compile(r"\.acl-([0-9a-f]{8})-(\d+)-[0-9a-f]{12}\.tmp")
 """Machine, process and a random number: short, whatever the file is called."""
 
@@ -23,7 +25,7 @@ _OLD = 24 * 3600.0
 
 def with_suffix(path: str | os.PathLike[str]) -> Path:
     """Add `.npz` to a path that lacks it."""
-    path = Path(path)
+    path = validation.path("path", path)
     return path if path.suffix == ".npz" else path.with_name(path.name + ".npz")
 
 

@@ -9,6 +9,7 @@ from collections.abc import Collection
 from dataclasses import dataclass
 from difflib import get_close_matches
 from numbers import Integral, Real
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -114,11 +115,12 @@ def integer(
             f"{type(value).__name__}."
         )
     if value < at_least:
-        raise ValueError(f"{name} must be at least {at_least}, got {shown(value)}.")
-    result = int(value)
-    if at_most is not None and result > at_most:
-        raise ValueError(f"{name} must be at most {at_most}, got {shown(value)}.")
-    return result
+        raise ValueError(
+            f"{name} must be at least {at_least}, got {shown(int(value))}."
+        )
+    if at_most is not None and int(value) > at_most:
+        raise ValueError(f"{name} must be at most {at_most}, got {shown(int(value))}.")
+    return int(value)
 
 
 def seed(value: Any, name: str = "seed") -> int | None:
@@ -177,6 +179,25 @@ def as_array(values: Any) -> NDArray[Any] | None:
         return np.asarray(values)
     except (TypeError, ValueError, OverflowError):
         return None
+
+
+def path(name: str, value: Any) -> Path:
+    """Return the path of a file or folder.
+
+    Raises:
+        TypeError: `value` is neither text nor a path.
+        ValueError: `value` is empty or holds a NUL, which no name does.
+    """
+    try:
+        text = os.fsdecode(value)
+    except TypeError:
+        raise TypeError(
+            f"{name} must be a path, text or pathlib.Path, got {shown(value)} of type "
+            f"{type(value).__name__}."
+        ) from None
+    if not text or "\0" in text:
+        raise ValueError(f"{name} must be the name of a file, got {shown(value)}.")
+    return Path(text)
 
 
 def read_only(array: NDArray[Any]) -> NDArray[Any]:

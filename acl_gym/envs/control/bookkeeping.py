@@ -20,6 +20,11 @@ def checked_options(
     options: dict[str, Any] | None, allowed: tuple[str, ...]
 ) -> dict[str, Any]:
     """Refuse reset options that would otherwise be ignored silently."""
+    if options is not None and not isinstance(options, dict):
+        raise TypeError(
+            f"reset options must be a dict, got {validation.shown(options)} of type "
+            f"{type(options).__name__}."
+        )
     unknown = sorted(set(options or ()) - set(allowed), key=str)
     if unknown:
         raise ValueError(
@@ -159,7 +164,7 @@ def checked_autoreset_mode(mode: str | AutoresetMode) -> AutoresetMode:
     except ValueError:
         choices = ", ".join(repr(choice.value) for choice in AutoresetMode)
         raise ValueError(
-            f"autoreset_mode must be one of {choices}, got {mode!r}."
+            f"autoreset_mode must be one of {choices}, got {validation.shown(mode)}."
         ) from None
 
 
@@ -168,7 +173,7 @@ def checked_render_mode(mode: str | None, metadata: dict[str, Any]) -> str | Non
     if mode is not None and mode not in metadata["render_modes"]:
         raise ValueError(
             f"render_mode must be None or one of {metadata['render_modes']}, "
-            f"got {mode!r}."
+            f"got {validation.shown(mode)}."
         )
     return mode
 

@@ -10,6 +10,7 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from acl_gym.envs.control.signals import Signals
+from acl_gym.utils import validation
 from acl_gym.utils.compiling import njit
 from acl_gym.utils.typing import BoolArray, FloatArray, IntArray
 
@@ -122,7 +123,7 @@ class ControlSystem(ABC):
         if cells is not None:
             raise ValueError(
                 f"cells must be None for {type(self).__name__}, for which the thesis "
-                f"has no centres, got {cells!r}."
+                f"has no centres, got {validation.shown(cells)}."
             )
         return None
 

@@ -17,6 +17,7 @@ from acl_gym.envs.control.signals import Signals
 from acl_gym.export import Source, write_c_header, write_numpy_file
 from acl_gym.partitions import Partition
 from acl_gym.utils import validation
+from acl_gym.utils.text import short
 from acl_gym.utils.typing import BoolArray, CellArray, FloatArray, IntArray, RankArray
 
 
@@ -41,6 +42,11 @@ class PartitionPolicy(ABC):
 
     partition: Partition
     first_action: int
+
+    def __repr__(self) -> str:
+        """Partition and number of actions."""
+        name = type(self).__name__
+        return f"{name}({short(repr(self.partition))}, {self.n_actions} actions)"
 
     @property
     @abstractmethod

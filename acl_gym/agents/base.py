@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from gymnasium.vector import VectorEnv
 from numpy.typing import ArrayLike, NDArray
 
+from acl_gym.agents.notebook import name_of, page_of
 from acl_gym.callbacks.base import Callbacks
 from acl_gym.colony.greedy import greedy_actions
 from acl_gym.envs.control.lookup import signals_of
@@ -20,6 +21,8 @@ from acl_gym.partitions.automatic import automatic_partition
 from acl_gym.policies import PartitionPolicy, TablePolicy, random_ranks
 from acl_gym.utils import files, validation
 from acl_gym.utils.parameters import fixed
+from acl_gym.utils.pictures import guarded
+from acl_gym.utils.text import count, short
 from acl_gym.utils.typing import (
     BoolArray,
     CellArray,
@@ -57,6 +60,9 @@ class TabularAgent(PartitionPolicy):
         metadata: your own notes, JSON values under string keys, empty at first; saved
             and loaded with the agent.
     """
+
+    slots_are: ClassVar[str] = "slots"
+    """What the slots are called where the agent is described."""
 
     def __init__(
         self,
@@ -103,6 +109,38 @@ class TabularAgent(PartitionPolicy):
         self.in_trial = False
         self.metadata: dict[str, Any] = {}
         self.set_random_seed(seed)
+
+    def __repr__(self) -> str:
+        """Environment, slots, partition, and how much has been learned, in a line."""
+        name, parts = type(self).__name__, []
+        try:
+            if self.env is not None:
+                parts += [name_of(self.env), f"{self.num_envs} {self.slots_are}"]
+            parts.append(repr(self.partition))
+            parts += [f"{self.trials} trials", f"{count(self.num_timesteps)} steps"]
+        except AttributeError:  # not made completely
+            return f"{name}(not complete)"
+        return f"{name}({', '.join(map(short, parts))})"
+
+    @guarded
+    def _repr_html_(self) -> str:
+        """What a notebook shows: parameters, how far the agent is, its policy."""
+        facts: list[tuple[str, Any]] = [("partition", self.partition)]
+        if self.env is not None:
+            slots = f"{self.num_envs} {self.slots_are}"
+            facts = [("environment", f"{name_of(self.env)}, {slots}"), *facts]
+        facts += [
+            ("longest episode", f"{self.max_steps} steps"),
+            ("learned", f"{self.trials} trials, {count(self.num_timesteps)} steps"),
+            ("time", f"{self.seconds:.3g} s"),
+        ]
+        last = self.history[-1] if self.history else {}
+        facts += [
+            (name.replace("_", " "), f"{last[name]:.4g}")
+            for name in ("ants_return", "ants_cost", "policy_return", "policy_cost")
+            if last.get(name) is not None
+        ]
+        return page_of(self, self.policy.best_actions(), facts)
 
     @property
     @abstractmethod

@@ -15,6 +15,8 @@ from acl_gym.colony.episodes import Episode
 from acl_gym.envs.control.environments import ControlVectorEnv
 from acl_gym.evaluation.rollout import Rollout, require_vector_env
 from acl_gym.policies import PartitionPolicy
+from acl_gym.utils.pictures import guarded, table
+from acl_gym.utils.text import digits
 from acl_gym.utils.typing import FloatArray, Predictor
 
 
@@ -31,6 +33,30 @@ class PolicyCost:
     costs: FloatArray
     success: NDArray[np.bool_]
     lengths: NDArray[np.int64]
+
+    def __repr__(self) -> str:
+        """Cost, rate of success, and how many episodes of which lengths."""
+        facts = ", ".join(f"{name}={value}" for name, value in self._facts())
+        return f"PolicyCost({facts}, {self._episodes()})"
+
+    @guarded
+    def _repr_html_(self) -> str:
+        """What a notebook shows: the measures as a table."""
+        rows = [(name.replace("_", " "), value) for name, value in self._facts()]
+        costs = [digits(float(q)) for q in np.quantile(self.costs, (0.0, 0.5, 1.0))]
+        spread = f"lowest {costs[0]}, median {costs[1]}, highest {costs[2]}"
+        return table([*rows, ("costs", spread), ("episodes", self._episodes())])
+
+    def _facts(self) -> list[tuple[str, str]]:
+        facts = [("cost", digits(self.cost))]
+        if self.success is not None:
+            facts.append(("success_rate", f"{self.success_rate:.0%}"))
+        return facts
+
+    def _episodes(self) -> str:
+        shortest, longest = int(self.lengths.min()), int(self.lengths.max())
+        span = f"{shortest}" if shortest == longest else f"{shortest} to {longest}"
+        return f"{self.lengths.size} episodes of {span} steps"
 
     @property
     def cost(self) -> float:

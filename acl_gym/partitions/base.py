@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 from abc import ABC, abstractmethod
 from typing import Any, ClassVar
 
@@ -9,6 +10,8 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import ArrayLike, NDArray
 
+from acl_gym.utils import pictures
+from acl_gym.utils.pictures import guarded
 from acl_gym.utils.typing import CellArray, FloatArray, IntArray
 
 
@@ -27,6 +30,25 @@ class Partition(ABC):
     checked: ClassVar[bool] = False
     """Whether `locate` itself ensures that cells are in range, so that agents need not
     check them in every step."""
+
+    def __repr__(self) -> str:
+        """Name and number of cells."""
+        return f"{type(self).__name__}({getattr(self, 'n_cells', '?')} cells)"
+
+    @guarded
+    def _repr_html_(self) -> str:
+        """What a notebook shows: the variables and their cells."""
+        heading = html.escape(repr(self))
+        rows = self._variables()
+        heads = ("variable", "cells", "from", "to", "")
+        table = pictures.table(rows, heads) if rows else ""
+        k = self.cells_per_state
+        note = f"{self.n_cells:,} cells, a state belongs to {k} of them"
+        return f"<div><strong>{heading}</strong>{table}<div>{note}</div></div>"
+
+    def _variables(self) -> list[tuple[Any, ...]]:
+        """Of each variable its number, cells, lowest and highest value, and a note."""
+        return []
 
     @abstractmethod
     def locate(

@@ -18,6 +18,7 @@ from acl_gym.partitions import Partition, checked_partition, locate_all
 from acl_gym.utils import validation
 from acl_gym.utils.compiling import njit
 from acl_gym.utils.parameters import Fixed
+from acl_gym.utils.text import short
 from acl_gym.utils.typing import BoolArray, CellArray, FloatArray, IntArray, RankArray
 
 
@@ -54,6 +55,11 @@ class PartitionPolicy(Fixed, ABC):
 
     partition: Partition
     first_action: int
+
+    def __repr__(self) -> str:
+        """Partition and number of actions."""
+        name = type(self).__name__
+        return f"{name}({short(repr(self.partition))}, {self.n_actions} actions)"
 
     @property
     @abstractmethod

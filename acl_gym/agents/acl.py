@@ -109,6 +109,8 @@ class ACL(TabularAgent):
         3
     """
 
+    slots_are = "ants"
+
     tau0 = Parameter("Initial pheromone level", "tau_0", fixed=True, above=0)
     local_decay = Parameter(
         "Decay of each visited pair (4.12)", "gamma", at_least=0, below=1

@@ -7,13 +7,14 @@ import os
 from abc import abstractmethod
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, BinaryIO, NamedTuple, Self, overload
+from typing import Any, BinaryIO, ClassVar, NamedTuple, Self, overload
 
 import numpy as np
 from gymnasium import spaces
 from gymnasium.vector import VectorEnv
 from numpy.typing import ArrayLike, NDArray
 
+from acl_gym.agents.notebook import name_of, page_of
 from acl_gym.callbacks.base import Callbacks
 from acl_gym.colony.greedy import greedy_actions
 from acl_gym.envs.control.environments import ControlVectorEnv
@@ -32,6 +33,7 @@ from acl_gym.partitions.automatic import automatic_partition
 from acl_gym.policies import PartitionPolicy, TablePolicy, random_ranks
 from acl_gym.utils import archives, validation
 from acl_gym.utils.parameters import fixed
+from acl_gym.utils.pictures import guarded
 from acl_gym.utils.serialization import (
     Missing,
     from_json,
@@ -40,6 +42,7 @@ from acl_gym.utils.serialization import (
     to_json,
     to_settings,
 )
+from acl_gym.utils.text import count, short
 from acl_gym.utils.typing import (
     BoolArray,
     CellArray,
@@ -120,6 +123,9 @@ class TabularAgent(PartitionPolicy):
             the agent.
     """
 
+    slots_are: ClassVar[str] = "slots"
+    """What the slots are called where the agent is described."""
+
     def __init__(
         self,
         env: VectorEnv[Any, Any, Any] | None,
@@ -173,6 +179,38 @@ class TabularAgent(PartitionPolicy):
     @property
     def _n_cells(self) -> int:
         return len(self._table)
+
+    def __repr__(self) -> str:
+        """Environment, slots, partition, and how much has been learned, in a line."""
+        name, parts = type(self).__name__, []
+        try:
+            if self.env is not None:
+                parts += [name_of(self.env), f"{self.num_envs} {self.slots_are}"]
+            parts.append(repr(self.partition))
+            parts += [f"{self.trials} trials", f"{count(self.num_timesteps)} steps"]
+        except AttributeError:  # not made completely
+            return f"{name}(not complete)"
+        return f"{name}({', '.join(map(short, parts))})"
+
+    @guarded
+    def _repr_html_(self) -> str:
+        """What a notebook shows: parameters, how far the agent is, its policy."""
+        facts: list[tuple[str, Any]] = [("partition", self.partition)]
+        if self.env is not None:
+            slots = f"{self.num_envs} {self.slots_are}"
+            facts = [("environment", f"{name_of(self.env)}, {slots}"), *facts]
+        facts += [
+            ("longest episode", f"{self.max_steps} steps"),
+            ("learned", f"{self.trials} trials, {count(self.num_timesteps)} steps"),
+            ("time", f"{self.seconds:.3g} s"),
+        ]
+        last = self.history[-1] if self.history else {}
+        facts += [
+            (name.replace("_", " "), f"{last[name]:.4g}")
+            for name in ("ants_return", "ants_cost", "policy_return", "policy_cost")
+            if last.get(name) is not None
+        ]
+        return page_of(self, self.policy.best_actions(), facts)
 
     @property
     @abstractmethod

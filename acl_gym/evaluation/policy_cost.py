@@ -18,6 +18,8 @@ from acl_gym.envs.control.single import ControlEnv
 from acl_gym.evaluation.rollout import Rollout, rows_of
 from acl_gym.policies import PartitionPolicy
 from acl_gym.utils import validation
+from acl_gym.utils.pictures import guarded, table
+from acl_gym.utils.text import digits
 from acl_gym.utils.typing import FloatArray, IntArray, Predictor, Row
 from acl_gym.utils.vector_envs import require_vector_env
 
@@ -39,6 +41,30 @@ class PolicyCost:
     success: NDArray[np.bool_] | None
     lengths: NDArray[np.int64]
     returns: FloatArray
+
+    def __repr__(self) -> str:
+        """Cost, rate of success, and how many episodes of which lengths."""
+        facts = ", ".join(f"{name}={value}" for name, value in self._facts())
+        return f"PolicyCost({facts}, {self._episodes()})"
+
+    @guarded
+    def _repr_html_(self) -> str:
+        """What a notebook shows: the measures as a table."""
+        rows = [(name.replace("_", " "), value) for name, value in self._facts()]
+        costs = [digits(float(q)) for q in np.quantile(self.costs, (0.0, 0.5, 1.0))]
+        spread = f"lowest {costs[0]}, median {costs[1]}, highest {costs[2]}"
+        return table([*rows, ("costs", spread), ("episodes", self._episodes())])
+
+    def _facts(self) -> list[tuple[str, str]]:
+        facts = [("cost", digits(self.cost))]
+        if self.success is not None:
+            facts.append(("success_rate", f"{self.success_rate:.0%}"))
+        return facts
+
+    def _episodes(self) -> str:
+        shortest, longest = int(self.lengths.min()), int(self.lengths.max())
+        span = f"{shortest}" if shortest == longest else f"{shortest} to {longest}"
+        return f"{self.lengths.size} episodes of {span} steps"
 
     @property
     def cost(self) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 from abc import ABC, abstractmethod
 from typing import Any, TypeVar
 
@@ -9,8 +10,9 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import ArrayLike, NDArray
 
-from acl_gym.utils import validation
+from acl_gym.utils import pictures, validation
 from acl_gym.utils.parameters import Fixed
+from acl_gym.utils.pictures import guarded
 from acl_gym.utils.typing import CellArray, FloatArray, IntArray
 
 MOST_CELLS = 2**31 - 1
@@ -33,6 +35,25 @@ class Partition(ABC):
 
     state_ndim: int = 1
     """Axes of the array that is one state; 0 where a state is a plain number."""
+
+    def __repr__(self) -> str:
+        """Name and number of cells."""
+        return f"{type(self).__name__}({getattr(self, 'n_cells', '?')} cells)"
+
+    @guarded
+    def _repr_html_(self) -> str:
+        """What a notebook shows: the variables and their cells."""
+        heading = html.escape(repr(self))
+        rows = self._variables()
+        heads = ("variable", "cells", "from", "to", "")
+        table = pictures.table(rows, heads) if rows else ""
+        k = self.cells_per_state
+        note = f"{self.n_cells:,} cells, a state belongs to {k} of them"
+        return f"<div><strong>{heading}</strong>{table}<div>{note}</div></div>"
+
+    def _variables(self) -> list[tuple[Any, ...]]:
+        """Of each variable its number, cells, lowest and highest value, and a note."""
+        return []
 
     @abstractmethod
     def locate(

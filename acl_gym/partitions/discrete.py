@@ -24,6 +24,9 @@ from acl_gym.utils.typing import CellArray, FloatArray, IntArray
 _MOST_START = 2**52
 """Starts up to this, plus sizes, are exact as floats, in which states may be given."""
 
+_MOST_LISTED = 8
+"""Variables whose values are listed in a line."""
+
 
 @trusted
 class Discrete(FixedPartition):
@@ -161,8 +164,17 @@ class Discrete(FixedPartition):
             "starts": self.starts.tolist(),
         }
 
+    def _variables(self) -> list[tuple[Any, ...]]:
+        pairs = zip(self.sizes.ravel(), self.starts.ravel(), strict=True)
+        return [
+            (i + 1, size, start, start + size - 1, "")
+            for i, (size, start) in enumerate(pairs)
+        ]
+
     def __repr__(self) -> str:
         """Name, values of each variable, and where they do not start at 0."""
+        if self.sizes.size > _MOST_LISTED:
+            return f"Discrete({self.sizes.size} variables, {self.n_cells} cells)"
         starts = f", starts={self.starts.tolist()}" if self.starts.any() else ""
         return f"Discrete({self.sizes.tolist()}{starts})"
 

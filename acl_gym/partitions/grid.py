@@ -264,6 +264,15 @@ class Grid(FixedPartition):
             "periods": list(self.periods),
         }
 
+    def _variables(self) -> list[tuple[Any, ...]]:
+        return [
+            (i + 1, axis.size, f"{axis[0]:.4g}", f"{axis[-1]:.4g}", note)
+            for i, (axis, period) in enumerate(
+                zip(self.centres, self.periods, strict=True)
+            )
+            for note in ["" if period is None else f"circular, period {period:.4g}"]
+        ]
+
     def __repr__(self) -> str:
         """Name, cells along each axis, and which axes are circular."""
         shape = " x ".join(str(n) for n in self._cells)

@@ -190,7 +190,7 @@ def _with_white(image: Image.Image) -> Image.Image:
 def _mp4(film: _Film) -> bytes:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "film.mp4"
-        film.animation().save(path, writer="ffmpeg", fps=1000.0 / film.interval)
+        film.animation().save(path, writer="ffmpeg", fps=round(1000.0 / film.interval))
         return path.read_bytes()
 
 

@@ -197,9 +197,9 @@ def layout_of(subject: Subject, shape: Any) -> Layout:
     moves = np.array([MOVES.get(name.lower(), (0, 0)) for name in names])
     system = subject.system
     if isinstance(system, GridSearch) and shape is None:
-        letters = np.array([list(row) for row in system.rows], dtype="S1")
-        return Layout(system.cells, letters, moves, names)
-    letters = None
+        walls = np.array([list(row) for row in system.rows], dtype="S1")
+        return Layout(system.cells, walls, moves, names)
+    letters: Any = None
     if shape is None:
         letters = _letters(base, count)
         shape = _rows(count) if letters is None else letters.shape
@@ -220,10 +220,10 @@ def _single(env: Any) -> Any:
 
 def _letters(base: Any, count: int) -> Any:
     """The map of an environment of Gymnasium, `(rows, columns)`, or None."""
-    desc = getattr(base, "desc", None)
+    desc: Any = getattr(base, "desc", None)
     if type(base).__name__ == "FrozenLakeEnv" and np.size(desc) == count:
         return np.asarray(desc, dtype="S1")
-    cliff = getattr(base, "_cliff", None)
+    cliff: Any = getattr(base, "_cliff", None)
     if type(base).__name__ == "CliffWalkingEnv" and np.size(cliff) == count:
         letters = np.where(cliff, b"C", b" ").astype("S1")
         letters[-1, -1] = b"G"

@@ -254,9 +254,11 @@ def _draw_forces(ax: Axes, subject: Subject, plane: Plane) -> None:
     navigation.draw_ground(ax, system)
     c1, c2 = navigation.positions(system)
     states = np.empty((c1.size, len(plane.variables)))
-    for i, value in {**plane.fixed, plane.shown[0]: c1, plane.shown[1]: c2}.items():
+    values: dict[int, Any] = {**plane.fixed, plane.shown[0]: c1, plane.shown[1]: c2}
+    for i, value in values.items():
         states[:, i] = value
-    navigation.draw_forces(ax, system, system.inputs[subject.columns(states)])
+    forces = np.array(system.forces)[subject.columns(states)]
+    navigation.draw_forces(ax, system, forces)
     ax.set_xlabel(style.symbol(plane.axes[0].name))
     ax.set_ylabel(style.symbol(plane.axes[1].name))
 

@@ -108,7 +108,7 @@ def draw_policy(ax: Axes, env: ControlVectorEnv, policy: Predictor) -> None:
     c1, c2 = positions(system)
     states = np.stack([c1, 0 * c1, c2, 0 * c2], axis=1)
     actions = actions_in(policy, env.with_slots(len(states)), states)
-    draw_forces(ax, system, system.inputs[actions])
+    draw_forces(ax, system, np.array(system.forces)[actions])
 
 
 def draw_forces(ax: Axes, system: Navigation, forces: FloatArray) -> None:

@@ -67,10 +67,9 @@ def of_names(names: Sequence[str]) -> Palette:
 def of_inputs(subject: Subject) -> Palette:
     """Physical inputs in their order, or names in the order of the actions."""
     inputs, count = subject.inputs, subject.n_actions
-    system = subject.system
-    if system is None or inputs is None or len(inputs) != count:
+    if inputs is None:
         return of_names(subject.actions)
-    names = [style.symbol(name) for name in system.input_names]
+    names = [style.symbol(name) for name in subject.input_names]
     if inputs.shape[1] == 1:
         order = np.argsort(inputs[:, 0], kind="stable")
         values = inputs[order, 0]
@@ -137,7 +136,7 @@ def add_bar(
     bar = _bar(ax, ScalarMappable(norm, cmap), "" if slim else colours.title, place)
     if slim:
         bar.ax.set_title(colours.title.replace(" (", "\n("), size="small")
-    bar.set_ticks(np.arange(count), labels=colours.names)
+    bar.set_ticks(list(range(count)), labels=colours.names)
     bar.ax.tick_params(length=0)
 
 
@@ -157,10 +156,11 @@ def add_level_bar(
     bar = _bar(ax, mappable, name, place, extend=extend)
     norm = mappable.norm
     if isinstance(norm, LogNorm):
+        vmin, vmax = float(norm.vmin or 0.0), float(norm.vmax or 0.0)
         axis = bar.ax.xaxis if below else bar.ax.yaxis
-        if norm.vmax < _NARROW * norm.vmin:
+        if vmax < _NARROW * vmin:
             few = LogLocator(subs=(1.0, 2.0, 5.0))
-            axis.set_major_locator(few if norm.vmax > 4 * norm.vmin else MaxNLocator(4))
+            axis.set_major_locator(few if vmax > 4 * vmin else MaxNLocator(4))
             style.plain_numbers(axis)
         bar.ax.minorticks_off()
 

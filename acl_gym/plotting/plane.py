@@ -75,7 +75,7 @@ class Plane:
             variable = self.variables[i]
             number = digits(value).replace("-", "\N{MINUS SIGN}")
             unit = f" {variable.unit}" if variable.unit else ""
-            parts.append(f"{style.symbol(variable.short)} = {number}{unit}")
+            parts.append(f"{style.symbol(variable.symbol)} = {number}{unit}")
         ending = " (middle)" if self.middle else ""
         return f"at {', '.join(parts)}{ending}"
 
@@ -112,7 +112,7 @@ def plane_of(
     if not isinstance(slice, Mapping | None):
         raise TypeError(
             "slice must be a dict from state variables to values, such as "
-            f"{{{variables[-1].short!r}: 0.0}}, got {slice!r}."
+            f"{{{variables[-1].symbol!r}: 0.0}}, got {slice!r}."
         )
     given = {
         number_of(variables, key): _within(variables, key, value)
@@ -144,7 +144,7 @@ def plane_of(
 
 
 def number_of(variables: Sequence[Variable], key: Any) -> int:
-    """The number of a state variable that is named in some way.
+    """The number of a state variable, which may be named in any way of `called`.
 
     Raises:
         ValueError: there is none, or more than one.
@@ -152,7 +152,7 @@ def number_of(variables: Sequence[Variable], key: Any) -> int:
     if isinstance(key, Integral) and not isinstance(key, bool):
         found = [int(key)] if 0 <= int(key) < len(variables) else []
     else:
-        found = [i for i, v in enumerate(variables) if key in (v.name, v.short)]
+        found = [i for i, v in enumerate(variables) if key in v.called()]
     if len(found) != 1:
         raise ValueError(
             f"a state variable must be one of {_names(variables)} or a number "
@@ -162,7 +162,7 @@ def number_of(variables: Sequence[Variable], key: Any) -> int:
 
 
 def _names(variables: Sequence[Variable]) -> str:
-    return ", ".join(repr(variable.short) for variable in variables)
+    return ", ".join(repr(variable.symbol) for variable in variables)
 
 
 def _within(variables: Sequence[Variable], key: Key, value: Any) -> float:

@@ -202,7 +202,11 @@ def _pendulum(ax: Axes, stage: Stage) -> Callable[[int], list[Any]]:
     half = math.degrees(system.goal_bounds[0])
     ax.add_patch(Wedge((0, 0), 1.22, 90 - half, 90 + half, color="#A6DCC4", zorder=1))
     ax.text(0, 1.27, "goal", color=style.GREEN, ha="center", size="small")
-    rod_look = {"color": "0.2", "linewidth": 3.5, "solid_capstyle": "round"}
+    rod_look: dict[str, Any] = {
+        "color": "0.2",
+        "linewidth": 3.5,
+        "solid_capstyle": "round",
+    }
     (rod,) = ax.plot([], [], zorder=2, **rod_look)
     (bob,) = ax.plot([], [], "o", markersize=15, color=style.ORANGE, zorder=3)
     (pivot,) = ax.plot([0], [0], "o", markersize=6, color="0.45", zorder=4)

@@ -106,10 +106,11 @@ def checked_axes(ax: Any) -> Axes:
 def keep_style(figure: Figure) -> None:
     """Make a tick of each axis now, in our style; others are copies of it."""
     for ax in figure.findobj(Axes):  # bars are inside others
-        for axis, name in ((ax.xaxis, "xtick"), (ax.yaxis, "ytick")):
-            axis.set_tick_params(
-                which="both", labelsize=mpl.rcParams[f"{name}.labelsize"]
-            )
+        for axis, size in (
+            (ax.xaxis, mpl.rcParams["xtick.labelsize"]),
+            (ax.yaxis, mpl.rcParams["ytick.labelsize"]),
+        ):
+            axis.set_tick_params(which="both", labelsize=size)
             axis.get_major_ticks(1)
             axis.get_minor_ticks(1)
 
@@ -198,7 +199,7 @@ def multiples_of_pi(axis: Axis) -> None:
     axis.set_major_formatter(FuncFormatter(lambda value, _: as_pi(value)))
 
 
-_GREEK = [
+GREEK = [
     "alpha",
     "beta",
     "gamma",
@@ -219,13 +220,15 @@ _GREEK = [
 def symbol(name: str) -> str:
     """The name of a variable as it is printed: "omega (rad/s)" with a Greek letter."""
     word, bracket, unit = name.partition(" (")
-    if word in _GREEK:
-        word = rf"$\{word}$"
-    elif re.fullmatch(r"[a-z]\d", word):
-        word = f"${word[0]}_{word[1]}$"
-    else:
-        word = word.replace("$", r"\$")
-    return word + bracket + unit
+    return " ".join(map(_printed, word.split(" "))) + bracket + unit
+
+
+def _printed(word: str) -> str:
+    if word in GREEK:
+        return rf"$\{word}$"
+    if re.fullmatch(r"[a-z]\d?", word):
+        return f"${'_'.join(word)}$"
+    return word.replace("$", r"\$")
 
 
 def as_pi(value: float) -> str:

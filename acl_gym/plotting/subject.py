@@ -13,9 +13,12 @@ from numpy.typing import NDArray
 
 from acl_gym.agents.base import TabularAgent
 from acl_gym.envs.control.environments import ControlVectorEnv
-from acl_gym.envs.control.lookup import system_of
+from acl_gym.envs.control.lookup import signals_of, system_of
+from acl_gym.envs.control.signals import Signals
 from acl_gym.envs.control.system import ControlSystem
+from acl_gym.envs.grid_search.system import GridSearch
 from acl_gym.partitions import Discrete, Grid, Partition
+from acl_gym.plotting.style import GREEK
 from acl_gym.policies import PartitionPolicy, SoftPolicy, TablePolicy
 from acl_gym.utils.typing import FloatArray, IntArray
 
@@ -24,6 +27,8 @@ _BATCH = 20_000
 
 _LIMIT = 1e6
 """Observations beyond it are not drawn: the bound stands for none."""
+
+_DIRECTIONS = {(-1, 0): "north", (1, 0): "south", (0, 1): "east", (0, -1): "west"}
 
 Labels = Sequence[str] | Mapping[int, str] | None
 """Names of state variables: of all in order, or of some by their number."""
@@ -59,6 +64,20 @@ class Variable:
         """The name without its unit."""
         return re.sub(r"\s*\([^()]*\)$", "", self.name)
 
+    @property
+    def symbol(self) -> str:
+        """The last word of the name where that is a symbol: "omega", "c1"."""
+        last = self.short.split(" ")[-1]
+        return last if last in GREEK or re.fullmatch(r"[a-z]\d?", last) else self.short
+
+    def called(self) -> tuple[str, ...]:
+        """What it may be called: the name with and without its unit, and the symbol."""
+        return self.name, self.short, self.symbol
+
+    def name_in_short(self) -> str:
+        """The symbol with its unit: "omega (rad/s)"."""
+        return f"{self.symbol} ({self.unit})" if self.unit else self.symbol
+
     def middle(self) -> float:
         """The middle of the range."""
         return 0.5 * (self.low + self.high)
@@ -74,6 +93,8 @@ class Subject:
         table: levels or action values, `(n_cells, n_actions)`, or None.
         env: the environment, or None.
         system: that of an environment of this package, or None.
+        inputs: the physical input of each action, `(n_actions, m)`, or None.
+        input_names: of the columns of `inputs`.
         variables: the state variables; of numbered states none.
         n_states: how many numbered states there are, or 0.
         first_state: the number of the first of them.
@@ -88,6 +109,8 @@ class Subject:
     table: FloatArray | None
     env: Any
     system: ControlSystem | None
+    inputs: FloatArray | None
+    input_names: tuple[str, ...]
     variables: tuple[Variable, ...]
     n_states: int
     first_state: int
@@ -95,11 +118,6 @@ class Subject:
     first_action: int
     actions: tuple[str, ...]
     title: str
-
-    @property
-    def inputs(self) -> FloatArray | None:
-        """The physical input of each action, `(n_actions, m)`, or None."""
-        return None if self.system is None else self.system.inputs
 
     def heading(self, kind: str) -> str:
         """The title of a picture of some kind."""
@@ -166,16 +184,20 @@ def subject_of(
     if system is not None and system.observation_space != space:
         system = None  # a wrapper has changed what is observed
     first, count = _actions(policy, env)
+    signals = None if env is None else signals_of(env)
+    inputs, input_names = _inputs(signals, system, count)
     names = _action_names(actions, system, first, count)
-    n_states, first_state, variables = 0, 0, ()
+    n_states, first_state = 0, 0
+    variables: tuple[Variable, ...] = ()
     if isinstance(space, spaces.Discrete):
         n_states, first_state = int(space.n), int(space.start)
     elif isinstance(partition, Discrete) and partition.state_ndim == 0:
         n_states, first_state = partition.n_cells, int(partition.starts)
     else:
-        variables = _variables(partition, space, system, labels)
-    known = (policy, partition, table, env, system, variables, n_states, first_state)
-    return Subject(*known, count, first, names, _title(agent))
+        variables = _variables(partition, space, signals, labels)
+    known = (policy, partition, table, env, system, inputs, input_names, variables)
+    numbers = (n_states, first_state, count, first)
+    return Subject(*known, *numbers, names, _title(agent))
 
 
 def _title(agent: Any) -> str:
@@ -231,6 +253,24 @@ def _actions(policy: Any, env: Any) -> tuple[int, int]:
     return int(space.start), int(space.n)
 
 
+def _inputs(
+    signals: Signals | None, system: ControlSystem | None, count: int
+) -> tuple[FloatArray | None, tuple[str, ...]]:
+    """What actions set, where that is more telling than their names."""
+    if signals is None or isinstance(system, GridSearch):
+        return None, ()
+    values = np.array(signals.values)
+    if len(values) != count:
+        return None, ()
+    return values, tuple(map(_with_unit, signals.inputs))
+
+
+def _with_unit(name: str) -> str:
+    """The unit in brackets, as in "torque u (N m)"; notes that follow are left out."""
+    word, *rest = name.split(", ")
+    return f"{word} ({rest[0]})" if rest else word
+
+
 def _action_names(
     given: Sequence[str] | None, system: ControlSystem | None, first: int, count: int
 ) -> tuple[str, ...]:
@@ -241,15 +281,15 @@ def _action_names(
                 f"actions must be {count} names, one for each action, got {given!r}."
             )
         return names
-    if system is not None and len(system.action_names) == count:
-        return system.action_names
+    if isinstance(system, GridSearch) and len(system.directions) == count:
+        return tuple(_DIRECTIONS[move] for move in system.directions)
     return tuple(f"action {first + u}" for u in range(count))
 
 
 def _variables(
     partition: Partition | None,
     space: Any,
-    system: ControlSystem | None,
+    signals: Signals | None,
     labels: Labels,
 ) -> tuple[Variable, ...]:
     if isinstance(partition, Grid):
@@ -268,17 +308,17 @@ def _variables(
             "states must be a number or a row of numbers to be drawn, got "
             f"{space if partition is None else partition!r}."
         )
-    names = _labels(labels, system, len(made))
+    names = _labels(labels, signals, len(made))
     return tuple(
         Variable(name, edges[0], edges[-1], edges, period)
         for name, (edges, period) in zip(names, made, strict=True)
     )
 
 
-def _labels(labels: Labels, system: ControlSystem | None, count: int) -> list[str]:
+def _labels(labels: Labels, signals: Signals | None, count: int) -> list[str]:
     names = [f"state {i + 1}" for i in range(count)]
-    if system is not None and len(system.state_names) == count:
-        names = list(system.state_names)
+    if signals is not None and len(signals.observations) == count:
+        names = list(map(_with_unit, signals.observations))
     if labels is None:
         return names
     given: dict[Any, Any] = {}

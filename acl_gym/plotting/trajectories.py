@@ -234,18 +234,16 @@ def _signals(subject: Subject, path: Trajectory) -> list[Signal]:
     if not subject.variables:
         return [("state", path.states[:, 0], None)]
     return [
-        (variable.name, values, variable.period)
+        (variable.name_in_short(), values, variable.period)
         for variable, values in zip(subject.variables, path.states.T, strict=True)
     ]
 
 
 def _inputs(subject: Subject) -> tuple[list[str], Any, list[FloatArray]]:
     """Names of the panel's lines, ticks of actions, and what each action stands for."""
-    inputs, system = subject.inputs, subject.system
-    if inputs is None or system is None or len(inputs) != subject.n_actions:
+    if subject.inputs is None:
         return ["action"], subject.actions, [np.arange(float(subject.n_actions))]
-    names = list(system.input_names) or ["input"] * inputs.shape[1]
-    return names, None, list(inputs.T)
+    return list(subject.input_names), None, list(subject.inputs.T)
 
 
 def _draw_panels(
@@ -254,18 +252,17 @@ def _draw_panels(
     """A variable in each panel, and the inputs in the last."""
     time, name = _times(subject, path)
     for panel, (label, values, period) in zip(panels[:-1], signals, strict=True):
-        turns = period is not None and subject.variables != ()
-        drawn = np.unwrap(values, period=period) if turns else values
+        drawn = values if period is None else np.unwrap(values, period=period)
         if subject.variables:
             panel.plot(time, drawn, **_LINE)
         else:
             panel.step(time, drawn, where="post", **_LINE)
         panel.set_ylabel(style.symbol(label))
-        if turns and label.endswith("(rad)"):
+        if period is not None and label.endswith("(rad)"):
             style.multiples_of_pi(panel.yaxis)
-    names, ticks, values = _inputs(subject)
+    names, ticks, meanings = _inputs(subject)
     last = panels[-1]
-    for column, (label, of_action) in enumerate(zip(names, values, strict=True)):
+    for column, (label, of_action) in enumerate(zip(names, meanings, strict=True)):
         # The last input holds until the last state.
         held = of_action[np.append(path.actions, path.actions[-1:])]
         color = (style.ORANGE, style.GREEN, style.BLACK)[column % 3]

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import base64
+import functools
 import html
 import struct
 import zlib
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -54,8 +55,8 @@ def direction_colours(vectors: NDArray[Any]) -> list[str]:
     """A colour for the direction of each vector `(n, 2)`; grey for those of no length."""
     angle = np.arctan2(vectors[:, 1], vectors[:, 0]) / (2 * np.pi)
     colours = _between((angle % 1.0) * len(_CIRCLE), [*_CIRCLE, _CIRCLE[0]])
-    still = ~vectors.any(axis=1)
-    return _written(np.where(still[:, None], _GREY, colours))
+    still = np.asarray(np.abs(vectors).sum(axis=1) == 0.0)
+    return _written(np.where(still.reshape(-1, 1), _GREY, colours))
 
 
 def _between(places: NDArray[Any], colours: Any) -> NDArray[Any]:
@@ -107,14 +108,32 @@ def inline_png(data: bytes, alt: str, style: str = "max-width:100%") -> str:
     )
 
 
+class Markup(str):
+    """A text that is HTML already."""
+
+    __slots__ = ()
+
+
+def guarded(page: Callable[[Any], str]) -> Callable[[Any], str]:
+    """Let a `_repr_html_` show the plain `repr` instead of raising."""
+
+    @functools.wraps(page)
+    def safe(thing: Any) -> str:
+        try:
+            return page(thing)
+        except Exception:  # a notebook must be able to show what is broken
+            return f"<pre>{html.escape(repr(thing))}</pre>"
+
+    return safe
+
+
 def table(rows: Iterable[Sequence[Any]], heads: Sequence[str] = ()) -> str:
     """A table of texts, all escaped; the first of a row names it."""
 
     def line(cells: Sequence[Any], kind: str) -> str:
         style = "text-align:left;padding:1px 12px 1px 0;vertical-align:top"
         inside = (
-            f'<{kind} style="{style}">{html.escape(str(cell))}</{kind}>'
-            for cell in cells
+            f'<{kind} style="{style}">{_escaped(cell)}</{kind}>' for cell in cells
         )
         return f"<tr>{''.join(inside)}</tr>"
 
@@ -124,3 +143,7 @@ def table(rows: Iterable[Sequence[Any]], heads: Sequence[str] = ()) -> str:
         '<table style="border-collapse:collapse;margin:0;font-size:90%">'
         f"{head}<tbody>{body}</tbody></table>"
     )
+
+
+def _escaped(cell: Any) -> str:
+    return cell if isinstance(cell, Markup) else html.escape(str(cell))

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import Any, overload
+from typing import Any
 
-import gymnasium as gym
 from gymnasium.vector import AutoresetMode
 from gymnasium.wrappers import TimeLimit
 
@@ -31,12 +30,6 @@ class PlantVectorEnv(ControlVectorEnv):
     painter = _PAINTER
 
 
-@overload
-def plant(
-    dynamics: Any, *, num_envs: None = None, **parameters: Any
-) -> gym.Env[Any, Any]: ...
-@overload
-def plant(dynamics: Any, *, num_envs: int, **parameters: Any) -> PlantVectorEnv: ...
 def plant(
     dynamics: Any,
     *,
@@ -58,7 +51,7 @@ def plant(
     input_names: Sequence[str] | None = None,
     autoreset_mode: str | AutoresetMode | None = None,
     render_mode: str | None = None,
-) -> gym.Env[Any, Any] | PlantVectorEnv:
+) -> Any:
     """Make an environment from a plant of your own.
 
     The plant x' = f(x, u) is integrated by the fourth-order method of Runge and Kutta,

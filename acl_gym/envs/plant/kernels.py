@@ -82,7 +82,7 @@ def advance_ode(dynamics: Any, size: int, put: Any) -> Advance:
                 bad = slot
         return bad
 
-    return advance  # type: ignore[no-any-return]
+    return advance
 
 
 @lru_cache(maxsize=64)
@@ -114,7 +114,7 @@ def advance_map(dynamics: Any, size: int, put: Any) -> Advance:
                 bad = slot
         return bad
 
-    return advance  # type: ignore[no-any-return]
+    return advance
 
 
 @njit(cache=True, error_model="numpy")

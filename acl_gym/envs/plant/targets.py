@@ -234,11 +234,11 @@ def checked_axes(circular: Iterable[int], size: int) -> tuple[int, ...]:
     axes = list(circular) if isinstance(circular, Iterable) else [None]
     for axis in axes:
         whole = isinstance(axis, Integral) and not isinstance(axis, bool)
-        if not whole or not 0 <= axis < size:  # type: ignore[operator]
+        if not whole or not 0 <= axis < size:
             raise ValueError(
                 f"circular must hold variables of 0..{size - 1}, got {circular!r}."
             )
-    return tuple(sorted({int(axis) for axis in axes}))  # type: ignore[arg-type]
+    return tuple(sorted({int(axis) for axis in axes}))
 
 
 def checked_names(

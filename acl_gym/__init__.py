@@ -37,6 +37,7 @@ if TYPE_CHECKING:
         Weighted,
     )
     from acl_gym.deposits import Deposit, FunctionDeposit, InverseCost, Rank, Return
+    from acl_gym.envs.plant import plant
     from acl_gym.envs.wrappers.scaling import ScaledObservation, ScaledVectorObservation
     from acl_gym.envs.wrappers.waiting import WaitingVectorEnv
     from acl_gym.evaluation import PolicyCost, evaluate_policy_cost
@@ -97,6 +98,7 @@ _PUBLIC = {
     "evaluate_policy_cost": "acl_gym.evaluation",
     "fuzzy_q_iteration": "acl_gym.planning.q_iteration",
     "get_num_threads": "acl_gym.utils.threads",
+    "plant": "acl_gym.envs.plant",
     "set_num_threads": "acl_gym.utils.threads",
     "value_iteration": "acl_gym.planning.value_iteration",
 }
@@ -146,6 +148,7 @@ __all__ = [
     "evaluate_policy_cost",
     "fuzzy_q_iteration",
     "get_num_threads",
+    "plant",
     "set_num_threads",
     "value_iteration",
 ]

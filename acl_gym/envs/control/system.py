@@ -18,6 +18,22 @@ BLOCK = 512
 """Slots that a kernel advances at a time, so that their data stays in the nearest cache."""
 
 
+class SlotError(ValueError):
+    """A step failed in one slot.
+
+    Args:
+        message: in which `<slot>` stands for the number of the slot.
+        slot: its number, counted among the states that were advanced.
+    """
+
+    def __init__(self, message: str, slot: int) -> None:
+        super().__init__(message, slot)  # both, so that it can be pickled
+        self.message, self.slot = message, slot
+
+    def __str__(self) -> str:
+        return self.message.replace("<slot>", str(self.slot))
+
+
 class ControlSystem(ABC):
     """A discrete-time system x(t+1) = f(x(t), u(t)), eq. (4.1), with goal and cost.
 

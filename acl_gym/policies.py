@@ -36,12 +36,18 @@ class Action(np.ndarray[tuple[()], np.dtype[np.int64]]):
     """One action: an array without axes, as Stable-Baselines3 gives it, with a hash.
 
     The environments of `gymnasium.envs.toy_text` look actions up in a dict, where a
-    plain array without axes is refused.
+    plain array without axes is refused. What is calculated with it is plain again.
     """
 
     def __hash__(self) -> int:  # type: ignore[override]
         """That of the number, to which it is equal."""
         return hash(self.item())
+
+    def __array_wrap__(
+        self, array: Any, context: Any = None, return_scalar: bool = False
+    ) -> Any:
+        """The result of a calculation, a number where it has no axes."""
+        return array[()]
 
 
 class PartitionPolicy(Fixed, ABC):

@@ -264,6 +264,13 @@ def test_one_action_is_also_a_number() -> None:
         assert hash(other) == hash(1)
         assert other == action
     assert f"{action} {action:02d} {int(action)}" == "1 01 1"
+    for result, kind in (
+        (action + 1, np.int64),
+        (action == 1, np.bool_),
+        (action / 2, np.float64),
+        (np.arange(3) + action, np.ndarray),
+    ):
+        assert type(result) is kind
     assert json.dumps(action.item()) == json.dumps(action.tolist()) == "1"
 
 

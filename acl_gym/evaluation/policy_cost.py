@@ -189,7 +189,11 @@ def with_slots_for(
         A new environment of the same system, whose random numbers continue a copy of
         the stream of `env`; or `env` itself if it is wrapped or of another package, or
         is such a new environment with the right number of slots.
+
+    Raises:
+        TypeError: `env` is not a vector environment.
     """
+    require_vector_env(env)
     base = env.unwrapped
     if base is not env or not isinstance(base, ControlVectorEnv):
         return env

@@ -16,6 +16,7 @@ from acl_gym.evaluation import PolicyCost, evaluate_policy_cost, policy_measures
 from acl_gym.sb3.adapter import VectorEnvAdapter
 from acl_gym.utils import validation
 from acl_gym.utils.typing import Row
+from acl_gym.utils.vector_envs import require_vector_env
 
 
 class PolicyCostCallback(BaseCallback):
@@ -43,6 +44,10 @@ class PolicyCostCallback(BaseCallback):
             `PolicyCost`.
         best: the evaluation with the lowest cost, which is the highest return, so far.
         best_parameters: the parameters of that policy, for `restore_best`.
+
+    Raises:
+        TypeError: `env` is not a vector environment, or a number is not an integer.
+        ValueError: a number is too small.
     """
 
     def __init__(
@@ -55,6 +60,7 @@ class PolicyCostCallback(BaseCallback):
         seed: int | None = 0,
     ) -> None:
         super().__init__()
+        require_vector_env(env)
         self.env = env
         self.states = states
         self.every = validation.integer("every", every, at_least=1)

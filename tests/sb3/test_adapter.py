@@ -4,6 +4,7 @@ import gymnasium as gym
 import numpy as np
 import pytest
 from gymnasium.vector import SyncVectorEnv
+from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.vec_env import DummyVecEnv
 
 from acl_gym.sb3.adapter import VectorEnvAdapter
@@ -126,7 +127,7 @@ def test_infos_are_taken_apart(mode: str) -> None:
 def test_the_same_as_sb3s_own_vector_environment(mode: str) -> None:
     """Step for step what `DummyVecEnv` gives for the same single environments."""
     ours = VectorEnvAdapter(countdowns(2, 3, 5, mode=mode))
-    theirs = DummyVecEnv([lambda n=n: Countdown(n) for n in (2, 3, 5)])  # type: ignore[misc]
+    theirs = DummyVecEnv([lambda n=n: Monitor(Countdown(n)) for n in (2, 3, 5)])  # type: ignore[misc]
     for env in (ours, theirs):
         env.seed(11)
     np.testing.assert_array_equal(ours.reset(), theirs.reset())
@@ -142,8 +143,11 @@ def test_the_same_as_sb3s_own_vector_environment(mode: str) -> None:
             # With SAME_STEP, Gymnasium adds the info of the reset.
             assert ("begun" in mine) == (mode == "SameStep" and last is not None)
             mine.pop("begun", None)
-            assert ("episode" in mine) == (last is not None)
-            mine.pop("episode", None)
+            episode, counted = mine.pop("episode", None), other.pop("episode", None)
+            assert (episode is None) == (counted is None) == (last is None)
+            if episode is not None:
+                assert episode["r"] == pytest.approx(counted["r"])
+                assert episode["l"] == counted["l"]
             assert mine == other
 
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
+from inspect import signature
 from pathlib import Path
 from typing import Any
 
@@ -27,11 +29,12 @@ from stable_baselines3.common.vec_env import (
     VecNormalize,
 )
 
+import acl_gym
 from acl_gym import ACL, QLearning, VectorEnvAdapter
 from acl_gym.envs import ENVIRONMENTS
 
 PENDULUM, GRID = "acl_gym/Pendulum-v0", "acl_gym/GridSearch2D-v0"
-LIMIT = 12  # steps an episode: a few of them fit into a run
+LIMIT = 12  # steps an episode, fewer than the ids have: several fit into a run
 EVERY_ID = pytest.mark.parametrize("env_id", ENVIRONMENTS)
 ALGORITHMS: list[tuple[Any, dict[str, Any]]] = [
     (PPO, {"n_steps": 16, "batch_size": 16}),
@@ -198,6 +201,22 @@ def test_our_agents_under_evaluate_policy(env_id: str, kind: Any) -> None:
         assert len(returns) == 3
         assert max(returns) <= 0
         assert 1 <= min(lengths) <= max(lengths) <= LIMIT
+
+
+@pytest.mark.parametrize("kind", [ACL, QLearning])
+@pytest.mark.parametrize(
+    ("theirs", "ours"),
+    [
+        ("EvalCallback", "PolicyEvaluation"),
+        ("CheckpointCallback", "Checkpoint"),
+        ("tensorboard_log", "TensorBoardLog"),
+        ("progress_bar", "progress_bar"),
+    ],
+)
+def test_learn_names_what_is_here_instead(kind: Any, theirs: str, ours: str) -> None:
+    for name in (theirs, ours):
+        assert re.search(rf"\b{name}\b", kind.learn.__doc__), name
+    assert hasattr(acl_gym, ours) or ours in signature(kind.learn).parameters
 
 
 @EVERY_ID

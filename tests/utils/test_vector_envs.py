@@ -23,10 +23,16 @@ from acl_gym import (
     ACL,
     PolicyEvaluation,
     QLearning,
+    ScaledVectorObservation,
     VectorEnvAdapter,
     evaluate_policy_cost,
 )
-from acl_gym.evaluation.policy_cost import actions_in, record_trajectory
+from acl_gym.evaluation.policy_cost import (
+    actions_in,
+    record_trajectory,
+    with_slots_for,
+)
+from acl_gym.sb3.callback import PolicyCostCallback
 from acl_gym.utils.vector_envs import require_vector_env
 
 LINE = "acl_gym/GridSearch1D-v0"
@@ -162,7 +168,10 @@ GRID = acl_gym.Crisp.from_box(spaces.Box(-1, 1, (1,)), 5)
         lambda env: QLearning(None, GRID, n_actions=2).set_env(env),
         lambda env: evaluate_policy_cost(QLearning(None, GRID, n_actions=2), env),
         PolicyEvaluation,
+        PolicyCostCallback,
         VectorEnvAdapter,
+        ScaledVectorObservation,
+        with_slots_for,
         lambda env: record_trajectory(
             QLearning(None, GRID, n_actions=2), env, np.zeros(1)
         ),

@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from acl_gym.utils.boxes import declared_bounds
 from acl_gym.utils.typing import Float32Array
+from acl_gym.utils.vector_envs import require_vector_env
 
 TWO_PI = 2.0 * math.pi
 
@@ -136,10 +137,10 @@ class ScaledVectorObservation(
     def __init__(
         self, env: VectorEnv[NDArray[Any], Any, Any], circular: Iterable[int] = ()
     ) -> None:
+        require_vector_env(env)
         # The base class refuses this mode too, since the last observations would
         # stay as they were in infos["final_obs"]; here the message has a remedy.
-        mode = getattr(env, "metadata", {}).get("autoreset_mode")
-        if mode is AutoresetMode.SAME_STEP:
+        if env.metadata.get("autoreset_mode") is AutoresetMode.SAME_STEP:
             raise ValueError(
                 "env must have autoreset mode NEXT_STEP or DISABLED, got SAME_STEP, "
                 "whose infos['final_obs'] an observation wrapper does not reach; "

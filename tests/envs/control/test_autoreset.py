@@ -345,3 +345,26 @@ def test_statistics_of_episodes_are_recorded(case: SystemCase, mode: str) -> Non
     assert list(env.length_queue) == episodes[-100:]
     assert max(episodes) == LIMIT or not case.lasting
     assert min(episodes) < LIMIT
+
+
+def test_the_mode_can_be_changed(case: SystemCase, mode: str) -> None:
+    """The episodes are those of an environment that was made with the mode."""
+    made = native_env(case, mode, **case.easy)
+    for old in AutoresetMode:
+        env = native_env(case, old.value, **case.easy)
+        env.reset(seed=1)  # the change holds in the midst of episodes, too
+        env.set_autoreset_mode(mode)
+        assert env.autoreset_mode.value == env.metadata["autoreset_mode"].value == mode
+        assert type(env).metadata["autoreset_mode"] is AutoresetMode.NEXT_STEP
+        rng = np.random.default_rng(2)
+        made.reset(seed=1)
+        for _ in range(2 * LIMIT):
+            actions = rng.integers(0, case.n_actions, N)
+            result = made.step(actions)
+            assert_same_step(result, env.step(actions))
+            finished = result[2] | result[3]
+            if mode == "Disabled" and finished.any():
+                for each in (made, env):
+                    each.reset(options={"reset_mask": finished})
+    with pytest.raises(ValueError, match=r"^autoreset_mode must be one of"):
+        made.set_autoreset_mode("Sometimes")

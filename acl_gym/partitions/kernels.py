@@ -160,7 +160,8 @@ def locate_block(
     """
     start = block * BLOCK
     size = min(BLOCK, slots.size - start)
-    rows, outside = np.uint64(states.shape[0]), 0
+    rows = np.uint64(states.shape[0])
+    outside: Any = 0
     for i in range(size):
         outside += np.uint64(slots[start + i]) >= rows  # negative ones become huge
     if outside > 0:

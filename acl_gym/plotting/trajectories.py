@@ -151,7 +151,7 @@ def _run_slot(subject: Subject, env: Any, steps: int, seed: Any) -> Trajectory:
     walk = rollout.episodes()[0]
     states = walk.observations.reshape(len(walk.observations), -1)
     return Trajectory(
-        states.astype(np.float64), walk.actions, walk.stage_costs, walk.success
+        states.astype(np.float64), walk.actions, walk.stage_costs, walk.terminated
     )
 
 

@@ -74,7 +74,15 @@ class PartialStep:
                 rewards.fill(0.0)
                 terminated.fill(False)
                 return self._step_part(
-                    slots, states, steps, actions, None, rewards, terminated, truncated
+                    limit,
+                    slots,
+                    states,
+                    steps,
+                    actions,
+                    None,
+                    rewards,
+                    terminated,
+                    truncated,
                 )
             return int(
                 put_idle_back(
@@ -89,11 +97,20 @@ class PartialStep:
                 )
             )
         return self._step_part(
-            slots, states, steps, actions, uniforms, rewards, terminated, truncated
+            limit,
+            slots,
+            states,
+            steps,
+            actions,
+            uniforms,
+            rewards,
+            terminated,
+            truncated,
         )
 
     def _step_part(
         self,
+        limit: int,
         slots: IntArray,
         states: FloatArray,
         steps: IntArray,

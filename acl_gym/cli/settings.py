@@ -45,7 +45,7 @@ OBJECTS = {"cost": COSTS, "deposit": DEPOSITS}
 """The parameters that take an object, by name; those of schedules declare it."""
 
 _WORDS = {"true": True, "false": False, "none": None, "null": None}
-_SWITCHES = ("yes", "no", "on", "off")
+_SWITCHES = ("yes", "no", "on", "off", "y", "n", "t", "f")
 _DEEPEST = 20
 """Brackets within brackets; no setting needs as many."""
 

@@ -186,7 +186,7 @@ def read_outcome(directory: Path) -> Outcome:
             f"{directory}` makes one."
         )
     try:
-        found = dict(json.loads(path.read_text()))
+        found = dict(json.loads(path.read_text(encoding="utf-8")))
         if not {"claims", "experiments", "runs", "made", "runs_made"} <= found.keys():
             raise KeyError
     except (ValueError, TypeError, KeyError) as error:
@@ -244,7 +244,7 @@ def _finished(
 ) -> Outcome | None:
     """The outcome in a folder if all of it is there, made from this; None otherwise."""
     try:
-        known = json.loads((directory / _FINISHED).read_text())
+        known = json.loads((directory / _FINISHED).read_text(encoding="utf-8"))
         complete = (
             known["stamp"] == stamp
             and all((directory / file).is_file() for file in known["files"])

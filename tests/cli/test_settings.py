@@ -60,7 +60,7 @@ def test_values(text: str, value: Any) -> None:
     assert type(found) is type(value)
 
 
-@pytest.mark.parametrize("word", ["yes", "No", "ON", "off"])
+@pytest.mark.parametrize("word", ["yes", "No", "ON", "off", "F"])
 def test_other_words_for_true_and_false_are_refused(word: str) -> None:
     """As texts all of them would count as true."""
     with pytest.raises(BadArgumentError, match="must be true or false"):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import tomllib
 from collections.abc import Callable
+from importlib.resources import files
 from pathlib import Path
 
 from matplotlib.figure import Figure
@@ -41,7 +42,7 @@ PLOTS: dict[str, Callable[[Experiment, Results], Figure]] = {
 """What draws the figure of each name."""
 
 CAPTIONS: dict[str, dict[str, str]] = tomllib.loads(
-    Path(__file__).with_name("captions.toml").read_text()
+    files(__package__).joinpath("captions.toml").read_text(encoding="utf-8")
 )
 """For the figure of each name the `text` below it, and `alt`, what it shows."""
 

@@ -42,6 +42,14 @@ AGENTS = {
 """Value of `--agent` -> the agent. To add one, add an entry."""
 
 
+CHOICES = {
+    "selection": ("max_boltzmann", "boltzmann", "epsilon_greedy"),
+    "traces": ("replacing", "accumulating"),
+    "update": ("each_visit", "in_turn", "once_per_ant", "once_per_trial"),
+}
+"""Parameters that take one of some words; the modules that have them import Numba."""
+
+
 @dataclass(frozen=True)
 class Declared:
     """A parameter of an agent as its class declares it.
@@ -81,7 +89,8 @@ def parameters(name: str) -> dict[str, Declared]:
         if keyword.arg in OWN_OPTIONS:
             continue
         value = None if default is None else ast.literal_eval(default)
-        scheduled, words, within = numbers.get(keyword.arg, (False, "", ""))
+        choices = ", ".join(CHOICES.get(keyword.arg, ()))
+        scheduled, words, within = numbers.get(keyword.arg, (False, choices, ""))
         found[keyword.arg] = Declared(value, scheduled, words, within)
     return found
 

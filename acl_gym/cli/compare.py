@@ -187,7 +187,7 @@ def compare(
     _print_summary(*found, terminal)
     terminal.print(f"\nReport: {out / 'report.html'}\nResults: {out / 'results.json'}")
     if as_json:
-        typer.echo((out / "results.json").read_text())
+        typer.echo((out / "results.json").read_text(encoding="utf-8"))
 
 
 def _foreign(env_id: str) -> System:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import math
 import os
 import re
@@ -13,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import gymnasium as gym
 from gymnasium import spaces
+from gymnasium.envs.registration import load_env_creator
 
 from acl_gym.cli.errors import BadArgumentError, bad_arguments
 from acl_gym.envs import ENVIRONMENTS
@@ -135,7 +137,9 @@ class Environment:
                 raise BadArgumentError(
                     f"{name} is no parameter of {self.name}; leave out --env-arg {name}."
                 )
-        if not self.arguments or self.name not in ENVIRONMENTS:
+        if not self.is_own:
+            self._check_switches()
+        if not self.arguments or not self.is_own:
             return
         # A system of this package says which parameters it has.
         with bad_arguments():
@@ -150,6 +154,22 @@ class Environment:
                 raise BadArgumentError(
                     f"{self.name} has no parameter {name!r}; choose from "
                     f"{', '.join(names)}."
+                )
+
+    def _check_switches(self) -> None:
+        """Refuse a text where the environment has True or False: it would be true."""
+        with bad_arguments():
+            entry_point = gym.registry[self.name].entry_point
+            if self.arguments and isinstance(entry_point, str):
+                entry_point = load_env_creator(entry_point)
+        if not self.arguments or not callable(entry_point):
+            return
+        known = inspect.signature(entry_point).parameters
+        for name, value in self.arguments.items():
+            is_switch = name in known and isinstance(known[name].default, bool)
+            if is_switch and not isinstance(value, (bool, int)):
+                raise BadArgumentError(
+                    f"--env-arg {name} must be true or false, got {value!r}."
                 )
 
     def _check_actions(self, space: spaces.Space[Any]) -> None:

@@ -18,8 +18,8 @@ from collections.abc import Iterable, Mapping
 from dataclasses import MISSING, Field, fields
 from typing import Any
 
-from acl_gym.cli.agents import Declared
-from acl_gym.cli.common import did_you_mean
+from acl_gym.cli.agents import CHOICES, Declared
+from acl_gym.cli.common import check_name, did_you_mean
 from acl_gym.cli.errors import BadArgumentError, in_words
 from acl_gym.colony import costs, deposits, schedules
 
@@ -45,7 +45,8 @@ OBJECTS = {"cost": COSTS, "deposit": DEPOSITS}
 """The parameters that take an object, by name; those of schedules declare it."""
 
 _WORDS = {"true": True, "false": False, "none": None, "null": None}
-_SWITCHES = ("yes", "no", "on", "off")
+_SWITCHES = ("yes", "no", "on", "off", "y", "n", "t", "f")
+_LINE = 76
 _DEEPEST = 20
 """Brackets within brackets; no setting needs as many."""
 
@@ -185,6 +186,8 @@ def _parameter(option: str, name: str, text: str, declared: Declared) -> Any:
     value = parse_value(option, text)
     if declared.scheduled and isinstance(value, str):
         return _term(option, text, SCHEDULES)
+    if name in CHOICES:
+        return check_name(option, text.strip(), CHOICES[name])
     if isinstance(declared.default, bool) and not isinstance(value, bool):
         raise BadArgumentError(f"{option} must be true or false, got {text!r}.")
     return value
@@ -279,8 +282,12 @@ def _number(text: str) -> float | None:
 
 
 def signature(name: str, kind: type[Any]) -> str:
-    """How an object is written: linear:START:END:TRIALS, rank[:EXPONENT=1.0]."""
-    return name + "".join(map(_argument, fields(kind)))
+    """How an object is written: linear:START:END:TRIALS, rank[:EXPONENT=1.0].
+
+    Without the defaults where a line of a terminal has no room for them.
+    """
+    text = name + "".join(map(_argument, fields(kind)))
+    return text if len(text) <= _LINE else re.sub(r"=[^\]]*", "", text)
 
 
 def _argument(field: Field[Any]) -> str:

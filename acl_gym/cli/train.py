@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -53,8 +54,12 @@ class TrainCommand(Command):
         blocks = []
         for name in AGENTS:
             lines = [
-                f"  {each:14} {declared.default}"
-                + (f"  {declared.words}" if declared.words else "")
+                textwrap.fill(
+                    f"{each:14} {declared.default}  {declared.words}",
+                    78,
+                    initial_indent="  ",
+                    subsequent_indent=" " * 17,
+                )
                 for each, declared in parameters(name).items()
             ]
             blocks += [f"Parameters of --agent {name} with their defaults:", *lines, ""]

@@ -51,6 +51,10 @@ def test_an_interrupted_command_says_what_is_kept(
         (["train", "Pendulum-v0"], "'acl_gym/Pendulum-v0' of this package"),
         (["train", "Pendulum-v0"], "with --discretize 5"),
         (["train", "CartPole"], "no environment 'CartPole'"),
+        (
+            ["train", "FrozenLake-v1", "--env-arg", "is_slippery=never"],
+            "is_slippery must be true or false, got 'never'",
+        ),
         (["train", "Pendulum-v1", "--discretize", "1"], "number of values >= 2"),
         (["train", "Pendulum-v1", "--discretize", "5,3"], "each of the 1 dimensions"),
         ([*SMALL, "--discretize", "5"], "for continuous actions, but"),

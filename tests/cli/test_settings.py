@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from acl_gym.cli.agents import parameters
+from acl_gym.agents.q_learning import TRACES
+from acl_gym.cli.agents import CHOICES, parameters
 from acl_gym.cli.errors import BadArgumentError
 from acl_gym.cli.settings import parse_parameters, parse_settings, parse_value
 from acl_gym.colony.costs import (
@@ -22,6 +23,8 @@ from acl_gym.colony.costs import (
 )
 from acl_gym.colony.deposits import InverseCost, Rank, Return
 from acl_gym.colony.schedules import Exponential, Harmonic, Linear
+from acl_gym.colony.selection import RULES
+from acl_gym.colony.update_rules import as_update
 from tests.cli.runner import invoke
 
 
@@ -60,7 +63,7 @@ def test_values(text: str, value: Any) -> None:
     assert type(found) is type(value)
 
 
-@pytest.mark.parametrize("word", ["yes", "No", "ON", "off"])
+@pytest.mark.parametrize("word", ["yes", "No", "ON", "off", "F"])
 def test_other_words_for_true_and_false_are_refused(word: str) -> None:
     """As texts all of them would count as true."""
     with pytest.raises(BadArgumentError, match="must be true or false"):
@@ -136,6 +139,7 @@ def test_objects(text: str, value: Any) -> None:
         ("cost=quadratic:[0,0", "must close its brackets"),
         ("cost=settling", "Did you mean 'settling_time'"),
         ("tabu=1", "true or false"),
+        ("selection=boltzman", "Did you mean 'boltzmann'"),
         ("epsilom=1", "Did you mean 'epsilon'"),
     ],
 )
@@ -160,6 +164,17 @@ def test_costs_of_the_command_line_cost_what_they_say() -> None:
     assert cost(Three()).tolist() == [6.5, 10.5]  # type: ignore[arg-type]
 
 
+def test_choices_are_those_that_there_are() -> None:
+    assert set(CHOICES["selection"]) == set(RULES)
+    assert CHOICES["traces"] == TRACES
+    for name in CHOICES["update"]:
+        assert as_update(name) is not None
+    with pytest.raises(ValueError, match="update") as error:
+        as_update("no such rule")
+    assert all(repr(name) in str(error.value) for name in CHOICES["update"])
+    assert str(error.value).count("'") == 2 * len(CHOICES["update"]) + 2
+
+
 def test_help_lists_what_exists() -> None:
     text = invoke("train", "--help").stdout
     for each in (
@@ -171,4 +186,4 @@ def test_help_lists_what_exists() -> None:
         "Parameters of --agent q-learning",
     ):
         assert each in text
-    assert max(map(len, text.splitlines())) <= 90
+    assert max(map(len, text.splitlines())) <= 80

@@ -14,6 +14,7 @@ import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache
+from importlib.resources import files
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -23,6 +24,8 @@ from acl_gym.experiments.study import Study, Task
 from acl_gym.utils.validation import one_of
 
 Settings = Mapping[str, Any]
+
+_FOLDER = files("acl_gym.experiments.comparison")  # also where that is in a zip file
 
 SETTINGS_FILE = Path(__file__).with_name("settings.json")
 """The tuned settings: task -> method -> what its search has found."""
@@ -153,9 +156,7 @@ def _dqn(task: Task, settings: dict[str, Any], steps: int, every: int) -> Study:
     )
 
 
-_READ = tomllib.loads(
-    Path(__file__).with_name("tasks.toml").read_text(encoding="utf-8")
-)
+_READ = tomllib.loads(_FOLDER.joinpath("tasks.toml").read_text(encoding="utf-8"))
 
 _COLONIES = {
     "pendulum": systems.pendulum("fuzzy"),
@@ -279,7 +280,7 @@ PLAIN = {name: task for name, task in TASKS.items() if name in SYSTEMS}
 @cache
 def tuned_settings() -> dict[str, dict[str, dict[str, Any]]]:
     """What the searches have found: task -> method -> settings."""
-    return json.loads(SETTINGS_FILE.read_text(encoding="utf-8"))  # type: ignore[no-any-return]
+    return json.loads(_FOLDER.joinpath(SETTINGS_FILE.name).read_text(encoding="utf-8"))  # type: ignore[no-any-return]
 
 
 def tuned(name: str, method: str, most_runs: int | None = None) -> Study:

@@ -6,6 +6,7 @@ import io
 import tomllib
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -43,7 +44,7 @@ PLOTS: dict[str, Callable[[Experiment, Results], Figure]] = {
 """What draws the figure of each name."""
 
 CAPTIONS: dict[str, dict[str, str]] = tomllib.loads(
-    Path(__file__).with_name("captions.toml").read_text(encoding="utf-8")
+    files(__package__).joinpath("captions.toml").read_text(encoding="utf-8")
 )
 """For the figure of each name the `text` below it, and `alt`, what it shows."""
 

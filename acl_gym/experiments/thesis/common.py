@@ -6,7 +6,7 @@ import tomllib
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
 from functools import partial
-from pathlib import Path
+from importlib.resources import files
 from typing import Any, TypeVar
 
 import numpy as np
@@ -21,7 +21,9 @@ from acl_gym.utils.typing import FloatArray
 T = TypeVar("T")
 
 _WORDS = tomllib.loads(
-    Path(__file__).with_name("claims.toml").read_text(encoding="utf-8")
+    files("acl_gym.experiments.thesis")
+    .joinpath("claims.toml")
+    .read_text(encoding="utf-8")
 )
 
 Attempt = Callable[[Results], Tried]

@@ -16,6 +16,10 @@ from acl_gym.utils.typing import CellArray, FloatArray, IntArray
 _KINDS = (Crisp, Discrete, Fuzzy)
 _OWN = "own"
 
+_MOST_VARIABLES = 20
+"""Of a fuzzy partition in a file: a state has 2^20 cells then, which takes 12 MB. A file
+of a few bytes must not ask for more, as axes of one cell each would."""
+
 
 class MissingPartition(Missing, Partition):
     """Stands in for a user's own partition in an agent read from a file.
@@ -34,9 +38,11 @@ class MissingPartition(Missing, Partition):
         super().__init__("partition", name)
         self.n_cells = validation.integer("n_cells", n_cells, at_least=1)
         self.cells_per_state = validation.integer(
-            "cells_per_state", cells_per_state, at_least=1
+            "cells_per_state", cells_per_state, at_least=1, at_most=2**_MOST_VARIABLES
         )
-        self.state_ndim = validation.integer("state_ndim", state_ndim, at_least=0)
+        self.state_ndim = validation.integer(
+            "state_ndim", state_ndim, at_least=0, at_most=64
+        )
         self.own = own
 
     def error(self) -> ValueError:
@@ -140,6 +146,11 @@ def partition_from_settings(settings: dict[str, Any]) -> Partition:
         if kind == "Discrete":
             return Discrete(settings["sizes"], settings["starts"])
         grids = {"Crisp": Crisp, "Fuzzy": Fuzzy}
+        if kind == "Fuzzy" and len(settings["centres"]) > _MOST_VARIABLES:
+            raise ValueError(
+                f"a fuzzy partition must have at most {_MOST_VARIABLES} variables, got "
+                f"{len(settings['centres'])}."
+            )
         return grids[kind](settings["centres"], settings["periods"])
     except (KeyError, TypeError) as error:
         raise ValueError(

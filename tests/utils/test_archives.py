@@ -470,6 +470,7 @@ def test_a_shape_alone_reserves_nothing(
                 "settings": None,
             }
         },
+        {"partition": {"type": "Fuzzy", "centres": [[0.0]] * 32, "periods": None}},
         {"trials": 10**400},
         {"history": {"a": 1}},
         {"history": [{"seconds": "1"}]},

@@ -161,7 +161,8 @@ def locate_block(
     size = min(BLOCK, slots.size - start)
     rows, outside = np.uint64(states.shape[0]), 0
     for i in range(size):
-        outside += np.uint64(slots[start + i]) >= rows  # negative ones become huge
+        # Unsigned, so that negative ones become huge.
+        outside += bool(np.uint64(slots[start + i]) >= rows)
     if outside > 0:
         return OUTSIDE
     first, count, cells, period, rate = axes

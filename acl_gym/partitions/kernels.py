@@ -163,7 +163,8 @@ def locate_block(
     rows = np.uint64(states.shape[0])
     outside: Any = 0
     for i in range(size):
-        outside += np.uint64(slots[start + i]) >= rows  # negative ones become huge
+        # Unsigned, so that negative ones become huge.
+        outside += bool(np.uint64(slots[start + i]) >= rows)
     if outside > 0:
         return OUTSIDE
     first, count, cells, period, rate = axes

@@ -279,7 +279,9 @@ def test_bad_environments_and_partitions() -> None:
         ACL(Chain(), ROW)  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="Discrete"):
         ACL(gym.make_vec("Pendulum-v1", num_envs=2), ROW)
-    with pytest.raises(TypeError, match=r"Partition such as Crisp .*got list; build"):
+    with pytest.raises(
+        TypeError, match=r"Partition such as Crisp .*of type list; build"
+    ):
         ACL(chains(2), [np.arange(6.0)])  # type: ignore[arg-type]
     wrong = Fuzzy([np.arange(3.0), np.arange(3.0)])
     with pytest.raises(ValueError, match=r"Box of shape \(2,\), got"):

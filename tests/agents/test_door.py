@@ -12,6 +12,8 @@ from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
 from acl_gym import ACL, Discrete, Fuzzy, QLearning, SoftPolicy, evaluate_policy_cost
 from acl_gym.colony.costs import Quadratic
+from acl_gym.envs.grid_search.env import GridSearch1DVectorEnv
+from acl_gym.envs.grid_search.system import GridSearch1D
 from acl_gym.policies import TablePolicy
 from tests.fuzz import liars, values
 
@@ -239,3 +241,19 @@ def test_an_environment_that_loses_slots_is_refused() -> None:
     env = gym.make_vec("acl_gym/Pendulum-v0", num_envs=4)
     with pytest.raises(AttributeError, match="num_envs"):
         env.unwrapped.num_envs = 2
+
+
+class _Lost(GridSearch1D):
+    """A system of a user's own that starts where there is no state."""
+
+    def sample_states(self, rng: np.random.Generator, count: int) -> Any:
+        return np.full((1, count), 1e9)
+
+
+class _LostEnv(GridSearch1DVectorEnv):
+    system_type = _Lost
+
+
+def test_states_that_a_system_draws_are_checked() -> None:
+    with pytest.raises(ValueError, match=r"state"):
+        _LostEnv(3).reset(seed=0)

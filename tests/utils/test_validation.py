@@ -62,7 +62,7 @@ def test_bounds(
             validation.number("rate", value, **bounds)
 
 
-@pytest.mark.parametrize("value", [2**63, 10**30, 10**5000, np.uint64(2**63)])
+@pytest.mark.parametrize("value", [2**63, 10**30, np.uint64(2**63)])
 def test_integers_must_fit_into_arrays_unless_told_otherwise(value: Any) -> None:
     with pytest.raises(ValueError, match=r"^count must be at most 9223372036854775807"):
         validation.integer("count", value, at_least=1)

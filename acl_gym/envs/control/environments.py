@@ -348,6 +348,10 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
                 f"give float64 states of a fixed size for {count} slots, got "
                 f"{validation.shown(states)}."
             )
+        if not type(self.system).__module__.startswith("acl_gym."):
+            self.system.checked_states(
+                states.T
+            )  # kernels of this package address by it
 
     def _infos(self) -> dict[str, Any]:
         mask = self.system.action_mask(self._states)

@@ -14,6 +14,9 @@ from acl_gym.utils import pictures
 from acl_gym.utils.pictures import guarded
 from acl_gym.utils.typing import CellArray, FloatArray, IntArray
 
+_MOST_LISTED = 12
+"""Variables that a notebook lists."""
+
 
 class Partition(ABC):
     """A map from states to cells with degrees."""
@@ -41,7 +44,7 @@ class Partition(ABC):
         heading = html.escape(repr(self))
         rows = self._variables()
         heads = ("variable", "cells", "from", "to", "")
-        table = pictures.table(rows, heads) if rows else ""
+        table = pictures.table(rows[:_MOST_LISTED], heads) if rows else ""
         k = self.cells_per_state
         note = f"{self.n_cells:,} cells, a state belongs to {k} of them"
         return f"<div><strong>{heading}</strong>{table}<div>{note}</div></div>"

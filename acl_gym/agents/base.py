@@ -137,7 +137,8 @@ class TabularAgent(SavedAgent):
             if self.env is not None:
                 parts += [name_of(self.env), f"{self.num_envs} {self.slots_are}"]
             parts.append(repr(self.partition))
-            parts += [f"{self.trials} trials", f"{count(self.num_timesteps)} steps"]
+            trials = "1 trial" if self.trials == 1 else f"{self.trials} trials"
+            parts += [trials, f"{count(self.num_timesteps)} steps"]
         except AttributeError:  # not made completely
             return f"{name}(not complete)"
         return f"{name}({', '.join(map(short, parts))})"

@@ -13,7 +13,7 @@ from acl_gym.envs.control.lookup import signals_of
 from acl_gym.partitions import Discrete, Grid, Partition
 from acl_gym.utils import pictures
 from acl_gym.utils.parameters import parameters_of
-from acl_gym.utils.text import short
+from acl_gym.utils.text import short, signed
 from acl_gym.utils.typing import IntArray
 
 _GREEK = {
@@ -84,9 +84,16 @@ def _symbol(symbol: str) -> str:
 
 def _picture(agent: Any, policy: IntArray) -> str:
     """The best action of each cell, with the colours below."""
-    cells = _cells(agent.partition, policy)
-    if cells is None or max(cells.shape) > _MOST_CELLS:
+    sizes = _sizes(agent.partition)
+    # Of more than two variables those with one cell change nothing.
+    wide = sorted(range(len(sizes)), key=lambda axis: sizes[axis] == 1)[:2]
+    if not wide or max(sizes[axis] for axis in wide) > _MOST_CELLS:
         return ""
+    cells = _cells(policy, sizes, wide)
+    where = ""
+    if len(sizes) > 2:
+        across, up = sorted(wide)
+        where = f", variables {across + 1} and {up + 1}, others in the middle"
     names, values = _actions(agent)
     colours = pictures.action_colours(agent.n_actions, values)
     pixels = np.array([pictures.rgb(colour) for colour in colours], dtype=np.uint8)
@@ -105,7 +112,7 @@ def _picture(agent: Any, policy: IntArray) -> str:
     )
     return (
         f'{image}<div style="max-width:{_WIDTH}px;font-size:80%">best action of each '
-        f"cell<br>{named}</div>"
+        f"cell{where}<br>{named}</div>"
     )
 
 
@@ -117,18 +124,20 @@ def _actions(agent: Any) -> tuple[list[str], list[float] | None]:
         return [f"action {first + u}" for u in range(agent.n_actions)], None
     values = [row[0] for row in signals.values]
     unit = signals.inputs[0].split(", ")[1:2]
-    return [" ".join([f"{value:+g}", *unit]) for value in values], values
+    return [" ".join([signed(value), *unit]) for value in values], values
 
 
-def _cells(partition: Partition, policy: IntArray) -> NDArray[np.int64] | None:
-    """The policy over two variables, the first to the right; others in the middle."""
+def _sizes(partition: Partition) -> list[int]:
+    """The cells along each variable; none of a partition of another kind."""
     if isinstance(partition, Grid):
-        sizes = [axis.size for axis in partition.centres]
-    elif isinstance(partition, Discrete):
-        sizes = [int(size) for size in partition.sizes.ravel()]
-    else:
-        return None
-    wide = sorted(range(len(sizes)), key=lambda axis: -min(sizes[axis], 2))[:2]
+        return [axis.size for axis in partition.centres]
+    if isinstance(partition, Discrete):
+        return [int(size) for size in partition.sizes.ravel()]
+    return []
+
+
+def _cells(policy: IntArray, sizes: list[int], wide: list[int]) -> NDArray[np.int64]:
+    """The policy over two variables, the first to the right; others in the middle."""
     place = tuple(
         slice(None) if axis in wide else size // 2 for axis, size in enumerate(sizes)
     )

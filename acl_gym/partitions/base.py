@@ -21,6 +21,9 @@ MOST_CELLS = 2**31 - 1
 ROUNDING = 1e-6
 """By how much the sum of a state's degrees may differ from 1."""
 
+_MOST_LISTED = 12
+"""Variables that a notebook lists."""
+
 Kind = TypeVar("Kind", bound="Partition")
 
 
@@ -46,7 +49,7 @@ class Partition(ABC):
         heading = html.escape(repr(self))
         rows = self._variables()
         heads = ("variable", "cells", "from", "to", "")
-        table = pictures.table(rows, heads) if rows else ""
+        table = pictures.table(rows[:_MOST_LISTED], heads) if rows else ""
         k = self.cells_per_state
         note = f"{self.n_cells:,} cells, a state belongs to {k} of them"
         return f"<div><strong>{heading}</strong>{table}<div>{note}</div></div>"

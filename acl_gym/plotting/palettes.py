@@ -17,7 +17,7 @@ from acl_gym.plotting import style
 from acl_gym.plotting.subject import Subject
 from acl_gym.utils import validation
 from acl_gym.utils.pictures import action_colours, direction_colours, rgb
-from acl_gym.utils.text import digits
+from acl_gym.utils.text import signed
 from acl_gym.utils.typing import FloatArray
 
 LEVELS = "cividis"
@@ -74,11 +74,11 @@ def of_inputs(subject: Subject) -> Palette:
         order = np.argsort(inputs[:, 0], kind="stable")
         values = inputs[order, 0]
         colours = action_colours(count, values.tolist())
-        labels = [_signed(value) for value in values]
+        labels = [signed(float(value)) for value in values]
         return Palette(
             np.argsort(order), colours, labels, names[0] if names else "input"
         )
-    labels = [f"({', '.join(map(_signed, row))})" for row in inputs]
+    labels = [f"({', '.join(map(signed, row))})" for row in inputs]
     title = ", ".join(names) or "inputs"
     colours = action_colours(count)
     if inputs.shape[1] == 2:
@@ -176,8 +176,3 @@ def _bar(
     bar: Colorbar = figure.colorbar(mappable, label=name, extend=extend, **options)
     bar.outline.set_visible(False)
     return bar
-
-
-def _signed(value: float) -> str:
-    text = f"{'+' if value > 0 else ''}{digits(float(value))}"
-    return text.replace("-", "\N{MINUS SIGN}")

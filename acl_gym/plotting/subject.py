@@ -194,7 +194,7 @@ def subject_of(
     elif isinstance(partition, Discrete) and partition.state_ndim == 0:
         n_states, first_state = partition.n_cells, int(partition.starts)
     else:
-        variables = _variables(partition, space, signals, labels)
+        variables = _variables(partition, space, system, signals, labels)
     known = (policy, partition, table, env, system, inputs, input_names, variables)
     numbers = (n_states, first_state, count, first)
     return Subject(*known, *numbers, names, _title(agent))
@@ -289,6 +289,7 @@ def _action_names(
 def _variables(
     partition: Partition | None,
     space: Any,
+    system: ControlSystem | None,
     signals: Signals | None,
     labels: Labels,
 ) -> tuple[Variable, ...]:
@@ -302,7 +303,11 @@ def _variables(
             )
         ]
     elif isinstance(space, spaces.Box) and len(space.shape) == 1:
-        made = [_of_bounds(*ends) for ends in zip(space.low, space.high, strict=True)]
+        circular = () if system is None else system.circular
+        made = [
+            _of_bounds(low, high, axis in circular)
+            for axis, (low, high) in enumerate(zip(space.low, space.high, strict=True))
+        ]
     else:
         raise ValueError(
             "states must be a number or a row of numbers to be drawn, got "
@@ -386,13 +391,14 @@ def _of_integers(size: int, start: int) -> Pieces:
     return start - 0.5 + np.arange(size + 1.0), None
 
 
-def _of_bounds(low: Any, high: Any) -> Pieces:
+def _of_bounds(low: Any, high: Any, circular: bool) -> Pieces:
     if not (np.isfinite([low, high]).all() and max(abs(low), abs(high)) < _LIMIT):
         raise ValueError(
             f"observations must be bounded to be drawn, got bounds {low} and {high}; "
             "draw an agent with a partition."
         )
-    return np.linspace(float(low), float(high), _FINEST + 1), None
+    period = float(high) - float(low) if circular else None
+    return np.linspace(float(low), float(high), _FINEST + 1), period
 
 
 def _batches(states: NDArray[Any]) -> list[NDArray[Any]]:

@@ -20,6 +20,12 @@ def short(text: str, length: int = 44) -> str:
     return line if len(line) <= length else f"{line[: length - 3]}..."
 
 
+def signed(value: float) -> str:
+    """A number to three digits with its sign: +0.8, 0, and a proper minus sign."""
+    text = f"{'+' if value > 0 else ''}{digits(value)}"
+    return text.replace("-", "\N{MINUS SIGN}")
+
+
 def digits(value: float) -> str:
     """A number to three digits, without powers of ten: 2590, 44.7."""
     return f"{float(f'{value:.3g}'):g}"

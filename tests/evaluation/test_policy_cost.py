@@ -302,3 +302,16 @@ def test_policy_variation_and_sensitivity_of_every_trial(kind: type) -> None:
         else:
             assert "sensitivity" not in row
     assert agent.history[0]["policy_variation"] > 0
+
+
+def test_a_cost_says_what_it_is() -> None:
+    result = PolicyCost(
+        costs=np.array([1.0, 3.0]),
+        success=np.array([True, False]),
+        lengths=np.array([4, 20]),
+    )
+    line = "PolicyCost(cost=2, success_rate=50%, 2 episodes of 4 to 20 steps)"
+    assert repr(result) == line
+    page = result._repr_html_()
+    assert "lowest 1, median 2, highest 3" in page
+    assert ">50%<" in page

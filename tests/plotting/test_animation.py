@@ -1,0 +1,108 @@
+"""Films of agents that learn."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from matplotlib.animation import FuncAnimation, writers
+from PIL import Image
+
+from acl_gym.plotting import animate
+from tests.plotting.agents import colony, pendulum, q_learning
+
+QUICK: dict[str, Any] = {"seconds": 0.4, "dpi": 40}
+
+
+def pictures(path: Path) -> list[Any]:
+    with Image.open(path) as film:
+        frames = []
+        for number in range(film.n_frames):
+            film.seek(number)
+            frames.append(np.asarray(film.convert("RGB"), dtype=np.int64))
+    return frames
+
+
+def test_a_new_agent_learns_and_a_gif_moves(tmp_path: Path) -> None:
+    agent = pendulum(0)
+    path = animate(agent, tmp_path / "film.gif", trials=(0, 2), **QUICK)
+    assert path == tmp_path / "film.gif"
+    assert agent.trials == 2
+    frames = pictures(path)
+    assert frames[0].shape == (110, 288, 3)  # 2.75 by 7.2 inches
+    assert np.abs(frames[0] - frames[3]).max() > 50
+    assert (frames[0][0] == 255).all()  # the paper is white
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_film_does_not_change_what_is_learned(tmp_path: Path) -> None:
+    filmed, plain = pendulum(0), pendulum(0)
+    animate(filmed, tmp_path / "film.gif", trials=(1, 3), **QUICK)
+    assert filmed.table.tolist() == plain.learn(trials=3).table.tolist()
+
+
+def test_an_agent_that_has_learned_is_shown_as_it_is() -> None:
+    agent = pendulum(2)
+    film = animate(agent, **QUICK)
+    assert isinstance(film, FuncAnimation)
+    assert agent.trials == 2
+    html = film.to_jshtml(fps=10, default_mode="once")
+    assert "<img" in html
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda: colony("acl_gym/GridSearch2D-v0"),
+        lambda: colony("acl_gym/Navigation-v0"),
+        lambda: q_learning("MountainCar-v0"),
+        lambda: q_learning("FrozenLake-v1"),
+    ],
+)
+def test_every_kind_of_agent_has_a_film(make: Any, tmp_path: Path) -> None:
+    path = animate(make(), tmp_path / "film.gif", **QUICK)
+    assert len(pictures(path)) > 1
+
+
+@pytest.mark.skipif(not writers.is_available("ffmpeg"), reason="needs ffmpeg")
+def test_an_mp4(tmp_path: Path) -> None:
+    path = animate(pendulum(1), tmp_path / "film.mp4", **QUICK)
+    assert path.stat().st_size > 1000
+
+
+def test_without_ffmpeg_there_is_a_word(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(writers, "is_available", lambda name: False)
+    with pytest.raises(RuntimeError, match=r"needs ffmpeg.* write 'film.gif'"):
+        animate(pendulum(1), tmp_path / "film.mp4")
+
+
+@pytest.mark.parametrize(
+    ("options", "error", "message"),
+    [
+        ({"path": "film.avi"}, ValueError, r"path must end in \.gif or \.mp4"),
+        ({"path": "no/such/film.gif"}, ValueError, "a folder that exists"),
+        ({"path": 3}, ValueError, "path must end in"),
+        ({"trials": 3}, TypeError, "trials must be a list of integers"),
+        ({"trials": ()}, ValueError, "one integer or more, increasing"),
+        ({"trials": (3, 2)}, ValueError, "one integer or more, increasing"),
+        ({"trials": (0, 2)}, ValueError, r"trials\[0\] must be at least 1"),
+        ({"seconds": 0}, ValueError, "seconds must lie in"),
+        ({"dpi": 1e9}, ValueError, "dpi must lie in"),
+    ],
+)
+def test_errors_say_what_is_expected(
+    options: dict[str, Any], error: type[Exception], message: str
+) -> None:
+    agent = pendulum(1)
+    with pytest.raises(error, match=message):
+        animate(agent, **options)
+    assert agent.trials == 1  # nothing was learned before
+
+
+def test_policies_do_not_learn() -> None:
+    with pytest.raises(TypeError, match="agent must be an agent that learns a table"):
+        animate(pendulum().policy)

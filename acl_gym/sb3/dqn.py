@@ -268,6 +268,7 @@ def make_dqn(
         [64, 128]
     """
     settings = DQNSettings() if settings is None else settings
+    seed = validation.seed(seed)
     env = scaled_env(
         env_id,
         settings.num_envs,

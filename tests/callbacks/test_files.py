@@ -213,6 +213,26 @@ def test_it_stops_when_patience_is_at_an_end(
     assert agent.trials == trials
 
 
+@pytest.mark.parametrize("measure", ["policy_return", "ants_return", "success_rate"])
+@pytest.mark.parametrize(
+    ("values", "keywords", "trials"),
+    [
+        ([-5, -4, -4, -4, -3, -3], {"patience": 3}, 6),
+        ([-5, -4, -4, -4, -4, -1], {"patience": 3}, 5),
+        ([1, 1.5, 2, 2.5, 3, 3.5], {"patience": 2, "min_improvement": 0.9}, 6),
+        ([1, 2, 3, 4, 5, 6], {"patience": 9, "threshold": 3}, 3),
+    ],
+)
+def test_where_higher_is_better_it_waits_for_more(
+    values: Any, keywords: Any, trials: int, measure: str
+) -> None:
+    stop = EarlyStop(measure=measure, **keywords)
+    assert stop.best == -math.inf
+    agent = make().learn(trials=6, callback=[Script(values, measure), stop])
+    assert agent.trials == trials
+    assert stop.best >= max(values) - keywords.get("min_improvement", 3)
+
+
 def test_it_begins_anew_with_every_call() -> None:
     stop = EarlyStop(2, measure="mine")
     agent = make()

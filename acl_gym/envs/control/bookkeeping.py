@@ -49,12 +49,23 @@ def count_step(
 
 @njit
 def finish(
-    terminated: BoolArray, truncated: BoolArray, finished: BoolArray, walking: IntArray
+    terminated: BoolArray,
+    truncated: BoolArray,
+    finished: BoolArray,
+    walking: IntArray,
+    ended: BoolArray,
+    success: BoolArray,
 ) -> int:
-    """Record the finished slots; write the others into `walking`, return how many."""
+    """Record the slots that finish; write the others into `walking`, return how many.
+
+    `ended` receives which slots finish in this step, `success` which of them are at the
+    goal.
+    """
     n_walking = 0
     for slot in range(finished.size):
-        finished[slot] |= terminated[slot] | truncated[slot]
+        ended[slot] = terminated[slot] | truncated[slot]
+        success[slot] = terminated[slot]
+        finished[slot] |= ended[slot]
         walking[n_walking] = slot
         n_walking += not finished[slot]
     return n_walking

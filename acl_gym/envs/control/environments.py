@@ -234,19 +234,21 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
 
         last: dict[str, Any] = {}
         if n_finished:
-            finished = terminated | truncated
-            last = {"is_success": terminated.copy(), "_is_success": finished}
+            walking = np.empty(self.num_envs, dtype=np.int64)
+            ended = np.empty(self.num_envs, dtype=np.bool_)
+            success = np.empty(self.num_envs, dtype=np.bool_)
+            n_left = finish(
+                terminated, truncated, self._finished, walking, ended, success
+            )
+            self._walking = walking[:n_left]
+            last = {"is_success": success, "_is_success": ended}
             if (
                 self.autoreset_mode is AutoresetMode.SAME_STEP
                 and not self._wait_when_finished
             ):
                 last = {**self._infos(), **last}
-                last = final_infos(self._observe(), finished.copy(), last)
-                self._start(np.flatnonzero(finished), None)
-            else:
-                walking = np.empty(self.num_envs, dtype=np.int64)
-                n_left = finish(terminated, truncated, self._finished, walking)
-                self._walking = walking[:n_left]
+                last = final_infos(self._observe(), ended, last)
+                self._start(np.flatnonzero(ended), None)
         infos = {**last, **self._infos()}
         return self._observe(), rewards, terminated, truncated, infos
 

@@ -334,8 +334,11 @@ def test_counting_kernels_run_the_same_without_the_compiler() -> None:
         assert count(5, steps, terminated, truncated) == 3
         finished = np.array([False, False, False, False])
         walking = np.zeros(4, dtype=np.int64)
-        n_walking = finish(terminated, truncated, finished, walking)
-        results.append((steps, truncated, walking[:n_walking], finished))
+        ended, success = np.ones((2, 4), dtype=np.bool_)
+        n_walking = finish(terminated, truncated, finished, walking, ended, success)
+        results.append(
+            (steps, truncated, walking[:n_walking], finished, ended, success)
+        )
     for ours, plain in zip(*results, strict=True):
         assert_same_bits(ours, plain)
     assert [array.tolist() for array in results[0]] == [
@@ -343,6 +346,8 @@ def test_counting_kernels_run_the_same_without_the_compiler() -> None:
         [False, False, True, True],
         [0],
         [False, True, True, True],
+        [False, True, True, True],
+        [False, True, False, False],
     ]
 
 

@@ -1,6 +1,7 @@
 """Check the installed wheel; run with the interpreter of the environment it is in."""
 
 import importlib.metadata
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -52,6 +53,13 @@ command = [str(Path(sys.prefix, "bin", "acl-gym")), "reproduce", "--list"]
 listed = subprocess.run(command, capture_output=True, text=True, check=True).stdout
 if "versus-pendulum" not in listed:
     sys.exit(f"expected versus-pendulum among the experiments, got:\n{listed}")
+
+# PyPI shows the README, where links into the project lead nowhere.
+links = re.findall(r"\]\(([^)]+)\)", wheel.metadata["Description"])
+if not links or not all(link.startswith(("https:", "#")) for link in links):
+    sys.exit(f"expected complete addresses in the description, got {links}")
+if not wheel.metadata.get_all("Project-URL"):
+    sys.exit("the metadata names no address of the project")
 
 env = gym.make("acl_gym/Pendulum-v0")
 env.reset(seed=0)

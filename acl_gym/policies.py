@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from acl_gym.colony.greedy import NUMBERS_PER_ACTION, greedy_actions
 from acl_gym.colony.pheromone import Pheromone
 from acl_gym.colony.selection import choose_actions
-from acl_gym.partitions import Partition
+from acl_gym.envs.control.signals import Signals
+from acl_gym.export import Source, write_c_header, write_numpy_file
+from acl_gym.partitions import Partition, checked_partition, locate_all
 from acl_gym.utils import validation
+from acl_gym.utils.compiling import njit
+from acl_gym.utils.parameters import Fixed
+from acl_gym.utils.text import short
 from acl_gym.utils.typing import BoolArray, CellArray, FloatArray, IntArray, RankArray
 
 
@@ -27,7 +32,25 @@ def random_ranks(n_cells: int, n_actions: int, rng: np.random.Generator) -> Rank
     return np.asarray(rng.permuted(ranks, axis=1), dtype=np.int32)
 
 
-class PartitionPolicy(ABC):
+class Action(np.ndarray[tuple[()], np.dtype[np.int64]]):
+    """One action: an array without axes, as Stable-Baselines3 gives it, with a hash.
+
+    The environments of `gymnasium.envs.toy_text` look actions up in a dict, where a
+    plain array without axes is refused. What is calculated with it is plain again.
+    """
+
+    def __hash__(self) -> int:  # type: ignore[override]
+        """That of the number, to which it is equal."""
+        return hash(self.item())
+
+    def __array_wrap__(
+        self, array: Any, context: Any = None, return_scalar: bool = False
+    ) -> Any:
+        """The result of a calculation, a number where it has no axes."""
+        return array[()]
+
+
+class PartitionPolicy(Fixed, ABC):
     """A policy that sees cells and degrees, with Stable-Baselines3's `predict`.
 
     Attributes:
@@ -39,19 +62,31 @@ class PartitionPolicy(ABC):
     partition: Partition
     first_action: int
 
+    def __repr__(self) -> str:
+        """Partition and number of actions."""
+        name = type(self).__name__
+        return f"{name}({short(repr(self.partition))}, {self.n_actions} actions)"
+
     @property
     @abstractmethod
     def n_actions(self) -> int:
         """The number of actions, the columns of the table."""
+
+    @property
+    @abstractmethod
+    def _n_cells(self) -> int:
+        """The rows of the table, to which cells are held."""
 
     @staticmethod
     def _check_fits(name: str, table: FloatArray, partition: Partition) -> None:
         """Refuse a table that has not one row per cell: kernels do not check indices.
 
         Raises:
+            TypeError: the partition is none.
             ValueError: the table does not fit the partition.
         """
-        if table.ndim != 2 or len(table) != partition.n_cells:
+        checked_partition(partition)
+        if table.ndim != 2 or len(table) != partition.n_cells or not table.size:
             raise ValueError(
                 f"{name} must have shape ({partition.n_cells}, n_actions), a row for "
                 f"each cell of the partition, got shape {table.shape}."
@@ -81,47 +116,164 @@ class PartitionPolicy(ABC):
         deterministic: bool = True,
         action_masks: ArrayLike | None = None,
     ) -> tuple[NDArray[np.int64], Any]:
-        """Choose actions, with the signature of Stable-Baselines3.
+        """Choose actions, as in Stable-Baselines3 but for the default of `deterministic`.
+
+        There it is False, since its agents learn policies that draw their actions. Here
+        the policy is a function of the observation, and random actions belong to
+        learning; who asks for an action gets that of the policy.
 
         Args:
-            observation: one observation or a batch of them.
+            observation: one observation or a batch of them, an array or lists, of any
+                real dtype.
             state: returned as it is, except by a `SoftPolicy`; a table has no memory.
             episode_start: only used by a `SoftPolicy`.
-            deterministic: True follows the policy; False explores as in learning, if
-                the policy is that of an agent.
+            deterministic: True follows the policy; False makes an agent explore as it
+                does in learning. A policy that is not an agent does not explore and
+                follows itself in both cases.
             action_masks: which actions may be chosen, `(n_actions,)` or
                 `(n, n_actions)`, such as `info["action_mask"]`; None: all.
 
         Returns:
-            `(actions, state)`; the action of a single observation has no axis.
+            `(actions, state)`, the actions as an int64 array `(n,)`, for a single
+            observation `()`, ready for `env.step`.
 
         Raises:
             ValueError: an observation is not finite or has the wrong shape, or a mask
                 has the wrong shape or allows nothing.
         """
-        batch = np.asarray(observation)
+        batch = validation.as_array(observation)
+        if batch is None or batch.dtype == object:
+            raise ValueError(
+                "observation must be an array of numbers, got "
+                f"{validation.shown(observation)}; pass one observation or a batch."
+            )
         single = batch.ndim == self.partition.state_ndim
-        index, degree = self.partition(batch[None] if single else batch)
+        if single:
+            batch = batch[None]
+        index, degree = locate_all(self.partition, batch, self._n_cells)
         allowed = self._checked_masks(action_masks, len(index))
         columns, state = self._act_in_state(
             state, episode_start, index, degree, deterministic, allowed
         )
         actions = columns + self.first_action
-        return (actions[0] if single else actions), state
+        return (actions.reshape(()).view(Action) if single else actions), state
+
+    def to_numpy(self, path: str | Path) -> Path:
+        """Write the greedy policy to a file for NumPy, without this package.
+
+        These lines evaluate it; they give what `predict` gives for every finite
+        observation within the range of a discrete one:
+
+        ```python
+        import numpy as np
+
+        p = dict(np.load("policy.npz"))
+        lines = [p[f"centres_{axis}"] for axis in range(p["periods"].size)]
+
+
+        def act(observation):
+            corners = [((), 1.0)]  # the cells around the observation, and their degrees
+            for x, line, period in zip(np.ravel(observation), lines, p["periods"]):
+                x = x - period * np.floor((x - line[0]) / period) if period else x
+                low = np.searchsorted(line[1:-1], x, "right")
+                up = np.clip((x - line[low]) / (line[low + 1] - line[low]), 0, 1)
+                up = up if p["fuzzy"] else float(up >= 0.5)
+                sides = [(low, 1 - up), (low + 1, up)]
+                corners = [((*c, s), d * w) for c, d in corners for s, w in sides if w]
+            values = sum(d * p["table"][c] for c, d in corners)
+            ranks = p["ranks"][max(corners, key=lambda corner: corner[1])[0]]
+            return int(p["first_action"] + np.lexsort((ranks, -values))[0])
+        ```
+
+        The arrays are described in `acl_gym.export.numpy_file.numpy_arrays`; where
+        they are known, `inputs` and `input_values` say what each action sets.
+
+        Args:
+            path: the file; `.npz` is added where it is missing.
+
+        Returns:
+            The path written, atomically.
+
+        Raises:
+            TypeError: the policy draws its actions, or locates states by a method of
+                its own.
+            ValueError: the table holds numbers that are not finite.
+            FileNotFoundError: the folder of the file does not exist.
+            IsADirectoryError: the path is a folder.
+        """
+        return write_numpy_file(path, self._source())
+
+    def to_c(
+        self,
+        path: str | Path,
+        *,
+        name: str = "policy",
+        precision: str = "float",
+        inputs: ArrayLike | None = None,
+    ) -> Path:
+        """Write the greedy policy as one C99 header, also for C++.
+
+        `name_action(x)` returns the action for the observation `x`. It allocates
+        nothing, needs no library but <math.h> (only for circular variables), and keeps
+        its tables in read-only memory: a byte for each cell of a crisp or discrete
+        policy, n_actions numbers and a byte or two for each cell of a fuzzy one. The
+        comment at the head of the file states the units, the memory and how to call it.
+        Where it is known, the table `name_inputs` holds the input values that each
+        action stands for.
+
+        With "double" the actions are those of `predict` to the bit. With "float", half
+        the memory, they differ only where rounding to a float, one part in 10^7, moves
+        an observation across a border between two actions. An observation that
+        `predict` refuses (NaN, infinite, out of the range of a discrete variable) gives
+        `name_INVALID`.
+
+        Args:
+            path: the file; `.h` is added to a name without an ending.
+            name: what all names in the file begin with, a C identifier.
+            precision: "float" or "double", of observations and tables.
+            inputs: what each action sets, `(n_actions,)` or `(n_actions, n_inputs)`,
+                in place of what the environment knows.
+
+        Returns:
+            The path written, atomically; the same policy gives the same bytes.
+
+        Raises:
+            TypeError: the policy draws its actions, or locates states by a method of
+                its own.
+            ValueError: an argument is not valid, the table holds numbers that are not
+                finite or do not fit a float, or is too large for a header.
+            FileNotFoundError: the folder of the file does not exist.
+            IsADirectoryError: the path is a folder.
+        """
+        source = self._source(inputs)
+        return write_c_header(path, source, name, precision)
+
+    def _source(self, inputs: ArrayLike | None = None) -> Source:
+        """What is exported; `inputs` as in `to_c`."""
+        raise TypeError(
+            "only a greedy policy over a table can be exported, got "
+            f"{type(self).__name__}, which draws its actions or has rules of its own; "
+            "export agent.policy, or TablePolicy(partition, levels)."
+        )
 
     def _checked_masks(self, masks: ArrayLike | None, count: int) -> BoolArray | None:
         if masks is None:
             return None
-        allowed = np.asarray(masks) != 0
-        if allowed.ndim == 1:
-            allowed = allowed[None]
-        shape = (count, self.n_actions)
-        if allowed.shape != shape or not allowed.any(axis=1).all():
+        given, shape = validation.as_array(masks), (count, self.n_actions)
+        if given is not None and given.ndim == 1:
+            given = given[None]
+        if (
+            given is None
+            or given.shape != shape
+            or given.dtype.kind not in "biuf"
+            or not ((given == 0) | (given == 1)).all()
+            or not (given == 1).any(axis=1).all()
+        ):
             raise ValueError(
-                f"action_masks must have shape {shape} and allow an action in each "
-                f"row, got {np.asarray(masks).tolist()!r:.200}."
+                f"action_masks must have shape {shape}, hold 0 and 1, and allow an "
+                f"action in each row, got {validation.shown(masks)}."
             )
-        return np.ascontiguousarray(allowed)
+        return np.ascontiguousarray(given == 1)
 
 
 class TablePolicy(PartitionPolicy):
@@ -133,10 +285,16 @@ class TablePolicy(PartitionPolicy):
         ranks: `(n_cells, n_actions)`, the order in which tied actions are preferred;
             None draws it from a fixed seed.
         first_action: the action that column 0 stands for, `Discrete.start`.
+        signals: what observations and actions mean, for `to_c` and `to_numpy`; None if
+            unknown.
 
     Raises:
-        ValueError: `table` or `ranks` do not fit the partition.
+        TypeError: `partition` is no partition, or `first_action` not an integer.
+        ValueError: `table` or `ranks` do not fit the partition, or an entry is
+            NaN.
     """
+
+    _fixed = ("partition", "table", "ranks", "first_action")
 
     def __init__(
         self,
@@ -144,27 +302,46 @@ class TablePolicy(PartitionPolicy):
         table: FloatArray,
         ranks: RankArray | None = None,
         first_action: int = 0,
+        signals: Signals | None = None,
     ) -> None:
-        if table.dtype != np.float64:
-            raise ValueError(f"table must be float64, got {table.dtype}.")
+        if not isinstance(table, np.ndarray) or table.dtype != np.float64:
+            got = getattr(table, "dtype", type(table).__name__)
+            raise ValueError(f"table must be an array of float64, got {got}.")
         self._check_fits("table", table, partition)
+        if np.isnan(table).any():
+            cell = int(np.argmax(np.isnan(table).any(axis=1)))
+            raise ValueError(
+                f"table must not hold NaN, got {validation.shown(table[cell].tolist())} in "
+                f"cell {cell}."
+            )
         n_cells, n_actions = table.shape
         if ranks is None:
             ranks = random_ranks(n_cells, n_actions, np.random.default_rng(0))
-        if ranks.shape != table.shape:
+        if (
+            not isinstance(ranks, np.ndarray)
+            or ranks.shape != table.shape
+            or ranks.dtype.kind not in "iu"
+        ):
             raise ValueError(
-                f"ranks must have the shape of the table, {table.shape}, got "
-                f"{ranks.shape}."
+                f"ranks must be integers in the shape of the table, {table.shape}, got "
+                f"{validation.shown(ranks)}."
             )
+        if ranks.dtype != np.int32:
+            ranks = ranks.astype(np.int32)
         self.partition = partition
         self.table = table
         self.ranks = ranks
-        self.first_action = first_action
+        self.first_action = _checked_first(first_action)
+        self.signals = signals
 
     @property
     def n_actions(self) -> int:
         """See `PartitionPolicy.n_actions`."""
         return int(self.table.shape[1])
+
+    @property
+    def _n_cells(self) -> int:
+        return len(self.table)
 
     def _act(
         self,
@@ -182,7 +359,20 @@ class TablePolicy(PartitionPolicy):
     def copy(self) -> TablePolicy:
         """The same policy over a table that no longer changes."""
         return TablePolicy(
-            self.partition, self.table.copy(), self.ranks, self.first_action
+            self.partition,
+            self.table.copy(),
+            self.ranks,
+            self.first_action,
+            self.signals,
+        )
+
+    def _source(self, inputs: ArrayLike | None = None) -> Source:
+        signals = self.signals
+        if inputs is not None:
+            names = () if signals is None else signals.observations
+            signals = Signals.of_inputs(inputs, names)
+        return Source.of(
+            self.partition, self.table, self.ranks, self.first_action, signals
         )
 
 
@@ -213,6 +403,8 @@ class SoftPolicy(PartitionPolicy):
             `exponent` is not > 0 and finite, or `seed` is negative.
     """
 
+    _fixed = ("partition", "first_action", "_pheromone")
+
     def __init__(
         self,
         partition: Partition,
@@ -228,7 +420,7 @@ class SoftPolicy(PartitionPolicy):
         exponent = validation.number("exponent", exponent, above=0)
         seed = validation.seed(seed)
         self.partition = partition
-        self.first_action = first_action
+        self.first_action = _checked_first(first_action)
         n_cells, n_actions = levels.shape
         self._pheromone = Pheromone(n_cells, n_actions, 1.0, exponent)
         self._pheromone.set_levels(levels)
@@ -236,9 +428,20 @@ class SoftPolicy(PartitionPolicy):
         self._by_hand = self._stream(0)
 
     @property
+    def table(self) -> FloatArray:
+        """The levels, `(n_cells, n_actions)`, read-only."""
+        view = self._pheromone.levels.view()
+        view.flags.writeable = False
+        return view
+
+    @property
     def n_actions(self) -> int:
         """See `PartitionPolicy.n_actions`."""
         return int(self._pheromone.levels.shape[1])
+
+    @property
+    def _n_cells(self) -> int:
+        return len(self._pheromone.levels)
 
     def _act(
         self,
@@ -255,7 +458,7 @@ class SoftPolicy(PartitionPolicy):
         if episode_start is None:
             return super()._act_in_state(state, episode_start, *situation)
         index, degree, _, allowed = situation
-        drawn = 0 if state is None else int(state[0])
+        drawn = _drawn(state)
         columns = self._draw(self._stream(drawn), index, degree, allowed)
         return columns, (np.array(drawn + NUMBERS_PER_ACTION * len(columns)),)
 
@@ -275,7 +478,28 @@ class SoftPolicy(PartitionPolicy):
         return np.random.Generator(np.random.PCG64(self._seeds).advance(drawn))
 
 
-@njit(cache=True)
+def _checked_first(first_action: Any) -> int:
+    """`Discrete.start`: any integer to which the actions can be added."""
+    least = -(2**62)
+    return validation.integer(
+        "first_action", first_action, at_least=least, at_most=-least
+    )
+
+
+def _drawn(state: Any) -> int:
+    """How many numbers an evaluation has drawn, from the state of `SoftPolicy`."""
+    if state is None:
+        return 0
+    if not isinstance(state, tuple) or len(state) != 1 or np.ndim(state[0]) != 0:
+        raise ValueError(
+            "state must be None at first, and then what predict returned, got "
+            f"{validation.shown(state)}."
+        )
+    value = state[0].item() if isinstance(state[0], np.ndarray) else state[0]
+    return validation.integer("the number in state", value, at_least=0)
+
+
+@njit
 def _best_actions(table: FloatArray, ranks: RankArray) -> IntArray:
     best = np.zeros(table.shape[0], dtype=np.int64)
     for cell in range(table.shape[0]):

@@ -80,8 +80,8 @@ def follow(
     result = evaluate_policy_cost(policy, env, max_steps=limit, seed=TABLE_SEED)
     env.close()
     return {
-        "return": -result.cost,
-        "terminated": result.success_rate,
+        "return": result.mean_return,
+        "success_rate": result.success_rate,
         "length": float(result.lengths.mean()),
     }
 
@@ -202,7 +202,7 @@ def outcome(
         "seconds": rows[-1]["seconds"],
         "best_steps": cheapest["env_steps"],
         "best_seconds": cheapest["seconds"],
-        "curve": [[row["env_steps"], -row["policy_cost"]] for row in rows],
+        "curve": [[row["env_steps"], row["policy_return"]] for row in rows],
     }
 
 
@@ -211,7 +211,7 @@ def highest_point(episode: Episode) -> float:
 
     For MountainCar, where a solution that never arrives costs 200 however near it came.
     """
-    if episode.success:
+    if episode.terminated:
         return float(episode.actions.size)
     return 200.0 + 200.0 * (0.5 - float(episode.observations[:, 0].max()))
 

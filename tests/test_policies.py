@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
+import copy
+import json
+import pickle
+from typing import Any
+
 import gymnasium as gym
 import numpy as np
 import pytest
+from gymnasium import spaces
 
 from acl_gym import (
     ACL,
+    Crisp,
+    Discrete,
     Fuzzy,
     PolicyEvaluation,
     VectorEnvAdapter,
@@ -204,3 +212,82 @@ def test_a_table_of_nothing_finite_still_gives_actions() -> None:
 def test_a_table_that_does_not_fit_is_refused(table, ranks) -> None:
     with pytest.raises(ValueError, match=r"^(table|ranks) must"):
         TablePolicy(GRID, table, ranks)
+
+
+# --- the actions of predict -------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "single",
+    [
+        [0.3],
+        (0,),
+        np.array([0.3]),
+        np.array([0.3], dtype=np.float32),
+        np.array([0.3], dtype=">f8"),
+        np.array([1], dtype=np.uint8),
+    ],
+    ids=repr,
+)
+@pytest.mark.parametrize("deterministic", [True, False])
+def test_one_observation_gives_one_action_without_axes(
+    single: Any, deterministic: bool
+) -> None:
+    policy = TablePolicy(GRID, np.arange(6.0).reshape(3, 2), first_action=4)
+    action, state = policy.predict(single, deterministic=deterministic)
+    assert isinstance(action, np.ndarray)
+    assert (action.shape, action.dtype) == ((), np.int64)
+    assert action == 5
+    assert state is None
+    batch, _ = policy.predict([single, single], deterministic=deterministic)
+    assert type(batch) is np.ndarray
+    assert (batch.shape, batch.dtype) == ((2,), np.int64)
+    assert batch.tolist() == [5, 5]
+
+
+@pytest.mark.parametrize("cell", [2, 2.0, np.uint8(2), np.array(2)])
+def test_a_cell_as_a_number_is_one_observation(cell: Any) -> None:
+    policy = TablePolicy(Discrete.from_space(spaces.Discrete(3)), np.eye(3))
+    action, _ = policy.predict(cell)
+    assert action.shape == ()
+    assert action == 2
+    assert policy.predict([cell])[0].shape == (1,)
+
+
+def test_one_action_is_also_a_number() -> None:
+    """Gymnasium's toy environments look actions up in a dict."""
+    action = TablePolicy(GRID, np.arange(6.0).reshape(3, 2)).predict([0.3])[0]
+    assert {1: "right"}[action] == "right"
+    assert ["left", "right"][action] == "right"
+    assert {0, 1} == {0, action}
+    for other in (copy.deepcopy(action), pickle.loads(pickle.dumps(action))):
+        assert hash(other) == hash(1)
+        assert other == action
+    assert f"{action} {action:02d} {int(action)}" == "1 01 1"
+    for result, kind in (
+        (action + 1, np.int64),
+        (action == 1, np.bool_),
+        (action / 2, np.float64),
+        (np.arange(3) + action, np.ndarray),
+    ):
+        assert type(result) is kind
+    assert json.dumps(action.item()) == json.dumps(action.tolist()) == "1"
+
+
+@pytest.mark.parametrize(
+    "env_id",
+    ["FrozenLake-v1", "CliffWalking-v1", "Taxi-v4", "CartPole-v1", "MountainCar-v0"],
+)
+def test_one_action_goes_into_a_step_as_it_is(env_id: str) -> None:
+    env = gym.make(env_id)
+    finite = isinstance(env.observation_space, spaces.Discrete)
+    if finite:
+        grid: Any = Discrete.from_space(env.observation_space)
+    else:
+        low = np.full(env.observation_space.shape, -1.0)
+        grid = Crisp.from_box(spaces.Box(low, -low, dtype=np.float64), 3)
+    policy = TablePolicy(grid, np.ones((grid.n_cells, int(env.action_space.n))))
+    observation, _ = env.reset(seed=0)
+    action, _ = policy.predict(observation)
+    assert env.action_space.contains(action)
+    env.step(action)

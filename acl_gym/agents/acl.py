@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any, Self
 
 import numpy as np
@@ -17,6 +17,7 @@ from acl_gym.colony.costs import Cost, as_cost, cost_from_settings, solution_cos
 from acl_gym.colony.deposits import (
     Deposit,
     as_deposit,
+    checked_deposits,
     deposit_from_settings,
 )
 from acl_gym.colony.episodes import Episode
@@ -29,14 +30,14 @@ from acl_gym.colony.update_rule import MissingRule, TrialResult, UpdateRule
 from acl_gym.colony.update_rules import (
     as_update,
     update_from_settings,
-    update_to_settings,
+    watched,
 )
 from acl_gym.evaluation.rollout import Rollout
 from acl_gym.partitions import Partition
 from acl_gym.policies import SoftPolicy
 from acl_gym.utils import validation
 from acl_gym.utils.parameters import Parameter, fixed
-from acl_gym.utils.serialization import to_settings
+from acl_gym.utils.serialization import Missing, to_settings
 from acl_gym.utils.typing import BoolArray, CellArray, FloatArray, IntArray, Row
 
 __all__ = ["ACL", "PheromoneBoundWarning"]
@@ -108,6 +109,8 @@ class ACL(TabularAgent):
         3
     """
 
+    slots_are = "ants"
+
     tau0 = Parameter("Initial pheromone level", "tau_0", fixed=True, above=0)
     local_decay = Parameter(
         "Decay of each visited pair (4.12)", "gamma", at_least=0, below=1
@@ -159,7 +162,9 @@ class ACL(TabularAgent):
             env, partition, max_steps=max_steps, seed=seed, n_actions=n_actions
         )
         if not isinstance(tabu, bool):
-            raise TypeError(f"tabu must be True or False, got {tabu!r}.")
+            raise TypeError(
+                f"tabu must be True or False, got {validation.shown(tabu)}."
+            )
         if tabu and self.partition.cells_per_state > 1:
             raise ValueError(
                 "tabu needs a partition with one cell per state, such as Crisp or "
@@ -170,11 +175,12 @@ class ACL(TabularAgent):
         self.pheromone = Pheromone(
             *shape,
             self.tau0,
-            self._now("alpha"),
+            self._at_first("alpha"),
             as_heuristic(heuristic, env, self.partition, shape),
-            self._now("beta"),
+            self._at_first("beta"),
         )
         self._solutions: Solutions | None = None
+        self._rule = self._update  # of the trial under way; see `watched`
         self._check_tau0()
 
     def learn(
@@ -195,8 +201,15 @@ class ACL(TabularAgent):
             trials: K, how many trials to make; None sets no such limit. Without
                 either limit, 100.
             callback: a `Callback`, a function of `(agent, row)`, or a list of those.
+                In place of Stable-Baselines3's `EvalCallback` take
+                `PolicyEvaluation(env)`, which evaluates between trials and keeps the
+                best policy (`save_best="best"` writes it to a file); of
+                `StopTrainingOnRewardThreshold`, `EarlyStop` after it; of
+                `CheckpointCallback`, `Checkpoint("checkpoints")`; of
+                `tensorboard_log="log"`, `TensorBoardLog("log")`, or `CSVLog("log.csv")`
+                for a table.
             log_interval: print a line every `log_interval` trials; None prints nothing.
-            progress_bar: show a bar.
+            progress_bar: show a bar (of tqdm).
 
         Returns:
             The agent itself.
@@ -210,7 +223,8 @@ class ACL(TabularAgent):
             while training.next_trial():  # 2, 22: repeat until k = K
                 # 3-6: every ant begins in a random state with an empty solution
                 rollout, solutions = self.rollout, self._empty_solutions()
-                rule, record = self.update, self._needs_episodes()
+                rule = self._rule = watched(self.update, self.n_actions)
+                record = self._needs_episodes()
                 epsilon = self._set_exponents()
                 observation = rollout.start(seed=self._next_seed(), record=record)
                 rule.start_trial(pheromone, self.trials)
@@ -234,6 +248,7 @@ class ACL(TabularAgent):
                 rule.global_update(
                     pheromone, result, self.local_decay, self.global_decay
                 )
+                pheromone.check_levels()
                 training.end_trial(result.costs)  # 21: k <- k + 1
         return self
 
@@ -270,7 +285,8 @@ class ACL(TabularAgent):
     def update(self) -> UpdateRule:
         """The local and the global update; the colony's own copy of what was set.
 
-        A user's own rule is not saved. Set it again after `load`: a rule of the same
+        Of a user's own rule a file holds the name and what it remembered. Give it again
+        with `load(path, env, update=...)` or set it after `load`: a rule of the same
         class takes over what the saved one remembered.
         """
         return self._update
@@ -349,7 +365,7 @@ class ACL(TabularAgent):
             "selection": self.selection,
             "cost": to_settings(self.cost),
             "deposit": to_settings(self.deposit),
-            "update": update_to_settings(self.update),
+            "update": to_settings(self.update),
             "tabu": self.tabu,
             "max_steps": self.max_steps,
             "seed": self.seed,
@@ -377,19 +393,24 @@ class ACL(TabularAgent):
             arrays["heuristic"] = self.heuristic
         return arrays
 
-    def _restore(self, header: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> None:
+    def _restore(
+        self, header: dict[str, Any], arrays: Mapping[str, NDArray[Any]]
+    ) -> None:
         super()._restore(header, arrays)
-        self._set_arrays(arrays)
+        memory = _memory_of_rule(arrays)
+        if memory:
+            saved = update_from_settings(header["parameters"]["update"])
+            if type(saved) is type(self.update):
+                self.update.restore(memory)
+            elif isinstance(saved, MissingRule):  # the rule was given again
+                saved.restore(memory)
+                saved.hand_over(self.update)
         self.pheromone.heuristic = as_heuristic(
             arrays.get("heuristic"), None, self.partition, self._table.shape
         )
 
-    def _set_arrays(self, arrays: dict[str, NDArray[Any]]) -> None:
-        memory = {
-            name.removeprefix("update_"): array
-            for name, array in arrays.items()
-            if name.startswith("update_")
-        }
+    def _set_arrays(self, arrays: Mapping[str, NDArray[Any]]) -> None:
+        memory = _memory_of_rule(arrays)
         if memory:
             self.update.restore(memory)
 
@@ -402,6 +423,11 @@ class ACL(TabularAgent):
         """The value that a number or schedule has in the next trial."""
         parameter: Parameter = getattr(type(self), name)
         return parameter.at(self, self.trials)
+
+    def _at_first(self, name: str) -> float:
+        """The value with which to begin; 1 where a file could not hold the schedule."""
+        missing = isinstance(getattr(self, name), Missing)
+        return 1.0 if missing else self._now(name)
 
     def _set_exponents(self) -> float:
         """Set alpha and beta to their values in the next trial; return its epsilon."""
@@ -419,7 +445,7 @@ class ACL(TabularAgent):
         costs = rollout.cost
         if self.cost is not None and episodes is not None:
             costs = solution_costs(self.cost, episodes)
-        deposits = self._deposit(costs, self.tau0)
+        deposits = checked_deposits(self._deposit(costs, self.tau0), costs.size)
         return TrialResult(solutions, costs, deposits, rollout.terminated, episodes)
 
     def _allowed(
@@ -441,7 +467,7 @@ class ACL(TabularAgent):
         allowed: BoolArray | None,
     ) -> IntArray:
         """Choose the actions of the walking ants, as the update rule says."""
-        return self.update.choose(
+        return self._rule.choose(
             self.selection,
             self.pheromone,
             index,
@@ -475,3 +501,12 @@ class ACL(TabularAgent):
             self._solutions = kept
         kept.clear()
         return kept
+
+
+def _memory_of_rule(arrays: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
+    """What an update rule remembered, from the arrays of an agent's file."""
+    return {
+        name.removeprefix("update_"): arrays[name]
+        for name in arrays
+        if name.startswith("update_")
+    }

@@ -2,23 +2,47 @@
 
 from __future__ import annotations
 
+import inspect
+import os
 from abc import abstractmethod
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, NamedTuple, Self
+from typing import Any, BinaryIO, ClassVar, NamedTuple, Self, overload
 
 import numpy as np
+from gymnasium import spaces
 from gymnasium.vector import VectorEnv
 from numpy.typing import ArrayLike, NDArray
 
+from acl_gym.agents.notebook import name_of, page_of
 from acl_gym.callbacks.base import Callbacks
 from acl_gym.colony.greedy import greedy_actions
 from acl_gym.envs.control.environments import ControlVectorEnv
-from acl_gym.evaluation.rollout import Rollout, require_vector_env
-from acl_gym.partitions import Partition, check_cells, partition_from_settings
+from acl_gym.envs.control.lookup import signals_of
+from acl_gym.evaluation.rollout import Rollout
+from acl_gym.export import Source
+from acl_gym.partitions import (
+    Partition,
+    checked_partition,
+    given_partition,
+    locate_checked,
+    partition_from_settings,
+    partition_to_settings,
+)
 from acl_gym.partitions.automatic import automatic_partition
 from acl_gym.policies import PartitionPolicy, TablePolicy, random_ranks
-from acl_gym.utils import files, validation
+from acl_gym.utils import archives, validation
 from acl_gym.utils.parameters import fixed
+from acl_gym.utils.pictures import guarded
+from acl_gym.utils.serialization import (
+    Missing,
+    from_json,
+    missing_in,
+    own_name,
+    to_json,
+    to_settings,
+)
+from acl_gym.utils.text import count, short
 from acl_gym.utils.typing import (
     BoolArray,
     CellArray,
@@ -27,9 +51,36 @@ from acl_gym.utils.typing import (
     RankArray,
     Row,
 )
+from acl_gym.utils.vector_envs import require_vector_env
+
+BYTES_PER_PAIR = 20
+"""Memory of an entry of a table at least: value, probability and rank."""
 
 DEFAULT_MAX_STEPS = 300
 """T of Table 5.2, used if neither agent nor environment sets a limit."""
+
+_NOT_GIVEN = ("env", "heuristic", "n_actions", "seed")
+"""Arguments of constructors that a file holds otherwise, or that `load` has itself."""
+
+_COLUMNS = (
+    "trial",
+    "env_steps",
+    "seconds",
+    "ants_cost",
+    "ants_success_rate",
+    "policy_variation",
+)
+
+_DAMAGES = (
+    ArithmeticError,
+    AttributeError,
+    LookupError,
+    MemoryError,
+    RecursionError,
+    TypeError,
+    ValueError,
+)
+"""What nonsense in a file can raise."""
 
 
 class Snapshot(NamedTuple):
@@ -66,9 +117,14 @@ class TabularAgent(PartitionPolicy):
             `ants_success_rate` and `success_rate`.
         in_trial: whether a trial is under way, or was interrupted by an exception; the
             table is then not that after a complete trial.
-        metadata: your own notes, JSON values under string keys, empty at first; saved
-            and loaded with the agent.
+        busy: whether a trial is under way now, so that `set_env` and `learn` are refused.
+        metadata: your own notes under string keys, empty at first: numbers, text,
+            None, and lists, tuples, dicts and arrays of those; saved and loaded with
+            the agent.
     """
+
+    slots_are: ClassVar[str] = "slots"
+    """What the slots are called where the agent is described."""
 
     def __init__(
         self,
@@ -79,20 +135,15 @@ class TabularAgent(PartitionPolicy):
         seed: int | None,
         n_actions: int | None = None,
     ) -> None:
+        if env is not None:
+            require_vector_env(env)
         if partition is None:
             if env is None:
                 raise ValueError(
                     "an agent needs a partition, or env to choose one for; got neither."
                 )
-            require_vector_env(env)
             partition = automatic_partition(env)
-        if not isinstance(partition, Partition):
-            raise TypeError(
-                "partition must be a Partition such as Crisp or Fuzzy, got "
-                f"{type(partition).__name__}; build one with Fuzzy.from_box("
-                "env.single_observation_space, cells), or leave it out."
-            )
-        self.partition = partition
+        self.partition = checked_partition(partition)
         if max_steps is None:
             max_steps = time_limit(env) or DEFAULT_MAX_STEPS
         self._max_steps = validation.integer("max_steps", max_steps, at_least=1)
@@ -108,13 +159,58 @@ class TabularAgent(PartitionPolicy):
         self._n_actions = n_actions
         if env is not None:
             self._attach(Rollout(env, self.max_steps))
+        n_cells = self.partition.n_cells
+        validation.check_memory(
+            f"the tables of {n_cells} cells and {self.n_actions} actions",
+            BYTES_PER_PAIR * n_cells * self.n_actions,
+            "use fewer cells or actions",
+        )
         self.num_timesteps = 0
         self.trials = 0
         self.seconds = 0.0
         self.history: list[Row] = []
         self.in_trial = False
+        self.busy = False
         self.metadata: dict[str, Any] = {}
         self.set_random_seed(seed)
+
+    _fixed = ("partition", "pheromone")
+
+    @property
+    def _n_cells(self) -> int:
+        return len(self._table)
+
+    def __repr__(self) -> str:
+        """Environment, slots, partition, and how much has been learned, in a line."""
+        name, parts = type(self).__name__, []
+        try:
+            if self.env is not None:
+                parts += [name_of(self.env), f"{self.num_envs} {self.slots_are}"]
+            parts.append(repr(self.partition))
+            parts += [f"{self.trials} trials", f"{count(self.num_timesteps)} steps"]
+        except AttributeError:  # not made completely
+            return f"{name}(not complete)"
+        return f"{name}({', '.join(map(short, parts))})"
+
+    @guarded
+    def _repr_html_(self) -> str:
+        """What a notebook shows: parameters, how far the agent is, its policy."""
+        facts: list[tuple[str, Any]] = [("partition", self.partition)]
+        if self.env is not None:
+            slots = f"{self.num_envs} {self.slots_are}"
+            facts = [("environment", f"{name_of(self.env)}, {slots}"), *facts]
+        facts += [
+            ("longest episode", f"{self.max_steps} steps"),
+            ("learned", f"{self.trials} trials, {count(self.num_timesteps)} steps"),
+            ("time", f"{self.seconds:.3g} s"),
+        ]
+        last = self.history[-1] if self.history else {}
+        facts += [
+            (name.replace("_", " "), f"{last[name]:.4g}")
+            for name in ("ants_return", "ants_cost", "policy_return", "policy_cost")
+            if last.get(name) is not None
+        ]
+        return page_of(self, self.policy.best_actions(), facts)
 
     @property
     @abstractmethod
@@ -148,7 +244,7 @@ class TabularAgent(PartitionPolicy):
         """More arrays to save, which `_restore` takes over again."""
         return {}
 
-    def _set_arrays(self, arrays: dict[str, NDArray[Any]]) -> None:
+    def _set_arrays(self, arrays: Mapping[str, NDArray[Any]]) -> None:
         """Take over what `_arrays` gave."""
 
     def measures(self, policy: IntArray) -> Row:
@@ -197,7 +293,7 @@ class TabularAgent(PartitionPolicy):
     @property
     def num_envs(self) -> int:
         """The number of slots: M, the number of ants."""
-        return int(self.rollout.env.num_envs)
+        return self.rollout.num_envs
 
     def set_env(self, env: VectorEnv[Any, Any, Any]) -> None:
         """Learn on another environment from now on; its number of slots may differ.
@@ -206,7 +302,13 @@ class TabularAgent(PartitionPolicy):
             TypeError: `env` is not a vector environment.
             ValueError: its actions are not those of the table, or its observations
                 not those of the partition.
+            RuntimeError: a trial is under way.
         """
+        if self.busy:
+            raise RuntimeError(
+                "set_env must not be called while a trial is under way; call it between "
+                "trials, such as in a callback's on_trial_end, or after learn."
+            )
         rollout = Rollout(env, self.max_steps)
         if rollout.first_action != self.first_action:
             raise ValueError(
@@ -221,14 +323,27 @@ class TabularAgent(PartitionPolicy):
                 f"env must have {self._n_actions} actions as the table has, got "
                 f"{rollout.n_actions}."
             )
-        self.partition.check_space(rollout.env.single_observation_space)
+        space = rollout.env.single_observation_space
+        if isinstance(space, (spaces.Dict, spaces.Tuple)):
+            raise ValueError(
+                "observations must be arrays for an agent with a table, got "
+                f"{validation.shown(space)}; flatten them with "
+                "gymnasium.wrappers.vector.FlattenObservation, or choose a few "
+                "variables with TransformObservation."
+            )
+        self.partition.check_space(space)
         self._n_actions = rollout.n_actions
         self.first_action = rollout.first_action
-        self.env = env = rollout.env
+        self.env = rollout.env
         self._rollout = rollout
-        k = self.partition.cells_per_state
-        self._index: CellArray = np.zeros((env.num_envs, k), dtype=np.int32)
-        self._degree: FloatArray = np.zeros((env.num_envs, k))
+        slots, k = rollout.num_envs, self.partition.cells_per_state
+        validation.check_memory(
+            f"the cells of {slots} slots",
+            12 * slots * k,
+            "use fewer slots or variables",
+        )
+        self._index: CellArray = np.zeros((slots, k), dtype=np.int32)
+        self._degree: FloatArray = np.zeros((slots, k))
 
     def set_random_seed(self, seed: int | None) -> None:
         """Restart the agent's random numbers.
@@ -244,8 +359,7 @@ class TabularAgent(PartitionPolicy):
             TypeError: `seed` is not an integer.
             ValueError: it is negative.
         """
-        seed = validation.seed(seed)
-        self.seed = seed
+        self.seed = seed = validation.seed(seed)
         learning, predicting, ties = np.random.SeedSequence(seed).spawn(3)
         self.rng = np.random.default_rng(learning)
         self._predict_rng = np.random.default_rng(predicting)
@@ -256,7 +370,16 @@ class TabularAgent(PartitionPolicy):
     @property
     def policy(self) -> TablePolicy:
         """The policy as it is now; it follows the table until you `copy()` it."""
-        return TablePolicy(self.partition, self._table, self._ranks, self.first_action)
+        return TablePolicy(
+            self.partition,
+            self._table,
+            self._ranks,
+            self.first_action,
+            None if self.env is None else signals_of(self.env),
+        )
+
+    def _source(self, inputs: ArrayLike | None = None) -> Source:
+        return self.policy._source(inputs)
 
     def _act(
         self,
@@ -274,9 +397,8 @@ class TabularAgent(PartitionPolicy):
     ) -> tuple[CellArray, FloatArray]:
         """`(index, degree)` of the walking ants, valid until the next call."""
         index, degree = self._index[: ants.size], self._degree[: ants.size]
-        self.partition.locate(observation, ants, index, degree)
-        if not self.partition.checked:
-            check_cells(index, self.partition)
+        rows = len(self._table)
+        locate_checked(self.partition, observation, ants, index, degree, rows)
         return index, degree
 
     def _next_seed(self) -> int:
@@ -320,67 +442,154 @@ class TabularAgent(PartitionPolicy):
         del self.history[rows:]
         self.in_trial = False
 
-    def save(self, path: str | Path) -> Path:
+    @overload
+    def save(self, path: str | os.PathLike[str]) -> Path: ...
+
+    @overload
+    def save(self, path: BinaryIO) -> None: ...
+
+    def save(self, path: archives.Target) -> Path | None:
         """Write the agent to one `.npz` file, atomically and without pickle.
 
+        A user's own cost, deposit, schedule, update rule or partition is saved by its
+        name only; `load` says what is to be given again. So are the keywords of a
+        subclass's constructor that its `parameters` do not return.
+
+        Args:
+            path: where, with or without `.npz`; or a file open for writing in binary
+                mode, such as `io.BytesIO()`.
+
         Returns:
-            The path written, with `.npz` added where it was missing.
+            The path written, with `.npz` added where it was missing; None for a file.
 
         Raises:
-            ValueError: the partition is of a kind that `load` could not build again.
+            FileNotFoundError: the folder of the file does not exist.
+            TypeError: `metadata` or `history` hold what a file cannot hold.
         """
-        partition = self.partition.settings()
-        partition_from_settings(partition)
+        parameters = self.parameters()
         header = {
             "agent": type(self).__name__,
-            "parameters": self.parameters(),
-            "partition": partition,
+            "parameters": {n: _parameter(v) for n, v in parameters.items()},
+            "unsaved": sorted(_keywords(type(self)) - parameters.keys()),
+            "partition": partition_to_settings(self.partition),
             "n_actions": self.n_actions,
             "first_action": self.first_action,
             "num_timesteps": self.num_timesteps,
             "trials": self.trials,
             "seconds": self.seconds,
-            "history": self.history,
-            "metadata": self.metadata,
+            "history": [
+                to_json(row, f"history[{i}]") for i, row in enumerate(self.history)
+            ],
+            "metadata": self.checked_metadata(),
             "generators": [
                 rng.bit_generator.state for rng in (self.rng, self._predict_rng)
             ],
         }
         arrays: dict[str, NDArray[Any]] = {"table": self._table, "ranks": self._ranks}
         arrays |= self._arrays()
-        return files.save(path, header, arrays)
+        written: Path | None = archives.save(path, header, arrays)
+        return written
+
+    def checked_metadata(self) -> dict[str, Any]:
+        """The notes as a file holds them.
+
+        Raises:
+            TypeError: they are no dict, or hold what a file cannot hold.
+        """
+        if not isinstance(self.metadata, dict):
+            raise TypeError(
+                f"metadata must be a dict, got {self.metadata!r:.80}; put it under a "
+                "key."
+            )
+        notes: dict[str, Any] = to_json(self.metadata, "metadata")
+        return notes
+
+    def require_all_given(self) -> None:
+        """Check that nothing is missing that the file of the agent could not hold.
+
+        Raises:
+            TypeError: the parameters could not be saved.
+            ValueError: something is missing; the message says what is to be given.
+        """
+        try:
+            names = self.parameters()
+        except RecursionError as error:
+            raise TypeError(
+                "cost must lie at most some hundred costs deep, or it cannot be saved; "
+                "multiply the factors first."
+            ) from error
+        parts = (getattr(self, name, None) for name in names)
+        for part in (self.partition, *parts):
+            if (missing := missing_in(part)) is not None:
+                raise missing.error()
 
     @classmethod
     def load(
-        cls, path: str | Path, env: VectorEnv[Any, Any, Any] | None = None
+        cls,
+        path: archives.Target,
+        env: VectorEnv[Any, Any, Any] | None = None,
+        *,
+        max_bytes: int = archives.MOST_BYTES,
+        **given: Any,
     ) -> Self:
         """Read an agent that `save` wrote; learning continues where it stopped.
 
         Args:
-            path: the file, with or without `.npz`.
+            path: the file, with or without `.npz`; or a file open for reading in
+                binary mode.
             env: the environment to learn on; not needed to predict.
+            max_bytes: the most that the file may hold unpacked. A damaged or malicious
+                file cannot take more than a few times as much memory.
+            **given: arguments of the constructor that replace those in the file, above
+                all a `cost`, `deposit`, `update`, schedule or `partition` of your own,
+                of which a file holds the names only.
 
         Raises:
             FileNotFoundError: there is no such file.
-            ValueError: the file is not one of ours, is damaged, or holds another
-                kind of agent.
+            TypeError: the constructor has no such argument as in `given`.
+            ValueError: the file is not one of ours, is damaged, too large, holds
+                another kind of agent, or lacks what must be given.
         """
-        header, arrays = files.load(path)
+        archive = archives.Archive(path, max_bytes)
+        header, arrays, name = archive.header, archive.arrays, archive.name
         if header.get("agent") != cls.__name__:
             raise ValueError(
-                f"{path} must hold a {cls.__name__}, got {header.get('agent')!r}; "
+                f"{name} must hold a {cls.__name__}, got {header.get('agent')!r:.80}; "
                 "load it with that class."
+            )
+        if unknown := given.keys() - _keywords(cls) - {"partition"}:
+            raise TypeError(
+                f"{cls.__name__}.load takes the arguments of {cls.__name__} except "
+                f"{', '.join(_NOT_GIVEN)}, got {', '.join(sorted(unknown))}; one of "
+                f"{', '.join(sorted(_keywords(cls)))} may be given."
             )
         try:
             partition = partition_from_settings(header["partition"])
-            shape = partition.n_cells, int(header["n_actions"])
+            n_actions = validation.integer("n_actions", header["n_actions"], at_least=1)
+            shape = partition.n_cells, n_actions
+            # Read before an agent of that size is made.
             if arrays["table"].shape != shape or arrays["ranks"].shape != shape:
                 raise ValueError(f"its arrays must have shape {shape}")
-            parameters = cls._restored_parameters(header["parameters"])
-            agent = cls(None, partition, n_actions=shape[1], **parameters)
+            saved = from_json(header["parameters"])
+            lacking = _lacking(saved, header.get("unsaved", []), cls) - given.keys()
+        except _DAMAGES as error:
+            raise _damaged(name, error) from error
+        if lacking:
+            raise ValueError(
+                f"{name} needs {', '.join(sorted(lacking))}, which it does not hold; "
+                f"pass {cls.__name__}.load(path, env, {min(lacking)}=...), or let "
+                "`parameters` return what is numbers and text."
+            )
+        if "partition" in given:
+            partition = given_partition(given.pop("partition"), partition)
+        try:
+            parameters = cls._restored_parameters(saved) | given
+            agent = cls(None, partition, n_actions=n_actions, **parameters)
             agent._restore(header, arrays)
-        except (KeyError, OverflowError, TypeError, ValueError) as error:
-            raise ValueError(f"{path} is damaged: {error}.") from error
+        except _DAMAGES as error:
+            if given:
+                raise
+            raise _damaged(name, error) from error
         if env is not None:
             agent.set_env(env)
         return agent
@@ -390,8 +599,13 @@ class TabularAgent(PartitionPolicy):
         """Keyword arguments of the constructor from what `parameters` gave."""
         return dict(saved)
 
-    def _restore(self, header: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> None:
-        """Restore what a file holds in addition to the constructor's arguments."""
+    def _restore(
+        self, header: dict[str, Any], arrays: Mapping[str, NDArray[Any]]
+    ) -> None:
+        """Restore what a file holds in addition to the constructor's arguments.
+
+        `arrays` are read from the file when they are taken.
+        """
         self.set_table(arrays["table"])
         ranks = arrays["ranks"]
         if (np.sort(ranks, axis=1) != np.arange(self.n_actions)).any():
@@ -402,24 +616,62 @@ class TabularAgent(PartitionPolicy):
             raise TypeError(f"first_action must be an integer, got {first_action!r}")
         self.first_action = first_action
         for name in ("num_timesteps", "trials"):
-            count = validation.integer(name, header[name], at_least=0)
+            count = validation.integer(name, header[name], at_least=0, at_most=2**62)
             setattr(self, name, count)
         self.seconds = validation.number("seconds", header["seconds"], at_least=0)
-        history = header["history"]
-        if not isinstance(history, list) or not all(
-            isinstance(row, dict)
-            and all(isinstance(value, (int, float)) for value in row.values())
-            for row in history
-        ):
-            raise TypeError("history must be a list of rows of numbers")
+        history = from_json(header["history"])
+        if not isinstance(history, list) or not all(map(_is_row, history)):
+            raise TypeError("history must be a list of rows of measures")
         self.history = history
-        metadata = header.get("metadata", {})  # older files have none
+        metadata = from_json(header.get("metadata", {}))  # older files have none
         if not isinstance(metadata, dict):
-            raise TypeError(f"metadata must be a dict, got {metadata!r}")
+            raise TypeError(f"metadata must be a dict, got {metadata!r:.80}")
         self.metadata = metadata
         generators = (self.rng, self._predict_rng)
         for rng, state in zip(generators, header["generators"], strict=True):
             rng.bit_generator.state = state
+
+
+def _is_row(row: Any) -> bool:
+    """Whether it can be a row of `history`; our own columns are numbers."""
+    return isinstance(row, dict) and all(
+        isinstance(row[name], (int, float)) for name in _COLUMNS if name in row
+    )
+
+
+def _keywords(kind: type) -> set[str]:
+    """The arguments of an agent's constructor that a file holds or `load` is given."""
+    return {
+        name
+        for name, parameter in inspect.signature(kind).parameters.items()
+        if parameter.kind not in (parameter.VAR_POSITIONAL, parameter.VAR_KEYWORD)
+        and name not in _NOT_GIVEN
+    } - {"partition"}
+
+
+def _parameter(value: Any) -> Any:
+    """The saved form of a parameter: the value itself, or the name of its class."""
+    try:
+        return to_json(value, "a parameter")
+    except TypeError:
+        return to_settings(Missing("", own_name(value)))
+
+
+def _lacking(saved: Any, unsaved: Any, kind: type) -> set[str]:
+    """The arguments of the constructor that the file does not hold."""
+    known = {"cost", "deposit", "update", "alpha", "beta", "epsilon"}
+    by_name = {
+        name
+        for name, value in saved.items()
+        if isinstance(value, dict) and value.get("type") == "function"
+    }
+    return (by_name - known) | (set(unsaved) & _keywords(kind))
+
+
+def _damaged(name: str, error: Exception) -> ValueError:
+    if isinstance(error, archives.TooLargeError):
+        return ValueError(f"{name} {error}")
+    return ValueError(f"{name} is damaged: {str(error).rstrip('.')}.")
 
 
 def time_limit(env: Any) -> int | None:

@@ -6,7 +6,6 @@ from typing import Any, Self
 
 import numpy as np
 from gymnasium.vector import VectorEnv
-from numba import njit
 from numpy.typing import ArrayLike
 
 from acl_gym.agents.base import TabularAgent
@@ -19,12 +18,16 @@ from acl_gym.colony.greedy import (
     mark_greedy,
 )
 from acl_gym.evaluation.rollout import Rollout, Step
-from acl_gym.partitions import Partition
+from acl_gym.partitions import Partition, locate_all
 from acl_gym.utils import validation
+from acl_gym.utils.compiling import njit
 from acl_gym.utils.parameters import Parameter, fixed
 from acl_gym.utils.typing import BoolArray, CellArray, FloatArray, IntArray
 
 TRACES = ("replacing", "accumulating")
+
+FIRST_TRACES = 1_024
+"""For how many traces of each slot there is memory at first."""
 
 TRACE_CUTOFF = 1e-4
 """Traces that fade below it are dropped (a decision)."""
@@ -122,7 +125,24 @@ class QLearning(TabularAgent):
         log_interval: int | None = None,
         progress_bar: bool = False,
     ) -> Self:
-        """Learn; a trial is one episode in every slot. Arguments as in `ACL.learn`.
+        """Learn; a trial is one episode in every slot.
+
+        Called again, it continues from the values as they are.
+
+        Args:
+            total_timesteps: stop after the trial that reaches this many steps of all
+                slots together; None sets no such limit.
+            trials: how many trials to make; None sets no such limit. Without either
+                limit, 100.
+            callback: as in `ACL.learn`, which names the equivalents of
+                Stable-Baselines3's callbacks: `PolicyEvaluation` for `EvalCallback`,
+                `Checkpoint` for `CheckpointCallback`, `TensorBoardLog` for
+                `tensorboard_log`.
+            log_interval: print a line every `log_interval` trials; None prints nothing.
+            progress_bar: show a bar (of tqdm).
+
+        Returns:
+            The agent itself.
 
         Raises:
             ValueError: the action values have overflowed.
@@ -132,7 +152,7 @@ class QLearning(TabularAgent):
             while training.next_trial():
                 rollout, traces = self.rollout, self._empty_traces()
                 observation = rollout.start(seed=self._next_seed())
-                index, degree = self.partition(observation)
+                index, degree = locate_all(self.partition, observation, self._n_cells)
                 allowed = rollout.allowed()
                 while rollout.ants.size:
                     actions = epsilon_greedy_actions(
@@ -171,7 +191,7 @@ class QLearning(TabularAgent):
                             self._kind == "accumulating",
                             TRACE_CUTOFF,
                             step.ants,
-                            *traces.arrays,
+                            *traces.with_room(index.shape[1]),
                         )
                     allowed, stays = next_allowed, ~step.finished
                     index, degree = next_index[stays], next_degree[stays]
@@ -244,7 +264,7 @@ class QLearning(TabularAgent):
 class _Traces:
     """The eligibility traces e of all slots, those that are not 0.
 
-    Memory is reserved for the longest episode, but only what traces need is touched.
+    Memory grows with what traces need: by doubling, up to the longest episode.
 
     Args:
         slots: how many slots there are.
@@ -253,17 +273,41 @@ class _Traces:
     """
 
     def __init__(self, slots: int, n_pairs: int, longest: int) -> None:
-        capacity = min(n_pairs, longest)
-        self.greedy: BoolArray = np.empty(slots, dtype=np.bool_)
-        pair: IntArray = np.empty((slots, capacity), dtype=np.int64)
-        trace: FloatArray = np.empty((slots, capacity))
+        self._most = min(n_pairs, longest)
+        first = min(self._most, FIRST_TRACES)
+        self._greedy: BoolArray = np.empty(slots, dtype=np.bool_)
+        self._pair: IntArray = np.empty((slots, first), dtype=np.int64)
+        self._trace: FloatArray = np.empty((slots, first))
         self._count: IntArray = np.zeros(slots, dtype=np.int64)
-        mark: FloatArray = np.zeros(n_pairs)
-        self.arrays = (self.greedy, pair, trace, self._count, mark)
+        self._mark: FloatArray = np.zeros(n_pairs)
+        self._at_most = 0  # no slot has more traces than this
+
+    @property
+    def greedy(self) -> BoolArray:
+        """Whether the last action of each walking slot was greedy; to be written."""
+        return self._greedy
 
     def clear(self) -> None:
         """Forget all traces."""
         self._count[:] = 0
+        self._at_most = 0
+
+    def with_room(self, more: int) -> tuple[Any, ...]:
+        """The arrays that `_update_traced` changes, with room for `more` in each slot."""
+        self._at_most += more
+        if self._at_most > (room := self._pair.shape[1]):
+            self._at_most = int(self._count.max()) + more
+            if min(self._at_most, self._most) > room:
+                self._widen(min(max(2 * room, self._at_most), self._most))
+        return self._greedy, self._pair, self._trace, self._count, self._mark
+
+    def _widen(self, width: int) -> None:
+        """Make room for more traces of each slot; those that are there stay."""
+        for name in ("_pair", "_trace"):
+            array = getattr(self, name)
+            wider = np.empty((len(array), width), dtype=array.dtype)
+            wider[:, : array.shape[1]] = array
+            setattr(self, name, wider)
 
 
 def _next_allowed(rollout: Rollout, step: Step) -> BoolArray:
@@ -279,7 +323,7 @@ def _next_allowed(rollout: Rollout, step: Step) -> BoolArray:
     return allowed
 
 
-@njit(cache=True, inline="always")
+@njit(inline="always")
 def _error(
     values: FloatArray,
     index: CellArray,
@@ -303,7 +347,7 @@ def _error(
     return error
 
 
-@njit(cache=True)
+@njit
 def _update(
     values: FloatArray,
     index: CellArray,
@@ -341,7 +385,7 @@ def _update(
             values[index[j, c], u] += learning_rate * degree[j, c] * error
 
 
-@njit(cache=True)
+@njit
 def _update_traced(
     values: FloatArray,
     index: CellArray,

@@ -14,6 +14,7 @@ from acl_gym.agents.base import TabularAgent
 from acl_gym.callbacks.base import Callbacks, as_callbacks, is_stop
 from acl_gym.evaluation import reports_returns
 from acl_gym.utils import validation
+from acl_gym.utils.serialization import check_row
 from acl_gym.utils.typing import Row
 
 DEFAULT_TRIALS = 100
@@ -53,6 +54,14 @@ class Training:
             log_interval = validation.integer("log_interval", log_interval, at_least=1)
         if total_timesteps is None and trials is None:
             trials = DEFAULT_TRIALS
+        if agent.busy:
+            raise RuntimeError(
+                "learn must not be called while a trial is under way; call it after the "
+                "first call has returned."
+            )
+        # Before any work is done that could not be saved.
+        agent.require_all_given()
+        agent.checked_metadata()
         self._agent = agent
         cost = getattr(agent, "cost", None)
         self._reported = (
@@ -86,9 +95,12 @@ class Training:
         error: BaseException | None,
         traceback: TracebackType | None,
     ) -> None:
+        self._agent.busy = False
         try:
             for callback in self._callbacks:
                 callback.on_training_end(self._agent)
+                if self._agent.history:
+                    check_row(self._agent.history[-1])
         finally:
             self._bar.close()
 
@@ -99,6 +111,7 @@ class Training:
             and self._agent.num_timesteps < self._last_step
             and self._agent.trials < self._last_trial
         )
+        self._agent.busy = self._agent.in_trial
         return self._agent.in_trial
 
     def end_trial(self, costs: NDArray[np.float64] | None = None) -> None:
@@ -108,6 +121,7 @@ class Training:
             costs: J of each ant; None takes the sums of the stage costs.
         """
         agent, rollout = self._agent, self._agent.rollout
+        agent.busy = False
         steps = int(rollout.length.sum())
         agent.num_timesteps += steps
         agent.trials += 1
@@ -128,6 +142,7 @@ class Training:
         for callback in self._callbacks:
             if is_stop(callback.on_trial_end(agent, row)):
                 self._stopped = True
+            check_row(row)
         self._report(row, 1 if self._bar_counts_trials else steps)
         self._clock = time.perf_counter()
 

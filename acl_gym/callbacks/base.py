@@ -10,6 +10,7 @@ import numpy as np
 from gymnasium.vector import VectorEnv
 from numpy.typing import ArrayLike
 
+from acl_gym.utils import validation
 from acl_gym.utils.typing import FloatArray, Predictor, Row
 
 
@@ -95,5 +96,5 @@ def as_callbacks(callback: Callbacks) -> list[Callback]:
         return [one for each in callback for one in as_callbacks(each)]
     raise TypeError(
         "callback must be a Callback object, a function of (agent, row) or a list of "
-        f"those, got {callback!r}."
+        f"those, got {validation.shown(callback)}."
     )

@@ -18,10 +18,10 @@ from acl_gym.evaluation import (
     policy_measures,
     with_slots_for,
 )
-from acl_gym.evaluation.rollout import require_vector_env
 from acl_gym.policies import TablePolicy
 from acl_gym.utils import files, validation
 from acl_gym.utils.typing import Predictor, Row
+from acl_gym.utils.vector_envs import require_vector_env
 
 
 class PolicyEvaluation(Callback):
@@ -75,7 +75,7 @@ class PolicyEvaluation(Callback):
         if policy is not None and not callable(policy):
             raise TypeError(
                 "policy must be a function of the agent that returns what to evaluate, "
-                f"got {policy!r}."
+                f"got {validation.shown(policy)}."
             )
         self.save_best = None
         if save_best is not None:
@@ -178,7 +178,9 @@ class EarlyStop(Callback):
     ) -> None:
         self.patience = validation.integer("patience", patience, at_least=1)
         if not isinstance(measure, str):
-            raise TypeError(f"measure must be the name of a measure, got {measure!r}.")
+            raise TypeError(
+                f"measure must be the name of a measure, got {validation.shown(measure)}."
+            )
         self.measure = measure
         self._sign = -1.0 if measure.endswith(_HIGHER_IS_BETTER) else 1.0
         self.min_improvement = validation.number(

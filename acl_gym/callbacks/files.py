@@ -9,6 +9,8 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from acl_gym.callbacks.base import Agent, Callback
 from acl_gym.utils import files, validation
 from acl_gym.utils.typing import Row
@@ -38,7 +40,7 @@ class Checkpoint(Callback):
     def __init__(
         self, directory: str | Path, every: int = 10, keep: int | None = None
     ) -> None:
-        self.directory = Path(directory)
+        self.directory = validation.path("directory", directory)
         self.every = validation.integer("every", every, at_least=1)
         if keep is not None:
             keep = validation.integer("keep", keep, at_least=1)
@@ -90,7 +92,7 @@ class CSVLog(Callback):
     """
 
     def __init__(self, path: str | Path) -> None:
-        self.path = files.checked_target(Path(path))
+        self.path = files.checked_target(validation.path("path", path))
         if self.path.exists() and not _is_log(self.path):
             raise ValueError(
                 f"{self.path} exists and is not a log of acl-gym, whose first column "
@@ -138,7 +140,7 @@ class CSVLog(Callback):
 
 def _plain(value: Any) -> Any:
     """Turn a NumPy number, which a callback may have added, into a Python number."""
-    return value.item() if hasattr(value, "item") else value
+    return value.item() if isinstance(value, np.generic) else value
 
 
 def _is_log(path: Path) -> bool:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import time
+from importlib import import_module
+from numbers import Real
 from pathlib import Path
 from typing import Any
 
@@ -40,17 +43,15 @@ class TensorBoardLog(Callback):
 
     def __init__(self, directory: str | Path) -> None:
         self.directory = Path(directory)
-        self._writer_type = _import_writer()
+        _tensorboard()  # if it is missing, that is said before learning
         self._writer: Any = None
         self._written: Row = {}
 
     def on_training_start(self, agent: Agent) -> None:
         """Open an event file."""
         self._written = dict(agent.history[-1]) if agent.history else {}
-        self._writer = self._writer_type(
-            str(self.directory),
-            purge_step=agent.num_timesteps + 1 if agent.history else None,
-            flush_secs=10,
+        self._writer = _ScalarWriter(
+            str(self.directory), agent.num_timesteps + 1 if agent.history else None
         )
 
     def on_trial_end(self, agent: Agent, row: Row) -> bool | None:
@@ -70,19 +71,57 @@ class TensorBoardLog(Callback):
     def _write(self, row: Row, values: Row) -> None:
         step = int(row["env_steps"])
         for name, value in values.items():
-            if name != "env_steps":
+            if name != "env_steps" and isinstance(value, Real):  # notes have no curve
                 tag = _TAGS.get(name, f"other/{name}")
                 self._writer.add_scalar(tag, float(value), step)
         self._written = dict(row)
 
 
-def _import_writer() -> Any:
-    # Imported here because torch takes seconds to import.
+class _ScalarWriter:
+    """Writes scalars to an event file, as torch's `SummaryWriter`, but without torch.
+
+    Args:
+        directory: receives the event file.
+        purge_step: TensorBoard hides what earlier files hold from this step on; None
+            hides nothing.
+
+    Raises:
+        ModuleNotFoundError: tensorboard is not installed.
+    """
+
+    def __init__(self, directory: str, purge_step: int | None) -> None:
+        event, _, event_file_writer = _tensorboard()
+        self._file = event_file_writer.EventFileWriter(directory, flush_secs=10)
+        if purge_step is not None:
+            start = event.SessionLog(status=event.SessionLog.START)
+            self._add(purge_step, session_log=start)
+
+    def add_scalar(self, tag: str, value: float, step: int) -> None:
+        """Write a value of the scalar `tag`."""
+        _, summary, _ = _tensorboard()
+        scalar = summary.Summary.Value(tag=tag, simple_value=value)
+        self._add(step, summary=summary.Summary(value=[scalar]))
+
+    def close(self) -> None:
+        """Write what is left and close the file."""
+        self._file.close()
+
+    def _add(self, step: int, **content: Any) -> None:
+        event, _, _ = _tensorboard()
+        self._file.add_event(event.Event(wall_time=time.time(), step=step, **content))
+
+
+def _tensorboard() -> tuple[Any, Any, Any]:
+    """The modules of events, of summaries and of the file writer."""
+    names = ("compat.proto.event_pb2", "compat.proto.summary_pb2")
     try:
-        from torch.utils.tensorboard import SummaryWriter
+        event, summary, writer = (
+            import_module(f"tensorboard.{name}")
+            for name in (*names, "summary.writer.event_file_writer")
+        )
     except ImportError as error:
         raise ModuleNotFoundError(
             "TensorBoardLog needs tensorboard, which is not installed; "
             'run `pip install "acl-gym[tensorboard]"`.'
         ) from error
-    return SummaryWriter
+    return event, summary, writer

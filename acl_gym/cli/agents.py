@@ -122,10 +122,10 @@ def load_agent(path: str) -> Any:
     Raises:
         BadArgumentError: there is no such file, or it holds no agent of this package.
     """
-    from acl_gym.utils import files
+    from acl_gym.utils.archives import Archive
 
     with bad_arguments():
-        name = str(files.load(path)[0].get("agent"))
+        name = str(Archive(path).header.get("agent"))
     for kind in AGENTS.values():
         if kind.name == name:
             with bad_arguments():

@@ -17,7 +17,7 @@ import numpy as np
 
 from acl_gym.colony.episodes import Episode, Episodes
 from acl_gym.utils import validation
-from acl_gym.utils.serialization import Savable, from_settings
+from acl_gym.utils.serialization import Savable, Unsaved, from_settings, make_plain
 from acl_gym.utils.typing import FloatArray
 
 
@@ -31,7 +31,8 @@ class Cost(Savable, ABC):
     def __add__(self, other: Cost | float) -> Cost:
         """The sum of two costs, or of a cost and a constant."""
         term = other if isinstance(other, Cost) else Constant(other)
-        return Sum((self, term))
+        # One sum of many terms, not sums in sums, which Python limits.
+        return Sum((*self.terms, term) if type(self) is Sum else (self, term))
 
     __radd__ = __add__
 
@@ -80,6 +81,7 @@ class Quadratic(Cost):
     periods: tuple[float | None, ...] | None = None
 
     def __post_init__(self) -> None:
+        make_plain(self)
         size = validation.real_array("goal", self.goal, ndim=1).size
         _weight("state_weight", self.state_weight, size)
         if (self.inputs is None) != (self.input_weight is None):
@@ -89,11 +91,16 @@ class Quadratic(Cost):
         if self.inputs is not None:
             inputs = validation.real_array("inputs", self.inputs, ndim=2)
             _weight("input_weight", self.input_weight, inputs.shape[1])
-        if self.periods is not None and len(self.periods) != size:
-            raise ValueError(
-                f"periods must hold one entry for each of the {size} variables, got "
-                f"{self.periods!r}."
-            )
+        if self.periods is not None:
+            periods: Any = self.periods
+            if np.ndim(periods) != 1 or len(self.periods) != size:
+                raise ValueError(
+                    f"periods must hold one entry for each of the {size} variables, got "
+                    f"{validation.shown(self.periods)}."
+                )
+            for axis, period in enumerate(self.periods):
+                if period is not None:
+                    validation.number(f"periods[{axis}]", period, above=0)
 
     def __call__(self, episodes: Episodes) -> FloatArray:
         """See `Cost`."""
@@ -132,6 +139,7 @@ class _Response(Cost):
         """The period of a circular variable, > 0; else None."""
 
     def __post_init__(self) -> None:
+        make_plain(self)
         validation.integer("variable", self.variable, at_least=0)
         validation.number("target", self.target)
         if self.period is not None:
@@ -248,6 +256,7 @@ class Constant(Cost):
     value: float
 
     def __post_init__(self) -> None:
+        make_plain(self)
         validation.number("value", self.value, at_least=0)
 
     def __call__(self, episodes: Episodes) -> FloatArray:
@@ -264,6 +273,12 @@ class Sum(Cost):
     """
 
     terms: tuple[Cost, ...]
+
+    def __post_init__(self) -> None:
+        make_plain(self)
+        if not isinstance(self.terms, (tuple, list)) or not self.terms:
+            raise TypeError(f"terms must be Costs, got {validation.shown(self.terms)}.")
+        _check_costs("terms", self.terms)
 
     def __call__(self, episodes: Episodes) -> FloatArray:
         """See `Cost`."""
@@ -283,7 +298,9 @@ class Weighted(Cost):
     cost: Cost
 
     def __post_init__(self) -> None:
+        make_plain(self)
         validation.number("factor", self.factor, above=0)
+        _check_costs("cost", (self.cost,))
 
     def __call__(self, episodes: Episodes) -> FloatArray:
         """See `Cost`."""
@@ -312,6 +329,10 @@ class FunctionCost(Cost):
         )
 
 
+class MissingCost(Unsaved, Cost):
+    """Stands in for a user's own cost in an agent read from a file."""
+
+
 _KINDS = (
     StageCosts,
     Steps,
@@ -338,7 +359,7 @@ def as_cost(cost: Cost | Callable[[Episode], float] | None) -> Cost | None:
         return FunctionCost(cost)
     raise TypeError(
         "cost must be a Cost such as Steps(), or a function of one solution, got "
-        f"{cost!r}."
+        f"{validation.shown(cost)}."
     )
 
 
@@ -348,13 +369,19 @@ def solution_costs(cost: Cost, episodes: Episodes) -> FloatArray:
     Raises:
         ValueError: the cost does not give one finite number for each ant.
     """
-    costs = np.asarray(cost(episodes), dtype=np.float64)
-    if costs.shape != (len(episodes),) or not np.isfinite(costs).all():
+    found = cost(episodes)
+    costs = validation.as_array(found)
+    if (
+        costs is None
+        or costs.dtype.kind not in "biuf"
+        or costs.shape != (len(episodes),)
+        or not np.isfinite(costs).all()
+    ):
         raise ValueError(
             f"a cost must give one finite number for each of the {len(episodes)} ants, "
-            f"got {costs.tolist()!r:.200} from {cost!r:.100}."
+            f"got {validation.shown(found)} from {validation.shown(cost)}."
         )
-    return costs
+    return costs.astype(np.float64)
 
 
 def cost_from_settings(settings: Any) -> Cost | None:
@@ -363,7 +390,7 @@ def cost_from_settings(settings: Any) -> Cost | None:
     Raises:
         ValueError: they are not those of a cost.
     """
-    cost = from_settings("cost", settings, _KINDS)
+    cost = from_settings("cost", settings, _KINDS, MissingCost)
     if cost is not None and not isinstance(cost, Cost):
         raise ValueError(f"cost must be a Cost, got {settings!r:.200}.")
     return cost
@@ -380,6 +407,15 @@ def _first_crossing(progress: FloatArray, level: float) -> FloatArray:
     return np.where(above.any(axis=0), step - part, np.inf)
 
 
+def _check_costs(name: str, costs: Any) -> None:
+    for cost in costs if isinstance(costs, (tuple, list)) else (costs,):
+        if not isinstance(cost, Cost):
+            raise TypeError(
+                f"{name} must be made of Costs such as Steps(), got {validation.shown(cost)}; make "
+                "a Cost of a function with FunctionCost(function)."
+            )
+
+
 def _weight(name: str, values: Any, size: int) -> FloatArray:
     weight = validation.real_array(name, values)
     if weight.shape == (size,):
@@ -388,6 +424,6 @@ def _weight(name: str, values: Any, size: int) -> FloatArray:
     if not (valid and np.linalg.eigvalsh(weight)[0] >= -1e-12 * np.abs(weight).max()):
         raise ValueError(
             f"{name} must be a diagonal of {size} numbers or a symmetric positive "
-            f"semi-definite ({size}, {size}) matrix, got {values!r}."
+            f"semi-definite ({size}, {size}) matrix, got {validation.shown(values)}."
         )
     return weight

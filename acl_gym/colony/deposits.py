@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from acl_gym.utils import validation
-from acl_gym.utils.serialization import Savable, from_settings
+from acl_gym.utils.serialization import Savable, Unsaved, from_settings, make_plain
 from acl_gym.utils.typing import FloatArray
 
 Function = Callable[[FloatArray], FloatArray]
@@ -50,6 +50,7 @@ class InverseCost(Deposit):
     offset: float = 0.0
 
     def __post_init__(self) -> None:
+        make_plain(self)
         validation.number("offset", self.offset)
 
     def __call__(self, costs: FloatArray, tau0: float) -> FloatArray:
@@ -105,6 +106,7 @@ class Rank(Deposit):
     exponent: float = 1.0
 
     def __post_init__(self) -> None:
+        make_plain(self)
         validation.number("exponent", self.exponent, above=0)
 
     def __call__(self, costs: FloatArray, tau0: float) -> FloatArray:
@@ -137,16 +139,33 @@ class FunctionDeposit(Deposit):
 
     def __call__(self, costs: FloatArray, tau0: float) -> FloatArray:
         """See `Deposit`."""
-        deposits = np.asarray(self.function(costs), dtype=np.float64)
-        valid = deposits.shape == costs.shape and (
-            np.isfinite(deposits).all() and (deposits > 0.0).all()
+        # A copy, which the function may do with as it likes.
+        return checked_deposits(self.function(costs.copy()), costs.size)
+
+
+def checked_deposits(deposits: Any, n_ants: int) -> FloatArray:
+    """What a deposit of a user's own has returned, as an array of its own.
+
+    Raises:
+        ValueError: it is not a finite number > 0 for each ant.
+    """
+    array = validation.as_array(deposits)
+    if (
+        array is None
+        or array.dtype.kind not in "iuf"
+        or array.shape != (n_ants,)
+        or not np.isfinite(array).all()
+        or not (array > 0.0).all()
+    ):
+        raise ValueError(
+            f"deposit must return a finite number > 0 for each of the {n_ants} ants, "
+            f"got {validation.shown(deposits)}."
         )
-        if not valid:
-            raise ValueError(
-                "deposit must return a finite number > 0 for each of the "
-                f"{costs.size} ants, got {deposits.tolist()!r:.200}."
-            )
-        return deposits
+    return array.astype(np.float64)
+
+
+class MissingDeposit(Unsaved, Deposit):
+    """Stands in for a user's own deposit in an agent read from a file."""
 
 
 def as_deposit(deposit: str | Deposit | Function) -> Deposit:
@@ -164,7 +183,7 @@ def as_deposit(deposit: str | Deposit | Function) -> Deposit:
         return FunctionDeposit(deposit)
     raise TypeError(
         f"deposit must be one of {', '.join(map(repr, NAMED))}, a Deposit such as "
-        f"InverseCost(offset=20), or a function of the costs, got {deposit!r}."
+        f"InverseCost(offset=20), or a function of the costs, got {validation.shown(deposit)}."
     )
 
 
@@ -175,7 +194,7 @@ def deposit_from_settings(settings: Any) -> Deposit:
         ValueError: they are not those of a deposit.
     """
     kinds = (InverseCost, Return, Rank, FunctionDeposit)
-    deposit = from_settings("deposit", settings, kinds)
+    deposit = from_settings("deposit", settings, kinds, MissingDeposit)
     if not isinstance(deposit, Deposit):
         raise ValueError(f"deposit must be a Deposit, got {settings!r:.200}.")
     return deposit

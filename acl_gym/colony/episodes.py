@@ -19,13 +19,13 @@ class Episode:
         observations: from the first to the last, `(L + 1, ...)`.
         actions: indices, `(L,)`.
         stage_costs: -(reward) of each step, `(L,)`.
-        success: whether it ended in a terminal state.
+        terminated: whether it ended in a terminal state.
     """
 
     observations: NDArray[Any]
     actions: IntArray
     stage_costs: FloatArray
-    success: bool
+    terminated: bool
 
 
 @dataclass(frozen=True)
@@ -39,14 +39,14 @@ class Episodes:
         actions: indices, `(longest, n)`.
         stage_costs: `(longest, n)`.
         lengths: L of each ant, `(n,)`.
-        success: whether each ended in a terminal state, `(n,)`.
+        terminated: whether each ended in a terminal state, `(n,)`.
     """
 
     observations: NDArray[Any]
     actions: IntArray
     stage_costs: FloatArray
     lengths: IntArray
-    success: BoolArray
+    terminated: BoolArray
 
     def __len__(self) -> int:
         """How many ants there are."""
@@ -59,7 +59,7 @@ class Episodes:
             self.observations[: length + 1, ant].copy(),
             self.actions[:length, ant].copy(),
             self.stage_costs[:length, ant].copy(),
-            bool(self.success[ant]),
+            bool(self.terminated[ant]),
         )
 
     def taken(self) -> BoolArray:

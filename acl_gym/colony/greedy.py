@@ -6,9 +6,12 @@ For tables of any kind: levels of pheromone, action values, costs to go.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from acl_gym.utils import validation
+from acl_gym.utils.compiling import njit
 from acl_gym.utils.typing import BoolArray, CellArray, FloatArray, IntArray, RankArray
+
+_CELL, _FLOAT, _BOOL = np.dtype(np.int32), np.dtype(np.float64), np.dtype(np.bool_)
 
 ALL: BoolArray = np.empty((0, 0), dtype=np.bool_)
 """What kernels take as `allowed` where every action is allowed."""
@@ -30,11 +33,98 @@ def epsilon_greedy_actions(
 
     See `choose_actions`.
     """
-    draws = rng.random((NUMBERS_PER_ACTION, index.shape[0]))
+    check_choice(index, degree, table, allowed)
+    draws = drawn_numbers(rng, len(index))
     actions = np.empty(index.shape[0], dtype=np.int64)
     any_action = ALL if allowed is None else allowed
     _epsilon_greedy(table, weights, index, degree, draws, epsilon, any_action, actions)
     return actions
+
+
+def drawn_numbers(rng: np.random.Generator, count: int) -> FloatArray:
+    """The random numbers from which `count` actions are chosen, `(2, count)`.
+
+    Args:
+        rng: a generator, or an object with the same `random`.
+        count: how many actions.
+
+    Raises:
+        ValueError: what another object than a generator gives is not uniform in [0, 1).
+    """
+    shape = NUMBERS_PER_ACTION, count
+    draws = rng.random(shape)
+    if type(rng) is not np.random.Generator and (
+        not isinstance(draws, np.ndarray)
+        or draws.shape != shape
+        or draws.dtype != _FLOAT
+        or not ((draws >= 0.0) & (draws < 1.0)).all()
+    ):
+        raise ValueError(
+            f"rng.random({shape}) must give numbers in [0, 1), got "
+            f"{validation.shown(draws)}."
+        )
+    return draws
+
+
+def check_choice(
+    index: CellArray,
+    degree: FloatArray,
+    table: FloatArray,
+    allowed: BoolArray | None,
+    cells: bool = True,
+) -> None:
+    """Check what kernels choose by: they address the table without further checks.
+
+    Args:
+        index: cells of the states, int32 `(n, k)`.
+        degree: their degrees, float64 `(n, k)`.
+        table: `(n_cells, n_actions)`.
+        allowed: bool `(n, n_actions)`, or None.
+        cells: look at every cell; False where another kernel does so.
+
+    Raises:
+        ValueError: a shape or type is wrong, or a cell is not one of the table.
+    """
+    if not (isinstance(index, np.ndarray) and isinstance(degree, np.ndarray)):
+        raise TypeError(
+            "index and degree must be arrays, got "
+            f"{type(index).__name__} and {type(degree).__name__}."
+        )
+    good = (
+        index.ndim == 2
+        and index.shape == degree.shape
+        and index.dtype == _CELL
+        and degree.dtype == _FLOAT
+    )
+    if not good:
+        raise ValueError(
+            "index and degree must be int32 and float64 of the same shape (n, k), got "
+            f"{index.dtype} {index.shape} and {degree.dtype} {degree.shape}."
+        )
+    if allowed is not None:
+        shape = (len(index), table.shape[1])
+        array = isinstance(allowed, np.ndarray)
+        if not array or allowed.shape != shape or allowed.dtype != _BOOL:
+            raise ValueError(
+                f"allowed must be a bool array of shape {shape}, got "
+                f"{validation.shown(allowed)}."
+            )
+        cells = True
+    if cells and not _all_below(index, len(table)):
+        raise ValueError(
+            f"index must hold cells in 0..{len(table) - 1}, got {index.min()} to "
+            f"{index.max()}."
+        )
+
+
+@njit
+def _all_below(index: CellArray, n_cells: int) -> bool:
+    """Whether all cells are in 0..n_cells - 1; vectorised."""
+    good = True
+    for j in range(index.shape[0]):
+        for c in range(index.shape[1]):
+            good &= (index[j, c] >= 0) & (index[j, c] < n_cells)
+    return good
 
 
 def greedy_actions(
@@ -59,12 +149,13 @@ def greedy_actions(
     Returns:
         Indices of actions, `(n,)`.
     """
+    check_choice(index, degree, table, allowed)
     actions = np.empty(index.shape[0], dtype=np.int64)
     _greedy(table, ranks, index, degree, ALL if allowed is None else allowed, actions)
     return actions
 
 
-@njit(cache=True, inline="always")
+@njit(inline="always")
 def best_value(
     table: FloatArray, index: CellArray, degree: FloatArray, j: int, allowed: BoolArray
 ) -> float:
@@ -91,7 +182,7 @@ def best_value(
     return best
 
 
-@njit(cache=True)
+@njit
 def mark_greedy(
     table: FloatArray,
     index: CellArray,
@@ -109,7 +200,7 @@ def mark_greedy(
         greedy[j] = value >= best_value(table, index, degree, j, allowed)
 
 
-@njit(cache=True, inline="always")
+@njit(inline="always")
 def _value(table: FloatArray, cells: CellArray, degrees: FloatArray, u: int) -> float:
     """The sum over a state's cells of degree times table entry."""
     total = 0.0
@@ -118,7 +209,7 @@ def _value(table: FloatArray, cells: CellArray, degrees: FloatArray, u: int) -> 
     return total
 
 
-@njit(cache=True)
+@njit
 def _values(
     table: FloatArray,
     weights: FloatArray | None,
@@ -144,7 +235,7 @@ def _values(
                 values[u] += degrees[c] * table[cell, u] * weight
 
 
-@njit(cache=True)
+@njit
 def best_action(
     table: FloatArray,
     weights: FloatArray | None,
@@ -187,7 +278,7 @@ def best_action(
     return 0
 
 
-@njit(cache=True)
+@njit
 def any_action(choice: float, j: int, n_actions: int, allowed: BoolArray) -> int:
     """One of the actions that ant j may take, all equally likely; choice in [0, 1)."""
     if allowed.size == 0:
@@ -204,7 +295,7 @@ def any_action(choice: float, j: int, n_actions: int, allowed: BoolArray) -> int
     return 0
 
 
-@njit(cache=True)
+@njit
 def _epsilon_greedy(
     levels: FloatArray,
     weights: FloatArray | None,
@@ -224,7 +315,7 @@ def _epsilon_greedy(
             )
 
 
-@njit(cache=True)
+@njit
 def _greedy(
     table: FloatArray,
     ranks: RankArray,

@@ -34,6 +34,16 @@ def as_heuristic(
     if heuristic is None:
         return None
     found = heuristic(env, partition) if callable(heuristic) else heuristic
+    return checked_heuristic(found, shape)
+
+
+def checked_heuristic(found: Any, shape: tuple[int, ...]) -> FloatArray:
+    """A new array of heuristic values, which cannot be written to.
+
+    Raises:
+        ValueError: they do not have that shape, or are not finite, >= 0 and positive
+            somewhere in each row.
+    """
     eta = validation.real_array("heuristic", found, finite=False, boolean=True)
     if eta.shape != shape:
         raise ValueError(

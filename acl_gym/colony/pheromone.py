@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from acl_gym.colony.heuristic import checked_heuristic
 from acl_gym.partitions.kernels import written_out
+from acl_gym.utils import validation
+from acl_gym.utils.compiling import njit
+from acl_gym.utils.parameters import Fixed
 from acl_gym.utils.typing import BoolArray, CellArray, FloatArray, IntArray
 
 
-class Pheromone:
+class Pheromone(Fixed):
     """A level tau for each (cell, action), and the probabilities that follow from it.
 
     Args:
@@ -22,13 +25,20 @@ class Pheromone:
         beta: exponent of eta in the selection rule, >= 0.
 
     Attributes:
-        levels: tau, `(n_cells, n_actions)`. Change it through `set_levels`, or mark
-            the cells changed in `stale`.
+        levels: tau, `(n_cells, n_actions)`, > 0 and finite. Change it through
+            `set_levels`, or in place, and then mark the cells changed in `stale`.
         probabilities: w / (sum of w over the actions), w = tau^alpha eta^beta (4.3),
             row by row; valid where `stale` is False. `repair` renews the rows that are
             needed, so that a cell is computed once per step for all ants.
         stale: whether the levels of a cell have changed since, `(n_cells,)`.
+
+    Raises:
+        TypeError: an argument is not a number.
+        ValueError: an argument is out of range.
     """
+
+    # The arrays may change, but not be replaced: kernels rely on their shapes and types.
+    _fixed = ("levels", "probabilities", "stale", "tau0", "n_actions")
 
     def __init__(
         self,
@@ -39,13 +49,17 @@ class Pheromone:
         heuristic: FloatArray | None = None,
         beta: float = 1.0,
     ) -> None:
-        self.tau0 = tau0
-        self.n_actions = n_actions
-        self._alpha, self._beta = alpha, beta
-        self.levels: FloatArray = np.full((n_cells, n_actions), tau0)
+        n_cells = validation.integer("n_cells", n_cells, at_least=1)
+        self.n_actions = validation.integer("n_actions", n_actions, at_least=1)
+        self.tau0 = validation.number("tau0", tau0, above=0)
+        self._alpha = validation.number("alpha", alpha, above=0)
+        self._beta = validation.number("beta", beta, at_least=0)
+        self.levels: FloatArray = np.full((n_cells, n_actions), self.tau0)
         self.probabilities: FloatArray = np.empty_like(self.levels)
         self.stale: BoolArray = np.ones(n_cells, dtype=np.bool_)
-        self._heuristic = heuristic
+        self._heuristic: FloatArray | None = None
+        if heuristic is not None:
+            self._heuristic = checked_heuristic(heuristic, self.levels.shape)
         self._weights: FloatArray | None = None
         self._greedy_weights: FloatArray | None = None
 
@@ -57,7 +71,7 @@ class Pheromone:
     @alpha.setter
     def alpha(self, value: float) -> None:
         if value != self._alpha:
-            self._alpha = value
+            self._alpha = validation.number("alpha", value, above=0)
             self._greedy_weights = None
             self.stale[:] = True
 
@@ -69,7 +83,7 @@ class Pheromone:
     @beta.setter
     def beta(self, value: float) -> None:
         if value != self._beta:
-            self._beta = value
+            self._beta = validation.number("beta", value, at_least=0)
             self._weights = self._greedy_weights = None
             self.stale[:] = True
 
@@ -80,6 +94,8 @@ class Pheromone:
 
     @heuristic.setter
     def heuristic(self, value: FloatArray | None) -> None:
+        if value is not None:
+            value = checked_heuristic(value, self.levels.shape)
         self._heuristic = value
         self._weights = self._greedy_weights = None
         self.stale[:] = True
@@ -111,13 +127,43 @@ class Pheromone:
         return np.where(eta > 0.0, powers, 0.0)
 
     def set_levels(self, levels: FloatArray) -> None:
-        """Replace all levels."""
-        self.levels[:] = levels
+        """Replace all levels.
+
+        Raises:
+            ValueError: they do not have the shape of the table, or are not all > 0 and
+                finite.
+        """
+        values = validation.real_array("levels", levels)
+        if values.shape != self.levels.shape or not (values > 0.0).all():
+            raise ValueError(
+                f"levels must be > 0 in shape {self.levels.shape}, got "
+                f"{validation.shown(levels)}."
+            )
+        self.levels[:] = values
         self.stale[:] = True
 
+    def check_levels(self) -> None:
+        """Check that all levels are > 0 and finite, which in-place changes may spoil.
+
+        Raises:
+            ValueError: one is not.
+        """
+        valid = np.isfinite(self.levels) & (self.levels > 0.0)
+        if not valid.all():
+            cell, u = np.argwhere(~valid)[0]
+            raise ValueError(
+                "levels must stay > 0 and finite, got "
+                f"{self.levels[cell, u]} for action {u} in cell {cell}; check the update "
+                "rule, or scale the cost."
+            )
+
     def repair(self, index: CellArray) -> None:
-        """Renew the probabilities of those of the cells `index` that are stale."""
-        _repair(
+        """Renew the probabilities of those of the cells `index` that are stale.
+
+        Raises:
+            ValueError: a cell is not one of the table.
+        """
+        good = _repair(
             self.levels,
             self._alpha,
             self.weights,
@@ -127,9 +173,18 @@ class Pheromone:
             self.probabilities,
             self.stale,
         )
+        if not good:
+            raise cells_out_of_range(index, len(self.levels))
 
 
-@njit(cache=True, error_model="numpy")
+def cells_out_of_range(index: CellArray, n_cells: int) -> ValueError:
+    """The error for cells that are not rows of the table."""
+    return ValueError(
+        f"index must hold cells in 0..{n_cells - 1}, got {index.min()} to {index.max()}."
+    )
+
+
+@njit(error_model="numpy")
 def _repair(
     levels: FloatArray,
     alpha: float,
@@ -139,17 +194,20 @@ def _repair(
     corners: tuple[int, ...],
     probabilities: FloatArray,
     stale: BoolArray,
-) -> None:
+) -> bool:
     """Compute the selection probabilities, eq. (4.3), of the stale cells in `index`.
 
-    Levels are scaled by the largest of their cell: no underflow.
+    Levels are scaled by the largest of their cell: no underflow. Returns False where a
+    cell is not one of the table.
     """
     n_actions = len(columns) or levels.shape[1]
     whole = int(alpha)
     multiply = whole == alpha and whole <= 8  # cheaper than pow
     for j in range(index.shape[0]):
         for c in range(len(corners) or index.shape[1]):
-            cell = np.uint64(index[j, c])  # unsigned: no check for negative indices
+            cell = np.uint64(index[j, c])  # unsigned: negative ones become huge
+            if cell >= np.uint64(stale.size):
+                return False
             if not stale[cell]:
                 continue
             stale[cell] = False
@@ -179,9 +237,10 @@ def _repair(
                 total += weight
             for u in range(n_actions):
                 probabilities[cell, u] /= total
+    return True
 
 
-@njit(cache=True)
+@njit
 def mean_sensitivity(levels: FloatArray, policy: IntArray, alpha: float) -> float:
     """How near the second-best action comes to the policy's (3.48), mean over cells.
 

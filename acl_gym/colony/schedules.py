@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from acl_gym.utils import validation
-from acl_gym.utils.serialization import Savable, from_settings
+from acl_gym.utils.serialization import Savable, from_settings, make_plain
 
 
 class Schedule(Savable, ABC):
@@ -43,6 +43,7 @@ class Linear(Schedule):
     trials: int
 
     def __post_init__(self) -> None:
+        make_plain(self)
         validation.number("start", self.start)
         validation.number("end", self.end)
         validation.integer("trials", self.trials, at_least=1)
@@ -72,6 +73,7 @@ class Exponential(Schedule):
     end: float | None = None
 
     def __post_init__(self) -> None:
+        make_plain(self)
         validation.number("start", self.start, above=0)
         validation.number("factor", self.factor, above=0)
         if self.end is not None:
@@ -108,6 +110,7 @@ class Harmonic(Schedule):
     trials: int
 
     def __post_init__(self) -> None:
+        make_plain(self)
         validation.number("start", self.start, at_least=0)
         validation.integer("trials", self.trials, at_least=1)
 

@@ -7,18 +7,20 @@ rules. Ants weigh tau^alpha eta^beta, where eta is a heuristic; without one, eta
 from __future__ import annotations
 
 import numpy as np
-from numba import njit, prange
+from numba import prange
 
 from acl_gym.colony.greedy import (
     ALL,
-    NUMBERS_PER_ACTION,
     any_action,
     best_action,
+    check_choice,
+    drawn_numbers,
     epsilon_greedy_actions,
 )
 from acl_gym.colony.pheromone import Pheromone
 from acl_gym.partitions.kernels import written_out
-from acl_gym.utils import threads
+from acl_gym.utils import threads, validation
+from acl_gym.utils.compiling import njit
 from acl_gym.utils.typing import BoolArray, CellArray, FloatArray, IntArray
 
 RULES = ("boltzmann", "epsilon_greedy", "max_boltzmann")
@@ -58,6 +60,13 @@ def choose_actions(
     Returns:
         Indices of actions, `(m,)`.
     """
+    if rule not in RULES:
+        validation.one_of("rule", rule, RULES)
+    if not (isinstance(pheromone, Pheromone) and hasattr(rng, "random")):
+        raise TypeError(
+            "choose_actions needs a Pheromone and a numpy.random.Generator, got "
+            f"{type(pheromone).__name__} and {type(rng).__name__}."
+        )
     if rule == "epsilon_greedy":
         return epsilon_greedy_actions(
             pheromone.levels,
@@ -68,7 +77,9 @@ def choose_actions(
             allowed,
             pheromone.greedy_weights,
         )
-    draws = rng.random((NUMBERS_PER_ACTION, index.shape[0]))
+    # `repair` looks at the cells.
+    check_choice(index, degree, pheromone.levels, allowed, cells=False)
+    draws = drawn_numbers(rng, len(index))
     actions = np.empty(index.shape[0], dtype=np.int64)
     columns, corners = written_out(pheromone.n_actions), written_out(index.shape[1])
     if rule != "max_boltzmann":
@@ -96,7 +107,7 @@ def choose_actions(
     return actions
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _boltzmann_allowed(
     levels: FloatArray,
     alpha: float,
@@ -146,7 +157,7 @@ def _boltzmann_allowed(
     return action
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@njit(error_model="numpy", inline="always")
 def _draw_action(
     levels: FloatArray,
     alpha: float,
@@ -185,7 +196,7 @@ def _draw_action(
     return explored if coin < epsilon else action
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _boltzmann(
     levels: FloatArray,
     alpha: float,
@@ -217,7 +228,8 @@ def _boltzmann(
         )
 
 
-@njit(cache=True, parallel=True, error_model="numpy")
+@threads.shared_among_threads
+@njit(parallel=True, error_model="numpy")
 def _boltzmann_in_parallel(
     levels: FloatArray,
     alpha: float,
@@ -250,7 +262,7 @@ def _boltzmann_in_parallel(
         )
 
 
-@njit(cache=True)
+@njit
 def choose_alone(
     levels: FloatArray,
     alpha: float,

@@ -7,11 +7,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from acl_gym.partitions import Partition
-from acl_gym.partitions.base import check_cells
+from acl_gym.partitions.base import locate_checked
+from acl_gym.utils import validation
+from acl_gym.utils.compiling import njit
+from acl_gym.utils.parameters import Fixed
 from acl_gym.utils.typing import ActionArray, BoolArray, CellArray, FloatArray, IntArray
 
 ROWS_PER_BLOCK = 4_096
@@ -20,6 +22,10 @@ ROWS_PER_BLOCK = 4_096
 RUN = 5
 """How many steps of one ant lie side by side in memory, followed by as many of the next
 ant: a step is written for all ants at once, but deposits are read ant by ant."""
+
+
+FIRST_STEPS = 640
+"""For how many steps of each ant there is memory at first; more is made when needed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +56,7 @@ class _Room:
     degree: FloatArray
 
 
-class Solutions:
+class Solutions(Fixed):
     """The multiset S_trial: what every ant did in one trial.
 
     Where a state has one cell, the cell is kept, in 4 bytes. Where it has more, cells
@@ -58,7 +64,7 @@ class Solutions:
     instead and located again when it is needed, with the same bits. An action takes one
     byte if there are at most 256.
 
-    Memory is reserved for `max_steps` steps, but only the steps made are touched.
+    Memory grows with the steps that ants make: by doubling, up to `max_steps`.
 
     Args:
         n_ants: M.
@@ -67,29 +73,47 @@ class Solutions:
         partition: turns observations into cells and degrees.
 
     Attributes:
-        length: how many steps each ant has made, `(n_ants,)`.
+        length: how many steps each ant has made, `(n_ants,)`, read-only.
+
+    Raises:
+        ValueError: there is no memory for so many steps.
     """
+
+    _fixed = ("n_ants", "max_steps", "partition")
 
     def __init__(
         self, n_ants: int, max_steps: int, n_actions: int, partition: Partition
     ) -> None:
         self.n_ants, self.max_steps = n_ants, max_steps
         self.partition = partition
-        # `_place` computes where step t of an ant lies.
-        self._size = (max_steps + RUN - 1) // RUN * RUN * n_ants
+        self._room_for_steps = min(max_steps, FIRST_STEPS)
+        self._appended = 0  # no ant has made more steps than this
         self._action: ActionArray = np.empty(
             self._size, dtype=np.min_scalar_type(n_actions - 1)
         )
-        self.length: IntArray = np.zeros(n_ants, dtype=np.int64)
-        self._one_cell = partition.cells_per_state == 1
+        self._length: IntArray = np.zeros(n_ants, dtype=np.int64)
+        self._n_actions, self._n_cells = n_actions, partition.n_cells
+        self._k = partition.cells_per_state
+        self._one_cell = self._k == 1
         # Cells or observations, a row each.
         self._rows: NDArray[Any] | None = None
         self._state_shape: tuple[int, ...] = ()
         self._room: _Room | None = None
 
+    @property
+    def length(self) -> IntArray:
+        """How many steps each ant has made, `(n_ants,)`, read-only."""
+        return validation.read_only(self._length)
+
+    @property
+    def _size(self) -> int:
+        """How many pairs there is memory for; `_place` computes where each lies."""
+        return (self._room_for_steps + RUN - 1) // RUN * RUN * self.n_ants
+
     def clear(self) -> None:
         """Forget all solutions."""
-        self.length[:] = 0
+        self._length[:] = 0
+        self._appended = 0
 
     def append(
         self,
@@ -105,6 +129,11 @@ class Solutions:
             observation: observations of all slots, `(n_ants, ...)`.
             index: the cells of the observations of `ants`, `(m, k)`.
             actions: the actions they chose, `(m,)`.
+
+        Raises:
+            ValueError: the arrays do not fit together, an ant or an action does not
+                exist, an ant has made `max_steps` already, or observations are not
+                numbers.
         """
         seen = index
         if not self._one_cell:
@@ -114,8 +143,28 @@ class Solutions:
         if rows is None or rows.dtype != seen.dtype or rows.shape[1] != seen.shape[1]:
             rows = self._rows_for(seen)
             self._state_shape = observation.shape[1:]
+        if self._appended >= self._room_for_steps < self.max_steps:
+            rows = self._grow(rows)
+        self._appended += 1
         by_slot = not self._one_cell
-        _append(ants, seen, by_slot, actions, rows, self._action, self.length)
+        good = _append(
+            ants,
+            seen,
+            by_slot,
+            actions,
+            self._n_actions,
+            self.max_steps,
+            rows,
+            self._action,
+            self._length,
+        )
+        if not good:
+            raise ValueError(
+                f"each of {ants.size} ants must exist, have made fewer than "
+                f"{self.max_steps} steps, and take an action in "
+                f"0..{self._n_actions - 1}, got {len(seen)} states and "
+                f"{validation.shown(actions)}."
+            )
 
     def _rows_for(self, seen: NDArray[Any]) -> NDArray[Any]:
         """Memory for observations of another type or size than before.
@@ -127,7 +176,12 @@ class Solutions:
         """
         width, kept = seen.shape[1], self._rows
         self._room = None  # has room for rows of the former kind
-        if kept is None or not self.length.any():
+        if seen.dtype.kind not in "biuf":
+            raise ValueError(
+                f"observations must be numbers, got {seen.dtype}; check the "
+                "environment, or use a partition with one cell per state."
+            )
+        if kept is None or not self._length.any():
             self._rows = np.empty((self._size, width), dtype=seen.dtype)
         elif kept.shape[1] != width:
             raise ValueError(
@@ -137,6 +191,14 @@ class Solutions:
         else:
             kind = np.result_type(kept, seen)
             self._rows = kept if kept.dtype == kind else kept.astype(kind)
+        return self._rows
+
+    def _grow(self, rows: NDArray[Any]) -> NDArray[Any]:
+        """Make memory for twice as many steps; what is there stays in its place."""
+        self._room_for_steps = min(2 * self._room_for_steps, self.max_steps)
+        self._room = None  # has room for the longest solution
+        self._action = _enlarged(self._action, self._size)
+        self._rows = _enlarged(rows, self._size)
         return self._rows
 
     def untried(
@@ -160,7 +222,7 @@ class Solutions:
         left = allowed.copy()
         if self._rows is not None:
             _strike_tried(
-                ants, index, self._rows, self._action, self.length, allowed, left
+                ants, index, self._rows, self._action, self._length, allowed, left
             )
         return left
 
@@ -173,7 +235,7 @@ class Solutions:
         if rows is None:
             return
         room = self._room_for(rows)
-        ends = np.cumsum(self.length)
+        ends = np.cumsum(self._length)
         first = done = 0
         while first < self.n_ants:
             last = int(np.searchsorted(ends, done + ROWS_PER_BLOCK, side="right"))
@@ -181,15 +243,14 @@ class Solutions:
             size = int(ends[last - 1]) - done
             places, action = room.places[:size], room.action[:size]
             index, degree = room.index[:size], room.degree[:size]
-            _collect(first, last, self.length, self._action, places, action)
+            _collect(first, last, self._length, self._action, places, action)
             seen = index if self._one_cell else room.seen[:size]
             np.take(rows, places, axis=0, out=seen, mode="clip")  # all are in range
             if not self._one_cell:
                 # A copy: the rest of the memory may hold anything.
                 states = seen.reshape(size, *self._state_shape)
-                self.partition.locate(states, room.all[:size], index, degree)
-                if not self.partition.checked:
-                    check_cells(index, self.partition)
+                every, n_cells = room.all[:size], self._n_cells
+                locate_checked(self.partition, states, every, index, degree, n_cells)
             ants = slice(first, last)
             yield Block(ants, index, degree, action, ends[ants] - done)
             first, done = last, done + size
@@ -198,8 +259,8 @@ class Solutions:
         """Scratch for a block, the same in every trial."""
         room = self._room
         if room is None:
-            most = max(ROWS_PER_BLOCK, self.max_steps)
-            k = self.partition.cells_per_state
+            most = max(ROWS_PER_BLOCK, self._room_for_steps)
+            k = self._k
             room = self._room = _Room(
                 np.empty((most, rows.shape[1]), dtype=rows.dtype),
                 np.arange(most),
@@ -211,7 +272,14 @@ class Solutions:
         return room
 
 
-@njit(cache=True, inline="always")
+def _enlarged(array: NDArray[Any], size: int) -> NDArray[Any]:
+    """A copy with more rows, of which those at the end hold nothing yet."""
+    larger = np.empty((size, *array.shape[1:]), dtype=array.dtype)
+    larger[: len(array)] = array
+    return larger
+
+
+@njit(inline="always")
 def _place(t: int, ant: int, n_ants: int) -> np.uint64:
     """Where step t of an ant lies, see `RUN`.
 
@@ -221,28 +289,41 @@ def _place(t: int, ant: int, n_ants: int) -> np.uint64:
     return (run * np.uint64(n_ants) + np.uint64(ant)) * np.uint64(RUN) + step
 
 
-@njit(cache=True)
+@njit
 def _append(
     ants: IntArray,
     seen: NDArray[Any],
     by_slot: bool,
     actions: IntArray,
+    n_actions: int,
+    max_steps: int,
     all_seen: NDArray[Any],
     all_action: ActionArray,
     length: IntArray,
-) -> None:
-    """Add a step; `seen` has a row for each slot if `by_slot`, else for each ant."""
+) -> bool:
+    """Add a step; `seen` has a row for each slot if `by_slot`, else for each ant.
+
+    Returns False where something does not exist; the steps before it are added.
+    """
+    n_rows = length.size if by_slot else ants.size
+    if actions.size != ants.size or seen.shape[0] < n_rows:
+        return False
     for j in range(ants.size):
-        ant = np.uint64(ants[j])  # unsigned, as in `_place`
+        ant = np.uint64(ants[j])  # unsigned, as in `_place`; negative ones become huge
+        if ant >= np.uint64(length.size) or length[ant] >= max_steps:
+            return False
+        if not 0 <= actions[j] < n_actions:
+            return False
         place = _place(length[ant], ants[j], length.size)
         row = ant if by_slot else np.uint64(j)
         for i in range(seen.shape[1]):
             all_seen[place, i] = seen[row, i]
         all_action[place] = actions[j]
         length[ant] += 1
+    return True
 
 
-@njit(cache=True)
+@njit
 def _collect(
     first: int,
     last: int,
@@ -261,7 +342,7 @@ def _collect(
             row += np.uint64(1)
 
 
-@njit(cache=True)
+@njit
 def _strike_tried(
     ants: IntArray,
     index: CellArray,

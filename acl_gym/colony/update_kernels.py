@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from acl_gym.colony.selection import choose_alone
+from acl_gym.utils.compiling import njit
 from acl_gym.utils.typing import ActionArray, BoolArray, CellArray, FloatArray, IntArray
 
 
-@njit(cache=True, inline="always")
+@njit(inline="always")
 def _decayed(level: float, kept: float, tau0: float) -> float:
     """Decay towards tau0, eq. (4.17), where the fraction `kept` of the excess stays.
 
@@ -19,7 +19,7 @@ def _decayed(level: float, kept: float, tau0: float) -> float:
     return tau0 + kept * excess
 
 
-@njit(cache=True, inline="always")
+@njit(inline="always")
 def _decay_pair(
     levels: FloatArray,
     cell: int | np.uint64,
@@ -33,7 +33,7 @@ def _decay_pair(
     stale[cell] = True
 
 
-@njit(cache=True)
+@njit
 def decay(
     index: CellArray,
     degree: FloatArray,
@@ -43,23 +43,32 @@ def decay(
     tau0: float,
     levels: FloatArray,
     stale: BoolArray,
-) -> None:
-    """Local update, eq. (4.12): every ant's pair decays by 1 - gamma * degree."""
+) -> bool:
+    """Local update, eq. (4.12): every ant's pair decays by 1 - gamma * degree.
+
+    Returns False if the arrays do not fit together, or a pair is not one of the table.
+    """
+    if index.shape[0] != actions.size or degree.shape != index.shape:
+        return False
+    n_cells, n_actions = np.uint64(levels.shape[0]), np.uint64(levels.shape[1])
     for j in range(actions.size):
-        action = np.uint64(actions[j])
+        action = np.uint64(actions[j])  # unsigned: negative ones become huge
         for c in range(len(corners) or index.shape[1]):
             if degree[j, c] > 0.0:
                 cell = np.uint64(index[j, c])
+                if cell >= n_cells or action >= n_actions:
+                    return False
                 _decay_pair(
                     levels, cell, action, local_decay * degree[j, c], tau0, stale
                 )
+    return True
 
 
 # Columns of the deposits on a pair, side by side because they are used together.
 _LAST, _DUE, _TOTAL, _LARGEST = range(4)
 
 
-@njit(cache=True)
+@njit
 def sum_deposits(
     index: CellArray,
     degree: FloatArray,
@@ -121,7 +130,7 @@ def sum_deposits(
     return int(count)
 
 
-@njit(cache=True)
+@njit
 def reinforce(
     touched: IntArray,
     summed: FloatArray,
@@ -143,7 +152,7 @@ def reinforce(
         summed[pair, 1:] = 0.0
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def choose_and_decay(
     levels: FloatArray,
     alpha: float,
@@ -175,7 +184,7 @@ def choose_and_decay(
 _OF_ANT, _OF_ALL = 1, 2
 
 
-@njit(cache=True)
+@njit
 def note_visits(
     index: CellArray,
     degree: FloatArray,
@@ -217,7 +226,7 @@ def note_visits(
             row += 1
 
 
-@njit(cache=True)
+@njit
 def decay_late(
     visits: FloatArray,
     kept: FloatArray,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 import numpy as np
@@ -13,7 +13,8 @@ from acl_gym.colony.episodes import Episodes
 from acl_gym.colony.pheromone import Pheromone
 from acl_gym.colony.selection import choose_actions
 from acl_gym.colony.solutions import Solutions
-from acl_gym.utils.serialization import Savable
+from acl_gym.utils import validation
+from acl_gym.utils.serialization import Missing, Savable
 from acl_gym.utils.typing import BoolArray, CellArray, FloatArray, IntArray
 
 
@@ -25,7 +26,7 @@ class TrialResult:
         solutions: S_trial, the cells, degrees and actions of every ant.
         costs: J of each ant, `(n_ants,)`.
         deposits: what each ant deposits, `(n_ants,)`, in the thesis 1 / J.
-        success: whether each ant ended in a terminal state, `(n_ants,)`.
+        terminated: whether each ant ended in a terminal state, `(n_ants,)`.
         episodes: observations, actions and stage costs, step by step; None unless
             the rule's `needs_episodes` is True.
     """
@@ -33,7 +34,7 @@ class TrialResult:
     solutions: Solutions
     costs: FloatArray
     deposits: FloatArray
-    success: BoolArray
+    terminated: BoolArray
     episodes: Episodes | None = None
 
 
@@ -132,21 +133,114 @@ class UpdateRule(Savable, ABC):
         """Take over what `memory` gave when the agent was saved."""
 
 
-@dataclass
-class MissingRule(UpdateRule):
+class WatchedRule(UpdateRule):
+    """Stands between a colony and a rule that is not of this package.
+
+    Kernels address tables by what a colony keeps of a step, without further checks. So
+    the rule is given copies, and the actions that it chooses are checked.
+
+    Args:
+        rule: the rule.
+        n_actions: how many actions there are.
+    """
+
+    def __init__(self, rule: UpdateRule, n_actions: int) -> None:
+        self._rule, self._n_actions = rule, n_actions
+
+    def start_trial(self, pheromone: Pheromone, trial: int) -> None:
+        """See `UpdateRule`."""
+        self._rule.start_trial(pheromone, trial)
+
+    def choose(
+        self,
+        selection: str,
+        pheromone: Pheromone,
+        index: CellArray,
+        degree: FloatArray,
+        epsilon: float,
+        rng: np.random.Generator,
+        allowed: BoolArray | None,
+        local_decay: float,
+    ) -> IntArray:
+        """Let the rule choose.
+
+        Raises:
+            ValueError: it does not choose one allowed action for each ant.
+        """
+        found = self._rule.choose(
+            selection,
+            pheromone,
+            index.copy(),
+            degree.copy(),
+            epsilon,
+            rng,
+            None if allowed is None else allowed.copy(),
+            local_decay,
+        )
+        actions, m = validation.as_array(found), len(index)
+        name = f"{type(self._rule).__name__}.choose"
+        if actions is None or actions.dtype.kind not in "iu" or actions.shape != (m,):
+            raise ValueError(
+                f"{name} must return an integer for each of the {m} ants, got "
+                f"{validation.shown(found)}."
+            )
+        good = (actions >= 0) & (actions < self._n_actions)
+        if allowed is not None and good.all():
+            good = allowed[np.arange(m), actions]
+        if not good.all():
+            j = int(np.argmin(good))
+            raise ValueError(
+                f"{name} must return allowed actions in 0..{self._n_actions - 1}, got "
+                f"{actions[j]} for ant {j} of the {m} that walk."
+            )
+        return actions.astype(np.int64)
+
+    def local_update(
+        self,
+        pheromone: Pheromone,
+        index: CellArray,
+        degree: FloatArray,
+        actions: IntArray,
+        local_decay: float,
+    ) -> None:
+        """See `UpdateRule`."""
+        self._rule.local_update(
+            pheromone, index.copy(), degree.copy(), actions.copy(), local_decay
+        )
+
+    def global_update(
+        self,
+        pheromone: Pheromone,
+        result: TrialResult,
+        local_decay: float,
+        global_decay: float,
+    ) -> None:
+        """See `UpdateRule`."""
+        own = replace(
+            result,
+            costs=result.costs.copy(),
+            deposits=result.deposits.copy(),
+            terminated=result.terminated.copy(),
+        )
+        self._rule.global_update(pheromone, own, local_decay, global_decay)
+
+
+class MissingRule(Missing, UpdateRule):
     """Stands in for a user's own update rule in an agent read from a file.
 
     It keeps what that rule remembered, for the rule itself or for the next file.
 
-    Attributes:
+    Args:
+        parameter: "update".
         name: of the rule's class.
+
+    Attributes:
         kept: what the rule's `memory` gave when the agent was saved.
     """
 
-    name: str
-    kept: dict[str, NDArray[Any]] = field(
-        default_factory=dict, init=False, repr=False, compare=False
-    )
+    def __init__(self, parameter: str, name: str) -> None:
+        super().__init__(parameter, name)
+        self.kept: dict[str, NDArray[Any]] = {}
 
     def start_trial(self, pheromone: Pheromone, trial: int) -> None:
         """Report which rule is missing.
@@ -154,10 +248,7 @@ class MissingRule(UpdateRule):
         Raises:
             ValueError: always.
         """
-        raise ValueError(
-            f"update was the rule {self.name!r}, which a file cannot hold; set "
-            "agent.update to it before learning continues."
-        )
+        raise self.error()
 
     def local_update(self, *arguments: Any) -> None:
         """Never called: a trial does not start."""
@@ -175,5 +266,7 @@ class MissingRule(UpdateRule):
 
     def hand_over(self, rule: UpdateRule) -> None:
         """Give what is kept to `rule`, if it is of the class that is missing."""
-        if self.kept and type(rule).__qualname__ == self.name:
+        # A script is a module of another name when it is imported; older files name the
+        # class only.
+        if self.kept and type(rule).__qualname__ == self.name.rpartition(":")[2]:
             rule.restore(self.kept)

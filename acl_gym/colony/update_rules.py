@@ -14,7 +14,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from acl_gym.colony.greedy import ALL, NUMBERS_PER_ACTION
+from acl_gym.colony.greedy import ALL, check_choice, drawn_numbers
 from acl_gym.colony.pheromone import Pheromone
 from acl_gym.colony.solutions import Solutions
 from acl_gym.colony.update_kernels import (
@@ -25,10 +25,15 @@ from acl_gym.colony.update_kernels import (
     reinforce,
     sum_deposits,
 )
-from acl_gym.colony.update_rule import MissingRule, TrialResult, UpdateRule
+from acl_gym.colony.update_rule import (
+    MissingRule,
+    TrialResult,
+    UpdateRule,
+    WatchedRule,
+)
 from acl_gym.partitions.kernels import written_out
 from acl_gym.utils import validation
-from acl_gym.utils.serialization import from_settings, to_settings
+from acl_gym.utils.serialization import from_settings
 from acl_gym.utils.typing import BoolArray, CellArray, FloatArray, IntArray
 
 
@@ -61,6 +66,15 @@ class Reinforcement:
             ValueError: a deposit is not positive and finite.
         """
         _check_deposits(deposits)
+        if (
+            deposits.shape != (solutions.n_ants,)
+            or self._summed.shape[0] != pheromone.levels.size
+        ):
+            raise ValueError(
+                f"deposits must have shape ({solutions.n_ants},), one for each ant, for "
+                f"a table of {self._summed.shape[0]} pairs, got {deposits.shape} for "
+                f"{pheromone.levels.shape}."
+            )
         if self._interrupted:
             self._summed[:] = 0.0
         self._interrupted = True
@@ -87,6 +101,10 @@ class Reinforcement:
 
 
 def _check_deposits(deposits: FloatArray) -> None:
+    if not isinstance(deposits, np.ndarray) or deposits.dtype != np.float64:
+        raise ValueError(
+            f"deposits must be an array of float64, got {validation.shown(deposits)}."
+        )
     with np.errstate(over="ignore"):
         total = deposits.sum()
     valid = np.isfinite(deposits) & (deposits > 0.0)
@@ -132,7 +150,7 @@ class EachVisit(_DepositAtEnd):
         local_decay: float,
     ) -> None:
         """Decay the visited pairs towards tau0 by 1 - gamma * degree, eq. (4.12)."""
-        if local_decay > 0.0:
+        if local_decay > 0.0 and not (
             decay(
                 index,
                 degree,
@@ -142,6 +160,12 @@ class EachVisit(_DepositAtEnd):
                 pheromone.tau0,
                 pheromone.levels,
                 pheromone.stale,
+            )
+        ):
+            raise ValueError(
+                "local_update needs a cell of the table and an action for each ant, got "
+                f"index {index.shape}, degree {degree.shape} and actions "
+                f"{actions.shape} for {pheromone.levels.shape}."
             )
 
 
@@ -166,6 +190,7 @@ class InTurn(_DepositAtEnd):
         local_decay: float,
     ) -> IntArray:
         """Choose by `selection` and decay by eq. (4.12), ant by ant."""
+        check_choice(index, degree, pheromone.levels, allowed)
         greedy = selection == "epsilon_greedy"
         actions = np.empty(index.shape[0], dtype=np.int64)
         choose_and_decay(
@@ -174,7 +199,7 @@ class InTurn(_DepositAtEnd):
             pheromone.greedy_weights if greedy else pheromone.weights,
             index,
             degree,
-            rng.random((NUMBERS_PER_ACTION, index.shape[0])),
+            drawn_numbers(rng, len(index)),
             0.0 if selection == "boltzmann" else epsilon,
             greedy,
             ALL if allowed is None else allowed,
@@ -284,31 +309,27 @@ def as_update(update: str | UpdateRule) -> UpdateRule:
     if not isinstance(update, UpdateRule):
         raise TypeError(
             f"update must be one of {', '.join(map(repr, UPDATE_RULES))} or an UpdateRule, "
-            f"got {update!r}."
+            f"got {validation.shown(update)}."
         )
     return copy.deepcopy(update)
 
 
-def update_to_settings(rule: UpdateRule) -> Any:
-    """The saved form of a rule: its settings, or the name of a user's own class."""
-    if isinstance(rule, MissingRule):
-        return {"type": "function", "name": rule.name}
-    if type(rule) not in map(type, UPDATE_RULES.values()):
-        return {"type": "function", "name": type(rule).__qualname__}
-    return to_settings(rule)
+def watched(rule: UpdateRule, n_actions: int) -> UpdateRule:
+    """The rule itself if it is one of this package, else behind a `WatchedRule`."""
+    own = type(rule) in map(type, UPDATE_RULES.values()) or isinstance(
+        rule, MissingRule
+    )
+    return rule if own else WatchedRule(rule, n_actions)
 
 
 def update_from_settings(settings: Any) -> UpdateRule:
-    """Undo `update_to_settings`.
+    """An update rule from the settings in a file.
 
     Raises:
         ValueError: the settings are those of no rule.
     """
-    if isinstance(settings, dict) and settings.get("type") == "function":
-        return MissingRule(str(settings.get("name")))
-    rule = from_settings(
-        "update", settings, [type(each) for each in UPDATE_RULES.values()]
-    )
+    kinds = [type(each) for each in UPDATE_RULES.values()]
+    rule = from_settings("update", settings, kinds, MissingRule)
     if not isinstance(rule, UpdateRule):
         raise ValueError(f"update must be an UpdateRule, got {settings!r:.200}.")
     return rule

@@ -15,9 +15,13 @@ from acl_gym.colony.costs import Cost, as_cost, solution_costs
 from acl_gym.colony.episodes import Episode
 from acl_gym.envs.control.environments import ControlVectorEnv
 from acl_gym.envs.control.single import ControlEnv
-from acl_gym.evaluation.rollout import Rollout, require_vector_env
+from acl_gym.evaluation.rollout import Rollout, rows_of
 from acl_gym.policies import PartitionPolicy
-from acl_gym.utils.typing import FloatArray, Predictor, Row
+from acl_gym.utils import validation
+from acl_gym.utils.pictures import guarded, table
+from acl_gym.utils.text import digits
+from acl_gym.utils.typing import FloatArray, IntArray, Predictor, Row
+from acl_gym.utils.vector_envs import require_vector_env
 
 
 @dataclass(frozen=True)
@@ -37,6 +41,30 @@ class PolicyCost:
     success: NDArray[np.bool_] | None
     lengths: NDArray[np.int64]
     returns: FloatArray
+
+    def __repr__(self) -> str:
+        """Cost, rate of success, and how many episodes of which lengths."""
+        facts = ", ".join(f"{name}={value}" for name, value in self._facts())
+        return f"PolicyCost({facts}, {self._episodes()})"
+
+    @guarded
+    def _repr_html_(self) -> str:
+        """What a notebook shows: the measures as a table."""
+        rows = [(name.replace("_", " "), value) for name, value in self._facts()]
+        costs = [digits(float(q)) for q in np.quantile(self.costs, (0.0, 0.5, 1.0))]
+        spread = f"lowest {costs[0]}, median {costs[1]}, highest {costs[2]}"
+        return table([*rows, ("costs", spread), ("episodes", self._episodes())])
+
+    def _facts(self) -> list[tuple[str, str]]:
+        facts = [("cost", digits(self.cost))]
+        if self.success is not None:
+            facts.append(("success_rate", f"{self.success_rate:.0%}"))
+        return facts
+
+    def _episodes(self) -> str:
+        shortest, longest = int(self.lengths.min()), int(self.lengths.max())
+        span = f"{shortest}" if shortest == longest else f"{shortest} to {longest}"
+        return f"{self.lengths.size} episodes of {span} steps"
 
     @property
     def cost(self) -> float:
@@ -109,6 +137,8 @@ def evaluate_policy_cost(
     require_predictor(model)
     require_vector_env(env)
     base = env.unwrapped
+    if states is not None:
+        states = validation.real_array("states", states)
     if isinstance(base, ControlVectorEnv):
         if states is None:
             states = base.system.evaluation_states()
@@ -132,7 +162,7 @@ def evaluate_policy_cost(
     )
     memory = None
     while rollout.ants.size:
-        seen = observation[rollout.ants]
+        seen = rows_of(observation, rollout.ants)
         actions, memory = _chosen(model, seen, rollout, memory)
         observation = rollout.step(actions).observation
     costs = rollout.cost
@@ -159,7 +189,11 @@ def with_slots_for(
         A new environment of the same system, whose random numbers continue a copy of
         the stream of `env`; or `env` itself if it is wrapped or of another package, or
         is such a new environment with the right number of slots.
+
+    Raises:
+        TypeError: `env` is not a vector environment.
     """
+    require_vector_env(env)
     base = env.unwrapped
     if base is not env or not isinstance(base, ControlVectorEnv):
         return env
@@ -225,13 +259,57 @@ def _chosen(
     """Indices of the actions that `model` takes in the active slots, and its state."""
     allowed = rollout.allowed()
     if isinstance(model, PartitionPolicy):
-        starts = np.full(len(observation), rollout.steps == 0)
-        actions, memory = model.predict(
-            observation, memory, starts, action_masks=allowed
-        )
+        starts = np.full(rollout.ants.size, rollout.steps == 0)
+        found = model.predict(observation, memory, starts, action_masks=allowed)
+        memory = found[1]
     else:
-        actions, _ = model.predict(observation, deterministic=True)
-    return np.asarray(actions) - rollout.first_action, memory
+        found = model.predict(observation, deterministic=True)
+    first, count = rollout.first_action, rollout.n_actions
+    return _checked_actions(found, rollout.ants, first, count) - first, memory
+
+
+def _checked_actions(
+    found: Any, slots: IntArray, first: int, count: int
+) -> NDArray[np.int64]:
+    """The actions that `predict` returned, if they are one for each slot.
+
+    Args:
+        found: what it returned.
+        slots: whose observations it was given, `(m,)`.
+        first: the first action of the environment.
+        count: how many actions the environment has.
+
+    Raises:
+        ValueError: they are not integers of the action space, one for each slot.
+    """
+    if not isinstance(found, tuple) or len(found) != 2:
+        raise ValueError(
+            "model.predict must return (actions, state), got "
+            f"{validation.shown(found)}; return (actions, None) where it has no state."
+        )
+    array = validation.as_array(found[0])
+    if array is None or array.dtype.kind not in "iu":
+        what = validation.shown(found[0]) if array is None else f"dtype {array.dtype}"
+        raise ValueError(
+            f"model.predict must return integers as actions, got {what}; round them in "
+            "predict and cast with .astype(np.int64)."
+        )
+    if array.shape == (slots.size, 1) or (array.ndim == 0 and slots.size == 1):
+        array = array.reshape(slots.size)
+    if array.shape != slots.shape:
+        raise ValueError(
+            f"model.predict must return one action for each of the {slots.size} "
+            f"observations, got shape {array.shape}; check that it handles batches."
+        )
+    wrong = (array < first) | (array >= first + count)
+    if wrong.any():
+        j = int(np.argmax(wrong))
+        raise ValueError(
+            f"model.predict must return actions in {first}..{first + count - 1}, got "
+            f"{array[j]} in slot {slots[j]}; check that the model is of this "
+            "environment."
+        )
+    return array.astype(np.int64)
 
 
 def record_trajectory(
@@ -299,11 +377,16 @@ def actions_in(
     """
     require_predictor(model)
     control_env(env)
+    states = validation.real_array("states", states)
     env = with_slots_for(env, states)
     observation, _ = env.reset(options={"state": states})
+    space: Any = env.single_action_space
     if isinstance(model, PartitionPolicy):
-        return model.predict(observation, None, np.ones(len(observation), np.bool_))[0]
-    return np.asarray(model.predict(observation, deterministic=True)[0], dtype=np.int64)
+        found = model.predict(observation, None, np.ones(len(observation), np.bool_))
+    else:
+        found = model.predict(observation, deterministic=True)
+    first, count = int(space.start), int(space.n)
+    return _checked_actions(found, np.arange(env.num_envs), first, count)
 
 
 def require_predictor(model: Any) -> None:
@@ -315,7 +398,7 @@ def require_predictor(model: Any) -> None:
     if not callable(getattr(model, "predict", None)) or isinstance(model, type):
         raise TypeError(
             "model must be an agent or a policy with "
-            f"predict(observation, deterministic=True), got {model!r}."
+            f"predict(observation, deterministic=True), got {validation.shown(model)}."
         )
 
 
@@ -323,8 +406,9 @@ def control_env(env: VectorEnv[Any, Any, Any]) -> ControlVectorEnv:
     """The environment of this package that `env` is or wraps.
 
     Raises:
-        TypeError: it is of another package.
+        TypeError: it is no vector environment, or of another package.
     """
+    require_vector_env(env)
     base = env.unwrapped
     if not isinstance(base, ControlVectorEnv):
         raise TypeError(

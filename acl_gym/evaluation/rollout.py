@@ -10,19 +10,20 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-import gymnasium as gym
 import numpy as np
 from gymnasium import spaces
 from gymnasium.vector import AutoresetMode, VectorEnv
-from numba import njit
 from numpy.typing import NDArray
 
 from acl_gym.colony.episodes import Episodes
+from acl_gym.envs import received
 from acl_gym.envs.control.environments import ControlVectorEnv
 from acl_gym.envs.wrappers.partial_reset import reset_slots
 from acl_gym.envs.wrappers.waiting import WaitingVectorEnv
 from acl_gym.utils import validation
+from acl_gym.utils.compiling import njit
 from acl_gym.utils.typing import BoolArray, FloatArray, IntArray
+from acl_gym.utils.vector_envs import require_vector_env
 
 
 class Step(NamedTuple):
@@ -41,17 +42,27 @@ class Step(NamedTuple):
 
 
 class _Record:
-    """Observations, actions and stage costs of all slots, step by step."""
+    """Observations, actions and stage costs of all slots, step by step.
 
-    def __init__(self, observation: NDArray[Any]) -> None:
-        self.observations = [observation]
+    Args:
+        observation: the first ones.
+        fresh: whether every observation is an array of its own. Other environments may
+            write the next one to the same array, so that each is copied.
+    """
+
+    def __init__(self, observation: NDArray[Any], fresh: bool) -> None:
+        self._fresh = fresh
+        self.observations = [observation if fresh else observation.copy()]
         self.actions: list[IntArray] = []
         self.costs: list[FloatArray] = []
 
-    def append(self, observation: NDArray[Any], actions: IntArray, reward: Any) -> None:
-        self.observations.append(observation)
+    def append(
+        self, observation: NDArray[Any], actions: IntArray, reward: FloatArray
+    ) -> None:
+        """Add a step; the last two arguments are new arrays, or copied."""
+        self.observations.append(observation if self._fresh else observation.copy())
         self.actions.append(actions)
-        self.costs.append(-np.asarray(reward, dtype=np.float64))
+        self.costs.append(-reward)
 
 
 class Rollout:
@@ -68,8 +79,12 @@ class Rollout:
         env: any vector environment with `Discrete` actions.
         max_steps: T, >= 1.
 
+    What the environment returns is held against the number of slots, see
+    `acl_gym.envs.received`, and copied where it is kept.
+
     Attributes:
-        ants: the slots that are still walking.
+        num_envs: the number of slots, which must not change.
+        ants: the slots that are still walking, read-only.
         cost: J of each slot so far, the sum of its stage costs.
         length: steps of each slot so far.
         terminated: whether the episode of each slot has ended in a terminal state.
@@ -95,22 +110,40 @@ class Rollout:
         self.n_actions = int(space.n)
         self._asks_to_wait = isinstance(env.unwrapped, ControlVectorEnv)
         self._waits = isinstance(env.unwrapped, (ControlVectorEnv, WaitingVectorEnv))
-        self._mode = AutoresetMode(
-            env.metadata.get("autoreset_mode", AutoresetMode.NEXT_STEP)
-        )
-        self._actions = np.full(env.num_envs, space.start, dtype=np.int64)
+        # Wrappers may reuse arrays, our own environments do not.
+        self._fresh = isinstance(env, ControlVectorEnv)
+        self._mode = received.autoreset_mode_of(env)
+        self._n_slots = validation.integer("env.num_envs", env.num_envs, at_least=1)
+        self._actions = np.full(self._n_slots, space.start, dtype=np.int64)
         self.first_action = int(space.start)
-        self._all = np.arange(env.num_envs)
+        self._all = _fixed(np.arange(self._n_slots))
         self._stale: BoolArray | None = None  # slots to reset before the next step
-        self.action_mask: BoolArray | None = None
+        self._mask: BoolArray | None = None
+        self._ants = self._all
         self._reported_success: BoolArray | None = None
+        self._stepping = False
+
+    @property
+    def num_envs(self) -> int:
+        """The number of slots."""
+        return self._n_slots
+
+    @property
+    def ants(self) -> IntArray:
+        """The slots that are still walking, `(m,)`, read-only."""
+        return self._ants
+
+    @property
+    def action_mask(self) -> BoolArray | None:
+        """Which actions each slot may take now, `(num_envs, n_actions)`; None: all."""
+        return self._mask
 
     def start(
         self,
         seed: int | None = None,
         states: FloatArray | None = None,
         record: bool = False,
-    ) -> NDArray[Any]:
+    ) -> Any:
         """Begin an episode in every slot.
 
         Args:
@@ -120,27 +153,38 @@ class Rollout:
             record: keep every step for `episodes`.
 
         Returns:
-            The first observations, `(num_envs, ...)`.
+            The first observations, `(num_envs, ...)`; of a Dict or Tuple space a dict
+            or tuple of such arrays.
+
+        Raises:
+            TypeError: `seed` is not an integer.
+            ValueError: it is negative, or the environment does not return what it
+                should.
         """
+        self._check_idle("start")
+        seed, n = validation.seed(seed), self.num_envs
         options: dict[str, Any] = {}
         if self._asks_to_wait:
             options |= {"finished": "wait", "max_steps": self.max_steps}
         if states is not None:
             options["state"] = states
-        observation, infos = self.env.reset(
-            seed=validation.seed(seed), options=options or None
+        observation, infos = received.parts(
+            "reset", self.env.reset(seed=seed, options=options or None), 2
         )
-        n = self.env.num_envs
-        self._read_mask(infos)
-        self.ants = self._all
+        observation = received.observations(observation, n)
+        self._read_mask(received.infos(infos, n))
+        self._ants = self._all
         self.cost = np.zeros(n)
         self.length = np.zeros(n, dtype=np.int64)
         self.terminated = np.zeros(n, dtype=np.bool_)
         self._reported_success = None
+        # Those that kernels change.
+        self._totals = self.cost, self.length, self.terminated
         self.steps = 0
         self._stale = None
-        observation = np.asarray(observation)
-        self._record: _Record | None = _Record(observation) if record else None
+        if record:
+            _require_array(observation)
+        self._record = _Record(observation, self._fresh) if record else None
         return observation
 
     def step(self, actions: IntArray) -> Step:
@@ -153,32 +197,55 @@ class Rollout:
             The outcome of the step. Ants that have finished are removed from `ants`.
 
         Raises:
-            ValueError: a reward is NaN or infinite.
+            ValueError: the actions are not one for each of `ants`; a reward is NaN or
+                infinite; or the environment does not return what it should.
         """
+        self._check_idle("step")
         ants = self.ants
+        m, n = ants.size, self.num_envs
+        if type(actions) is not np.ndarray:
+            actions = np.asarray(actions)
+        if actions.shape != ants.shape or actions.dtype.kind not in "iu":
+            raise ValueError(
+                f"actions must be integers of shape ({m},), one for each ant that "
+                f"walks, got {actions.dtype} in shape {actions.shape}."
+            )
+        if actions.dtype != np.int64:
+            actions = actions.astype(np.int64)
         if self._stale is not None:
             reset_slots(self.env, self._stale)
             self._stale = None
-        _spread(ants, actions, self.first_action, self._actions)
+        bad = _spread(ants, actions, self.first_action, self.n_actions, self._actions)
+        if bad >= 0:
+            raise ValueError(
+                f"actions must lie in 0..{self.n_actions - 1}, got {actions[bad]} in "
+                f"slot {ants[bad]}."
+            )
         # A copy, because an environment or a wrapper may keep its actions.
-        observation, reward, terminated, truncated, infos = self.env.step(
-            self._actions.copy()
+        self._stepping = True
+        try:
+            given = self.env.step(self._actions.copy())
+        finally:
+            self._stepping = False
+        observation, reward, terminated, truncated, infos = received.parts(
+            "step", given, 5
         )
-        observation = np.asarray(observation)
+        observation = received.observations(observation, n)
+        reward = received.rewards(reward, n)
+        terminated = received.flags("terminated", terminated, n)
+        truncated = received.flags("truncated", truncated, n)
+        infos = received.infos(infos, n)
         self._read_mask(infos)
         self.steps += 1
 
-        m = ants.size
         cost, left = np.empty(m), np.empty(m, np.int64)
         reached, stopped = np.empty(m, np.bool_), np.empty(m, np.bool_)
         n_left, bad = _account(
             ants,
-            np.asarray(reward, dtype=np.float64),
-            np.asarray(terminated, dtype=np.bool_),
-            np.asarray(truncated, dtype=np.bool_),
-            self.cost,
-            self.length,
-            self.terminated,
+            reward,
+            terminated,
+            truncated,
+            *self._totals,
             cost,
             reached,
             stopped,
@@ -196,11 +263,11 @@ class Rollout:
             done = np.logical_or(terminated, truncated)
             self._stale = done if done.any() else None
         if n_left < m:
-            self.ants = left[:n_left]
+            self._ants = _fixed(left[:n_left])
             if self._mode is AutoresetMode.SAME_STEP and not self._waits:
                 observation = self._last_seen(ants[stopped], observation, infos)
         if self.steps >= self.max_steps:
-            self.ants = ants[:0]
+            self._ants = ants[:0]
             stopped = np.ones_like(stopped)
         if self._record is not None:
             self._record.append(observation, self._actions - self.first_action, reward)
@@ -217,12 +284,19 @@ class Rollout:
             raise ValueError(
                 "no steps were recorded; call start(record=True), then step."
             )
+        if len({(seen.shape, seen.dtype.kind) for seen in record.observations}) > 1:
+            shapes = sorted({str(seen.shape) for seen in record.observations})
+            raise ValueError(
+                "observations must have the same shape and type in every step, got "
+                f"shapes {', '.join(shapes)}; check the environment's step and reset."
+            )
+        # Read-only, because a cost or an update rule of a user's own sees them.
         return Episodes(
-            np.stack(record.observations),
-            np.stack(record.actions),
-            np.stack(record.costs),
-            self.length,
-            self.terminated,
+            _fixed(np.stack(record.observations)),
+            _fixed(np.stack(record.actions)),
+            _fixed(np.stack(record.costs)),
+            validation.read_only(self.length),
+            validation.read_only(self.terminated),
         )
 
     @property
@@ -261,77 +335,131 @@ class Rollout:
             )
         return allowed
 
-    def _note_success(self, infos: dict[str, Any], ants: IntArray) -> None:
+    def _note_success(self, infos: Any, ants: IntArray) -> None:
         """Take over what the infos of a step say of the ants that took it."""
         # Where slots are reset in the same step, the infos of their ends come last.
-        for part in (infos, infos.get("final_info")) if infos else ():
-            told = part.get("is_success") if part else None
+        final = infos.get("final_info")
+        for part in (infos, received.infos(final, self.num_envs)) if infos else ():
+            told = received.success(part, self.num_envs)
             if told is None:
                 continue
+            success, given = told
             if self._reported_success is None:
-                self._reported_success = np.zeros(self.env.num_envs, dtype=np.bool_)
-            given = np.asarray(part.get("_is_success", True), dtype=np.bool_)
-            noted = ants[np.broadcast_to(given, self._reported_success.shape)[ants]]
-            self._reported_success[noted] = np.asarray(told)[noted] != 0
+                self._reported_success = np.zeros(self.num_envs, dtype=np.bool_)
+            noted = ants[given[ants]]
+            self._reported_success[noted] = success[noted]
 
-    def _read_mask(self, infos: dict[str, Any]) -> None:
-        mask = infos.get("action_mask") if infos else None
-        if mask is None:
-            self.action_mask = None
-            return
-        mask = np.array(mask)
-        shape = (self.env.num_envs, self.n_actions)
-        if mask.shape != shape or mask.dtype.kind not in "biuf":
-            raise ValueError(
-                f"infos['action_mask'] must have shape {shape}, one row per slot, got "
-                f"{mask.shape} of {mask.dtype}."
+    def _check_idle(self, what: str) -> None:
+        """Refuse calls from within `env.step`, which would disturb the step."""
+        if self._stepping:
+            raise RuntimeError(
+                f"{what} must not be called while the environment makes a step; let "
+                "env.step return first."
             )
-        self.action_mask = mask != 0
-        # A slot without a mask may take any action.
-        given = infos.get("_action_mask")
-        if given is not None:
-            self.action_mask |= ~np.asarray(given, dtype=np.bool_)[:, None]
 
-    def _last_seen(
-        self, stopped: IntArray, observation: NDArray[Any], infos: dict[str, Any]
-    ) -> NDArray[Any]:
+    def _read_mask(self, infos: Any) -> None:
+        """Take the action masks from checked infos."""
+        self._mask = received.action_mask(infos, self.num_envs, self.n_actions)
+
+    def _last_seen(self, stopped: IntArray, observation: Any, infos: Any) -> Any:
         """Observations; where an episode has just ended, its final observation."""
-        observation = observation.copy()
+        final = infos.get("final_obs")
+        if final is None or len(final) != self.num_envs:
+            raise ValueError(
+                "infos['final_obs'] must hold the last observation of each slot that has "
+                f"finished, as autoreset in the same step asks for, got {list(infos)}; "
+                'check the environment, or make it with autoreset_mode="NextStep".'
+            )
+        if isinstance(observation, dict):
+            shown = {key: part.copy() for key, part in observation.items()}
+        else:
+            shown = observation.copy()
         for slot in stopped:
-            observation[slot] = infos["final_obs"][slot]
+            _set_row(shown, int(slot), final[slot])
         if self.action_mask is not None:
             # The mask already belongs to the next episode.
-            final = infos.get("final_info", {}).get("action_mask")
-            self.action_mask[stopped] = True if final is None else final[stopped] != 0
-        return observation
+            last = received.infos(infos.get("final_info"), self.num_envs)
+            allowed = received.action_mask(last, self.num_envs, self.n_actions)
+            self.action_mask[stopped] = True if allowed is None else allowed[stopped]
+        return shown
 
 
-def require_vector_env(env: Any) -> None:
-    """Check that `env` is a vector environment.
+def rows_of(observation: Any, slots: IntArray) -> Any:
+    """The observations of some slots, copied; of dicts and tuples part by part."""
+    if isinstance(observation, dict):
+        return {key: rows_of(part, slots) for key, part in observation.items()}
+    if isinstance(observation, tuple):
+        return tuple(rows_of(part, slots) for part in observation)
+    return observation[slots]
+
+
+def _set_row(observation: Any, slot: int, row: Any) -> None:
+    """Replace the observation of one slot.
 
     Raises:
-        TypeError: `env` is not a `gymnasium.vector.VectorEnv`.
+        ValueError: `row` is not an observation of the same shape and kind.
     """
-    if not isinstance(env, VectorEnv):
-        remedy = "make it with gym.make_vec(id, num_envs=...)"
-        if isinstance(env, gym.Env):
-            remedy += " or wrap it in gym.vector.SyncVectorEnv([lambda: env])"
-        raise TypeError(
-            "env must be a gymnasium.vector.VectorEnv, got "
-            f"{type(env).__name__}; {remedy}."
+    if isinstance(observation, dict):
+        if not isinstance(row, dict) or set(row) != set(observation):
+            raise _not_final(slot, f"the keys {sorted(observation)}", row)
+        for key, part in observation.items():
+            _set_row(part, slot, row[key])
+        return
+    array = validation.as_array(row)
+    shape = observation.shape[1:]
+    if (
+        array is None
+        or array.shape != shape
+        or not np.can_cast(array.dtype, observation.dtype, "same_kind")
+    ):
+        raise _not_final(slot, f"shape {shape} and type {observation.dtype}", row)
+    observation[slot] = array
+
+
+def _not_final(slot: int, expected: str, row: Any) -> ValueError:
+    return ValueError(
+        f"infos['final_obs'] must have {expected} in slot {slot}, got "
+        f"{validation.shown(row)}; check the environment's step."
+    )
+
+
+def _require_array(observation: Any) -> None:
+    if not isinstance(observation, np.ndarray):
+        raise ValueError(
+            "a cost of complete solutions needs observations that are arrays, got "
+            f"{validation.shown(observation)}; leave the cost out, or flatten them with "
+            "gymnasium.wrappers.vector.FlattenObservation."
         )
 
 
-@njit(cache=True)
+def _fixed(array: NDArray[Any]) -> NDArray[Any]:
+    """The same new array, which from now on cannot be written to."""
+    array.flags.writeable = False
+    return array
+
+
+@njit
 def _spread(
-    ants: IntArray, actions: IntArray, first_action: int, all_actions: IntArray
-) -> None:
-    """Write the actions of the walking ants into the array of all slots."""
+    ants: IntArray,
+    actions: IntArray,
+    first_action: int,
+    n_actions: int,
+    all_actions: IntArray,
+) -> int:
+    """Write the actions of the walking ants into the array of all slots.
+
+    Returns:
+        The first ant whose action is not in 0..n_actions - 1, or -1; after it, nothing
+        is written.
+    """
     for j in range(ants.size):
+        if not 0 <= actions[j] < n_actions:
+            return j
         all_actions[np.uint64(ants[j])] = actions[j] + first_action
+    return -1
 
 
-@njit(cache=True)
+@njit
 def _account(
     ants: IntArray,
     reward: FloatArray,

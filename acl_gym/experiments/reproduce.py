@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 import os
 from collections.abc import Sequence
 from pathlib import Path
@@ -20,9 +21,17 @@ from acl_gym.experiments.store import Job, Store
 from acl_gym.experiments.study import Experiment
 from acl_gym.experiments.thesis import CLAIMS, RUNS
 from acl_gym.experiments.thesis.common import FEWER
-from acl_gym.utils.files import write_atomically
-from acl_gym.utils.hashing import hashed
+from acl_gym.utils.files import remove_stale, write_atomically
+from acl_gym.utils.hashing import (
+    checksum_fits,
+    digest,
+    hashed,
+    with_checksum,
+    without_checksum,
+)
 from acl_gym.utils.validation import one_of
+
+logger = logging.getLogger("acl_gym")
 
 __all__ = ["EXECUTORS", "RUNS", "without_curves"]
 
@@ -90,6 +99,7 @@ def reproduce(
     Raises:
         ValueError: there is no experiment of a name.
         RunFailedError: a run failed; the others are kept.
+        FigureFailedError: a figure failed; results and report are written without it.
         FolderInUseError: another run works on `directory`.
     """
     experiments = chosen(names)
@@ -118,22 +128,19 @@ def reproduce(
             "made": circumstances(workers),
         }
         _clear(directory)
-        write_atomically(directory / RESULTS, json.dumps(made).encode())
+        write_atomically(directory / RESULTS, json.dumps(with_checksum(made)).encode())
         _write_rows(directory / ROWS, experiments, results)
         if figures:
             (directory / _FIGURES).mkdir(exist_ok=True)
-            for each in experiments:
-                with console.status(f"Drawing {each.name}"):
-                    plots.save(each, results, directory / _FIGURES)
-            if any(each.name == ANIMATED for each in experiments):
-                with console.status("Drawing the animation"):
-                    plots.write_animation(directory / _FIGURES / ANIMATION)
-            write_pages(directory)
-        files = [
-            path.relative_to(directory).as_posix()
-            for path in _generated_files(directory)
-        ]
-        finished = {"stamp": stamp, "files": files}
+            with plots.drawing(directory) as draw:
+                for each in experiments:
+                    with console.status(f"Drawing {each.name}"):
+                        draw(plots.save, each, results, directory / _FIGURES)
+                if any(each.name == ANIMATED for each in experiments):
+                    with console.status("Drawing the animation"):
+                        draw(plots.write_animation, directory / _FIGURES / ANIMATION)
+                write_pages(directory)
+        finished = {"stamp": stamp, "files": _digests(directory, jobs)}
         write_atomically(directory / _FINISHED, json.dumps(finished).encode())
     return made, False
 
@@ -189,12 +196,17 @@ def read_outcome(directory: Path) -> Outcome:
         found = dict(json.loads(path.read_text(encoding="utf-8")))
         if not {"claims", "experiments", "runs", "made", "runs_made"} <= found.keys():
             raise KeyError
-    except (ValueError, TypeError, KeyError) as error:
+    except (ValueError, TypeError, KeyError, RecursionError) as error:
         raise ValueError(
             f"{path} is not the result of a reproduction by this version; make it again "
             "with `acl-gym reproduce`, which takes the runs that are there."
         ) from error
-    return found
+    if not checksum_fits(found):
+        raise ValueError(
+            f"{path} must be as it was written, but was damaged or edited since; make it "
+            "again with `acl-gym reproduce`, which takes the runs that are there."
+        )
+    return without_checksum(found)
 
 
 def write_pages(directory: Path) -> Path:
@@ -245,16 +257,33 @@ def _finished(
     """The outcome in a folder if all of it is there, made from this; None otherwise."""
     try:
         known = json.loads((directory / _FINISHED).read_text(encoding="utf-8"))
-        complete = (
-            known["stamp"] == stamp
-            and all((directory / file).is_file() for file in known["files"])
-            and (PAGE in known["files"] or not figures)
-        )
-        found = read_outcome(directory)
-    except (OSError, ValueError, KeyError, TypeError):
+        if known["stamp"] != stamp or (figures and PAGE not in known["files"]):
+            return None
+        now = _digests(directory, jobs)
+        changed = [
+            name for name in known["files"] if known["files"][name] != now.get(name)
+        ]
+        if not changed:
+            return read_outcome(directory)
+    except (AttributeError, OSError, ValueError, KeyError, TypeError, RecursionError):
         return None
+    logger.warning(
+        "%d of %d files in %s, %s among them, are missing, damaged or edited since they "
+        "were written; they are made again.",
+        *(len(changed), len(known["files"]), directory, changed[0]),
+    )
+    return None
+
+
+def _digests(directory: Path, jobs: Sequence[Job]) -> dict[str, str]:
+    """A checksum for each file that a folder consists of when all is done."""
     store = Store(directory / _KEPT_RUNS)
-    return found if complete and all(store.has(job) for job in jobs) else None
+    files = [directory / RESULTS, *_generated_files(directory), *map(store.path, jobs)]
+    return {
+        path.relative_to(directory).as_posix(): digest(path)
+        for path in files
+        if path.is_file()
+    }
 
 
 def _stamp(jobs: Sequence[Job]) -> str:
@@ -275,10 +304,11 @@ def _clear(directory: Path) -> None:
     old = [
         directory / _FINISHED,
         *_generated_files(directory),
-        *directory.rglob(".*.tmp"),
     ]
     for path in old:
         path.unlink(missing_ok=True)
+    for folder in (directory, directory / _FIGURES):
+        remove_stale(folder)
 
 
 def _generated_files(directory: Path) -> list[Path]:

@@ -27,6 +27,7 @@ from acl_gym.experiments.methods import warm_up
 from acl_gym.experiments.results import Results, Run
 from acl_gym.experiments.store import Job, Store
 from acl_gym.experiments.study import Study
+from acl_gym.utils.files import remove_stale
 
 logger = logging.getLogger("acl_gym")
 
@@ -63,8 +64,7 @@ def run_studies(
     console = console or Console(quiet=True)
     store = Store(directory)
     with exclusive_lock(directory):
-        for half in directory.glob(".*.tmp"):
-            half.unlink()  # of a runner that was killed while it wrote
+        remove_stale(directory)  # of a runner that was killed while it wrote
         runs: dict[str, Run | None] = {job.name: store.read(job) for job in jobs}
         missing = [job for job in jobs if runs[job.name] is None]
         unusable = sum(store.path(job).exists() for job in missing)

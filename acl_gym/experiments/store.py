@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import io
 import json
 from dataclasses import dataclass
@@ -19,12 +20,23 @@ from acl_gym.experiments.results import Run
 from acl_gym.experiments.study import Study
 from acl_gym.utils.files import write_atomically
 from acl_gym.utils.hashing import hashed
+from acl_gym.utils.typing import FloatArray
 
 _METADATA = b"acl_gym"
 _TABLE = "table"
 
-# A file that is not there, is cut short, or is somebody else's.
-_UNREADABLE = (OSError, KeyError, ValueError, TypeError, pa.ArrowException)
+# A file that is not there, is cut short or damaged, or is somebody else's.
+_UNREADABLE = (
+    ArithmeticError,
+    AttributeError,
+    LookupError,
+    MemoryError,
+    OSError,
+    RecursionError,
+    TypeError,
+    ValueError,
+    pa.ArrowException,
+)
 
 
 @dataclass(frozen=True)
@@ -52,7 +64,8 @@ class Store:
 
     Its rows are the evaluations, its columns the measures; the last row holds the
     table as well. All else is JSON in the metadata of the schema, under `acl_gym`: the
-    key, the study, the seed, seconds, failure, and where and when the run was made.
+    key, the study, the seed, seconds, failure, where and when the run was made, and a
+    checksum over all of this, rows and table included.
 
     Attributes:
         directory: where they are.
@@ -88,6 +101,8 @@ class Store:
                     if name != _TABLE
                 }
             )
+            if known.pop("checksum") != _checksum(known, rows, table):
+                return None
             return Run(
                 rows, table, known["seconds"], known["failure"], job.seed, known["made"]
             )
@@ -96,6 +111,7 @@ class Store:
 
     def write(self, job: Job, run: Run, made: dict[str, Any]) -> None:
         """Write a run atomically."""
+        table = np.asarray(run.table)
         metadata = {
             "key": job.key,
             "study": job.study.inputs,
@@ -104,14 +120,26 @@ class Store:
             "failure": run.failure,
             "made": made,
         }
+        metadata["checksum"] = _checksum(metadata, run.rows, table)
         columns: dict[str, Any] = {
             name: pa.array(run.rows[name].to_numpy()) for name in run.rows.columns
         }
-        table = [None] * (len(run.rows) - 1) + [np.asarray(run.table)]
-        columns[_TABLE] = pa.array(table, type=pa.list_(pa.float64()))
+        cells = [None] * (len(run.rows) - 1) + [table]
+        columns[_TABLE] = pa.array(cells, type=pa.list_(pa.float64()))
         content = pa.table(columns).replace_schema_metadata(
             {_METADATA: json.dumps(metadata)}
         )
         buffer = io.BytesIO()
         pq.write_table(content, buffer, compression="zstd")
         write_atomically(self.path(job), buffer.getvalue())
+
+
+def _checksum(metadata: dict[str, Any], rows: pd.DataFrame, table: FloatArray) -> str:
+    """A checksum over all that a run consists of.
+
+    Parquet has none of its own here: a flipped bit would be read as another number.
+    """
+    numbers = [rows[name].to_numpy().astype(np.float64) for name in rows.columns]
+    numbers.append(table.astype(np.float64))
+    digests = [hashlib.sha256(each.tobytes()).hexdigest() for each in numbers]
+    return hashed([json.loads(json.dumps(metadata)), list(rows.columns), digests])

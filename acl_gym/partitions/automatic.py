@@ -10,14 +10,14 @@ import numpy as np
 from gymnasium import spaces
 from gymnasium.vector import VectorWrapper
 
-from acl_gym.envs.control.environments import ControlVectorEnv
-from acl_gym.envs.control.single import ControlEnv
+from acl_gym.envs.control.lookup import system_of
 from acl_gym.envs.control.system import ControlSystem
 from acl_gym.envs.wrappers.perturbations import HiddenVariables
 from acl_gym.partitions.base import Partition
 from acl_gym.partitions.bounds import Env, complete_bounds, observation_space, real_box
 from acl_gym.partitions.discrete import FINITE_SPACES, Discrete
 from acl_gym.partitions.grid import Fuzzy, Grid, checked_kind
+from acl_gym.utils import validation
 from acl_gym.utils.typing import FloatArray
 
 CENTRES = {1: 101, 2: 41, 3: 15, 4: 7, 5: 5, 6: 3}
@@ -49,7 +49,7 @@ def thesis_partition(
     """
     space = observation_space(env)
     checked_kind(kind)
-    system = _system(env)
+    system = system_of(env)
     if system is None:
         raise TypeError(
             f"env must be a control environment of this package, got {env}; use "
@@ -59,7 +59,7 @@ def thesis_partition(
         if cells is not None:
             raise ValueError(
                 "cells must be None where observations are cells already, got "
-                f"{cells!r} for {space}."
+                f"{validation.shown(cells)} for {space}."
             )
         return Discrete.from_space(space)
     shown = _shown_variables(env, system)
@@ -141,11 +141,11 @@ def automatic_partition(
         if cells is not None or bounds is not None:
             raise ValueError(
                 "cells and bounds must be None where observations are cells already, "
-                f"got cells={cells!r} and bounds={bounds!r} for {space}."
+                f"got cells={validation.shown(cells)} and bounds={validation.shown(bounds)} for {space}."
             )
         return Discrete.from_space(space)
     box = real_box(space)
-    system = _system(env)
+    system = system_of(env)
     if system is not None and system.observation_space != space:
         system = None  # a wrapper has changed what is observed
     if cells is None and bounds is None and system is not None:
@@ -174,16 +174,6 @@ def _centres(dimensions: int) -> int:
             "each variable that does not matter."
         )
     return CENTRES[dimensions]
-
-
-def _system(env: Any) -> ControlSystem | None:
-    """The system of an environment of this package, None for any other."""
-    base = env.unwrapped
-    if isinstance(base, gym.vector.SyncVectorEnv):
-        base = base.envs[0].unwrapped
-    if not isinstance(base, (ControlEnv, ControlVectorEnv)):
-        return None
-    return base.system
 
 
 def _shown_variables(env: Any, system: ControlSystem) -> list[int]:

@@ -11,13 +11,12 @@ import numpy as np
 from gymnasium import spaces
 from gymnasium.vector import AutoresetMode, VectorEnv
 
+from acl_gym.envs import received
 from acl_gym.utils import validation
+from acl_gym.utils.boxes import declared_bounds
 from acl_gym.utils.typing import FloatArray
 
 Env = gym.Env[Any, Any] | VectorEnv[Any, Any, Any]
-
-INFINITE = 1e30
-"""A larger bound counts as none: some spaces use the largest float for infinity."""
 
 MARGIN = 0.25
 """`estimate_bounds` widens the observed range by this share of it on either side."""
@@ -54,11 +53,21 @@ def estimate_bounds(env: Env, random_steps: int, seed: int = 0) -> Bounds:
     dimensions = real_box(observation_space(env)).low.size
     slots = env.num_envs if isinstance(env, VectorEnv) else 1
     validation.integer("random_steps", random_steps, at_least=slots)
-    seed = validation.integer("seed", seed, at_least=0)
+    seed = validation.integer("seed", seed, at_least=0, at_most=None)
     step = _vector_steps if isinstance(env, VectorEnv) else _single_steps
     low, high = np.full(dimensions, np.inf), np.full(dimensions, -np.inf)
     for seen in step(env, random_steps // slots, seed):
-        states = np.asarray(seen, dtype=np.float64)
+        states = validation.as_array(seen)
+        if (
+            states is None
+            or states.dtype.kind not in "biuf"
+            or states.shape[1:] != (dimensions,)
+        ):
+            raise ValueError(
+                f"observations must be rows of {dimensions} real numbers, got "
+                f"{validation.shown(seen)}; check the environment."
+            )
+        states = states.astype(np.float64)
         if not np.isfinite(states).all():
             raise ValueError(
                 "observations must be finite, got "
@@ -85,19 +94,24 @@ def _single_steps(env: Any, steps: int, seed: int) -> Any:
 
 def _vector_steps(env: Any, steps: int, seed: int) -> Any:
     """Yield what is observed, `(m, d)`, in any autoreset mode."""
-    mode = env.metadata.get("autoreset_mode", AutoresetMode.NEXT_STEP)
+    mode, n = received.autoreset_mode_of(env), env.num_envs
     actions = copy.deepcopy(env.action_space)
     actions.seed(seed)
-    yield env.reset(seed=seed)[0]
+    yield received.observations(env.reset(seed=seed)[0], n)
     for _ in range(steps):
-        observation, _, terminated, truncated, infos = env.step(actions.sample())
-        yield observation
-        done = np.logical_or(terminated, truncated)
+        observation, _, terminated, truncated, infos = received.parts(
+            "step", env.step(actions.sample()), 5
+        )
+        yield received.observations(observation, n)
+        done = received.flags("terminated", terminated, n) | received.flags(
+            "truncated", truncated, n
+        )
         if not done.any():
             continue
-        if "final_obs" in infos:
-            yield np.stack(infos["final_obs"][done])
-        if AutoresetMode(mode) is AutoresetMode.DISABLED:
+        final = received.infos(infos, n).get("final_obs")
+        if final is not None:
+            yield [final[slot] for slot in np.flatnonzero(done)]
+        if mode is AutoresetMode.DISABLED:
             yield env.reset(options={"reset_mask": done})[0]
 
 
@@ -113,10 +127,10 @@ def complete_bounds(
 
     See `automatic_partition` for the arguments and errors.
     """
-    low, high = space.low.astype(np.float64), space.high.astype(np.float64)
+    low, high = declared_bounds(space)
     for axis, pair in _checked_bounds(bounds, low.size, circular).items():
         low[axis], high[axis] = pair
-    no_low, no_high = low < -INFINITE, high > INFINITE
+    no_low, no_high = np.isinf(low), np.isinf(high)
     unbounded = np.flatnonzero(no_low | no_high)
     if not unbounded.size:
         return Bounds(low, high)
@@ -146,7 +160,7 @@ def _checked_bounds(
     if not isinstance(bounds, Mapping):
         raise TypeError(
             "bounds must map variables to pairs (low, high), got "
-            f"{bounds!r}; write bounds={{0: (-1.0, 1.0)}}."
+            f"{validation.shown(bounds)}; write bounds={{0: (-1.0, 1.0)}}."
         )
     pairs = {}
     for axis, pair in bounds.items():
@@ -162,7 +176,7 @@ def _checked_bounds(
         ends = validation.real_array(f"bounds[{axis}]", pair, ndim=1)
         if ends.size != 2 or ends[0] >= ends[1]:
             raise ValueError(
-                f"bounds[{axis}] must be (low, high) with low < high, got {pair!r}."
+                f"bounds[{axis}] must be (low, high) with low < high, got {validation.shown(pair)}."
             )
         pairs[int(axis)] = (float(ends[0]), float(ends[1]))
     return pairs

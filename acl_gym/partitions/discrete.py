@@ -2,21 +2,34 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any, Self
 
 import numpy as np
 from gymnasium import spaces
 from numpy.typing import ArrayLike, NDArray
 
-from acl_gym.partitions.base import Partition
-from acl_gym.partitions.kernels import locate_discrete
+from acl_gym.partitions.base import (
+    MOST_CELLS,
+    FixedPartition,
+    check_memory_of_states,
+    check_states,
+    check_targets,
+    trusted,
+)
+from acl_gym.partitions.kernels import OUTSIDE, locate_discrete
+from acl_gym.utils import validation
 from acl_gym.utils.typing import CellArray, FloatArray, IntArray
 
 _MOST_START = 2**52
 """Starts up to this, plus sizes, are exact as floats, in which states may be given."""
 
+_MOST_LISTED = 8
+"""Variables whose values are listed in a line."""
 
-class Discrete(Partition):
+
+@trusted
+class Discrete(FixedPartition):
     """One cell for each value, or combination of values, of integer states (§3.2).
 
     A state is an array of integers, variable i among `starts[i]`, ..., `starts[i] +
@@ -39,27 +52,38 @@ class Discrete(Partition):
             or more.
     """
 
-    checked = True
-    cells_per_state = 1
+    _fixed = (
+        "sizes",
+        "starts",
+        "n_cells",
+        "cells_per_state",
+        "state_ndim",
+        "_flat_sizes",
+        "_flat_starts",
+    )
 
     def __init__(self, sizes: ArrayLike, starts: ArrayLike = 0) -> None:
-        self.sizes = _integers("sizes", sizes, 1, np.iinfo(np.int64).max)
+        self.sizes = validation.read_only(
+            _integers("sizes", sizes, 1, np.iinfo(np.int64).max)
+        )
         starts = _integers("starts", starts, -_MOST_START, _MOST_START)
         if starts.shape not in ((), self.sizes.shape):
             raise ValueError(
                 f"starts must be an integer or have the shape of sizes, "
                 f"{self.sizes.shape}, got shape {starts.shape}."
             )
-        self.starts = np.full(self.sizes.shape, starts)
+        self.starts = validation.read_only(np.full(self.sizes.shape, starts))
+        self.cells_per_state = 1
         self.state_ndim = self.sizes.ndim
-        self.n_cells = int(np.prod(self.sizes.astype(object)))
-        if self.n_cells > np.iinfo(np.int32).max:
+        self.n_cells = math.prod(self.sizes.ravel().tolist())
+        if self.n_cells > MOST_CELLS:
             raise ValueError(
                 f"a partition must have fewer than 2^31 cells, got {self.n_cells}; "
                 "leave out variables, or merge values of them."
             )
-        self._flat_sizes = self.sizes.ravel()
-        self._flat_starts = self.starts.ravel()
+        # Copies of their own, which kernels rely on.
+        self._flat_sizes = self.sizes.flatten()
+        self._flat_starts = self.starts.flatten()
 
     @classmethod
     def from_space(cls, space: spaces.Space[Any]) -> Self:
@@ -101,14 +125,18 @@ class Discrete(Partition):
     ) -> None:
         """See `Partition.locate`; int64 and float64 states are not copied."""
         shape = self.sizes.shape
+        check_states(states)
         if states.ndim == 0 or states.shape[1:] != shape:
             wanted = ", ".join(["n", *map(str, shape)]) + ("" if shape else ",")
             raise ValueError(f"states must have shape ({wanted}), got {states.shape}.")
+        check_targets(slots, index, degree, 1)
         if states.dtype != np.int64 and states.dtype != np.float64:
             states = _as_numbers(states)
         flat = states.reshape(len(states), self._flat_sizes.size)
         sizes, starts = self._flat_sizes, self._flat_starts
         bad, axis = locate_discrete(flat, slots, sizes, starts, index, degree)
+        if bad == OUTSIDE:
+            raise ValueError(f"slots must be rows of the {len(states)} states.")
         if bad >= 0:
             variable = f", variable {axis}" if shape else ""
             raise ValueError(
@@ -118,7 +146,12 @@ class Discrete(Partition):
             )
 
     def cell_states(self) -> IntArray:
-        """The state of each cell, int64 `(n_cells, ...)`, as observed."""
+        """The state of each cell, int64 `(n_cells, ...)`, as observed.
+
+        Raises:
+            ValueError: they do not fit into memory.
+        """
+        check_memory_of_states(self.n_cells, self._flat_sizes.size)
         variables = np.unravel_index(np.arange(self.n_cells), self._flat_sizes)
         states: IntArray = np.stack(variables, axis=-1) + self._flat_starts
         return states.reshape(self.n_cells, *self.sizes.shape)
@@ -131,8 +164,17 @@ class Discrete(Partition):
             "starts": self.starts.tolist(),
         }
 
+    def _variables(self) -> list[tuple[Any, ...]]:
+        pairs = zip(self.sizes.ravel(), self.starts.ravel(), strict=True)
+        return [
+            (i + 1, size, start, start + size - 1, "")
+            for i, (size, start) in enumerate(pairs)
+        ]
+
     def __repr__(self) -> str:
         """Name, values of each variable, and where they do not start at 0."""
+        if self.sizes.size > _MOST_LISTED:
+            return f"Discrete({self.sizes.size} variables, {self.n_cells} cells)"
         starts = f", starts={self.starts.tolist()}" if self.starts.any() else ""
         return f"Discrete({self.sizes.tolist()}{starts})"
 
@@ -155,12 +197,10 @@ def _sizes_and_starts(space: spaces.Space[Any]) -> tuple[ArrayLike, ArrayLike]:
 
 
 def _integers(name: str, values: ArrayLike, lowest: int, highest: int) -> IntArray:
-    try:
-        array = np.asarray(values)
-    except ValueError:  # ragged
-        array = np.empty(0)
+    array = validation.as_array(values)
     if (
-        array.dtype.kind not in "iu"
+        array is None
+        or array.dtype.kind not in "iu"
         or array.size == 0
         or array.min() < lowest
         or array.max() > highest
@@ -168,7 +208,7 @@ def _integers(name: str, values: ArrayLike, lowest: int, highest: int) -> IntArr
         bounds = f">= {lowest}" if highest > _MOST_START else f"within +-{highest}"
         raise ValueError(
             f"{name} must be an integer or an array of integers, each {bounds}, got "
-            f"{values!r}."
+            f"{validation.shown(values)}."
         )
     return array.astype(np.int64)
 

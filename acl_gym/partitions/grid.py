@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from numbers import Integral
 from typing import Any, ClassVar, Self
@@ -10,14 +11,24 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import ArrayLike, NDArray
 
-from acl_gym.partitions.base import Partition
-from acl_gym.partitions.kernels import Axes, locate, locate_in_parallel
+from acl_gym.partitions.base import (
+    MOST_CELLS,
+    FixedPartition,
+    check_memory_of_states,
+    check_states,
+    check_targets,
+    trusted,
+)
+from acl_gym.partitions.kernels import OUTSIDE, Axes, locate, locate_in_parallel
 from acl_gym.utils import threads, validation
+from acl_gym.utils.boxes import declared_bounds
 from acl_gym.utils.typing import CellArray, FloatArray, IntArray
 
 
-class Grid(Partition):
+class Grid(FixedPartition):
     """A product of axes, each with strictly increasing centres.
+
+    A variable with one centre makes no difference: all its values belong to that one.
 
     Args:
         centres: for each state variable its centres, strictly increasing; one or
@@ -31,7 +42,18 @@ class Grid(Partition):
     """
 
     fuzzy: ClassVar[bool]
-    checked = True
+    _fixed = (
+        "centres",
+        "periods",
+        "n_cells",
+        "cells_per_state",
+        "state_ndim",
+        "_cells",
+        "_varied",
+        "_edges",
+        "_axes",
+        "_splits",
+    )
 
     def __init__(
         self,
@@ -43,29 +65,34 @@ class Grid(Partition):
         ):
             raise ValueError(
                 "centres must be one sequence for each state variable, got "
-                f"{centres!r}; pass [sequence] for a single variable."
+                f"{validation.shown(centres)}; pass [sequence] for a single variable."
             )
         axes = [_checked_centres(axis, values) for axis, values in enumerate(centres)]
         if not axes:
             raise ValueError("centres must hold one or more state variables, got none.")
         lengths = _checked_periods(periods, axes)
-        self.centres = tuple(axes)
+        self.centres = tuple(map(validation.read_only, axes))
         self.periods = tuple(lengths)
-        self._cells = np.array([axis.size for axis in axes], dtype=np.int64)
-        self.n_cells = int(np.prod(self._cells.astype(object)))
-        if self.n_cells > np.iinfo(np.int32).max:
+        self._cells = tuple(axis.size for axis in axes)
+        self.n_cells = math.prod(self._cells)
+        if self.n_cells > MOST_CELLS:
             raise ValueError(
                 f"a partition must have fewer than 2^31 cells, got {self.n_cells}; "
                 "use fewer centres."
             )
-        self.cells_per_state = 2 ** len(axes) if self.fuzzy else 1
+        self.state_ndim = 1
+        # Kernels see only the variables that have several centres, or else the first.
+        several = [axis for axis, size in enumerate(self._cells) if size > 1]
+        self._varied = tuple(several or [0])
+        self.cells_per_state = 2 ** len(several) if self.fuzzy else 1
+        self._splits = self.cells_per_state > 1
 
         edges = [
             # A lone centre takes every state, so it needs no copy a period on.
-            axis
-            if period is None or axis.size == 1
-            else np.append(axis, axis[0] + period)
-            for axis, period in zip(axes, lengths, strict=True)
+            axes[i]
+            if (period := lengths[i]) is None or axes[i].size == 1
+            else np.append(axes[i], axes[i][0] + period)
+            for i in self._varied
         ]
         self._edges = np.concatenate(edges)
         counts = [axis.size for axis in edges]
@@ -74,8 +101,8 @@ class Grid(Partition):
                 int(end) - n for end, n in zip(np.cumsum(counts), counts, strict=True)
             ),
             tuple(counts),
-            tuple(axis.size for axis in axes),
-            tuple(period or 0.0 for period in lengths),
+            tuple(self._cells[i] for i in self._varied),
+            tuple(lengths[i] or 0.0 for i in self._varied),
             tuple(_regular_rate(axis) for axis in edges),
         )
 
@@ -102,8 +129,7 @@ class Grid(Partition):
         """
         if not isinstance(space, spaces.Box) or len(space.shape) != 1:
             raise ValueError(f"space must be a one-dimensional Box, got {space}.")
-        low = space.low.astype(np.float64)
-        high = space.high.astype(np.float64)
+        low, high = declared_bounds(space)
         if not (np.isfinite(low) & np.isfinite(high)).all():
             raise ValueError(
                 f"space must be bounded in every variable, got {space}; "
@@ -117,18 +143,19 @@ class Grid(Partition):
         if len(counts) != low.size:
             raise ValueError(
                 f"cells must be an int or {low.size} ints, one a variable, "
-                f"got {cells!r}."
+                f"got {validation.shown(cells)}."
             )
         round_axes = list(circular) if isinstance(circular, Iterable) else [None]
         for axis in round_axes:
             whole = isinstance(axis, Integral) and not isinstance(axis, bool)
             if not whole or not 0 <= axis < low.size:
                 raise ValueError(
-                    f"circular must hold variables 0..{low.size - 1}, got {circular!r}."
+                    f"circular must hold variables 0..{low.size - 1}, got "
+                    f"{validation.shown(circular)}."
                 )
         centres, periods = [], []
         for axis, count in enumerate(counts):
-            validation.integer(f"cells[{axis}]", count, at_least=1)
+            validation.integer(f"cells[{axis}]", count, at_least=1, at_most=MOST_CELLS)
             is_round = axis in round_axes
             centres.append(
                 np.linspace(low[axis], high[axis], count, endpoint=not is_round)
@@ -185,33 +212,49 @@ class Grid(Partition):
     ) -> None:
         """See `Partition.locate`."""
         dimensions = len(self.centres)
+        check_states(states)
         if states.ndim != 2 or states.shape[1] != dimensions:
             raise ValueError(
                 f"states must have shape (n, {dimensions}), got {states.shape}."
             )
+        check_targets(slots, index, degree, self.cells_per_state)
         if states.dtype != np.float64:
             states = _as_float64(states)
-        find = locate
-        if threads.worth_it(slots.size):
-            find = locate_in_parallel
-        bad = find(
-            states,
-            slots,
-            self._edges,
-            self._axes,
-            self.fuzzy,
-            index,
-            degree,
-        )
+        seen, bad = states, -1
+        if len(self._varied) < dimensions:
+            bad = _first_not_finite(states, slots)
+            seen = np.take(states, self._varied, axis=1)
+        if bad == -1:
+            find = locate
+            if threads.worth_it(slots.size):
+                find = locate_in_parallel
+            bad = find(
+                seen,
+                slots,
+                self._edges,
+                self._axes,
+                self._splits,
+                index,
+                degree,
+            )
+        if bad == OUTSIDE:
+            raise ValueError(f"slots must be rows of the {len(states)} states.")
         if bad >= 0:
             raise ValueError(
-                f"states must be finite, got {states[bad].tolist()} in row {bad}."
+                f"states must be finite, got {validation.shown(states[bad].tolist())} "
+                f"in row {bad}."
             )
 
     def cell_states(self) -> FloatArray:
-        """The centres of all cells, `(n_cells, d)`, in the order of (4.8)."""
+        """The centres of all cells, `(n_cells, d)`, in the order of (4.8).
+
+        Raises:
+            ValueError: they do not fit into memory.
+        """
+        dimensions = len(self.centres)
+        check_memory_of_states(self.n_cells, dimensions)
         mesh = np.meshgrid(*self.centres, indexing="ij")
-        return np.stack(mesh, axis=-1).reshape(-1, len(self.centres))
+        return np.stack(mesh, axis=-1).reshape(-1, dimensions)
 
     def settings(self) -> dict[str, Any]:
         """See `Partition.settings`."""
@@ -221,6 +264,15 @@ class Grid(Partition):
             "periods": list(self.periods),
         }
 
+    def _variables(self) -> list[tuple[Any, ...]]:
+        return [
+            (i + 1, axis.size, f"{axis[0]:.4g}", f"{axis[-1]:.4g}", note)
+            for i, (axis, period) in enumerate(
+                zip(self.centres, self.periods, strict=True)
+            )
+            for note in ["" if period is None else f"circular, period {period:.4g}"]
+        ]
+
     def __repr__(self) -> str:
         """Name, cells along each axis, and which axes are circular."""
         shape = " x ".join(str(n) for n in self._cells)
@@ -228,6 +280,7 @@ class Grid(Partition):
         return f"{type(self).__name__}({shape} cells, circular={rounds})"
 
 
+@trusted
 class Crisp(Grid):
     """Crisp bins: a state belongs entirely to the nearest centre, eq. (4.2).
 
@@ -242,6 +295,7 @@ class Crisp(Grid):
     fuzzy = False
 
 
+@trusted
 class Fuzzy(Grid):
     """Fuzzy cells: triangular membership functions, eqs. (4.7)-(4.9).
 
@@ -264,7 +318,9 @@ def checked_kind(kind: Any) -> type[Grid]:
         TypeError: it is not `Crisp`, `Fuzzy` or a subclass of one of them.
     """
     if not (isinstance(kind, type) and issubclass(kind, (Crisp, Fuzzy))):
-        raise TypeError(f"kind must be the class Crisp or Fuzzy, got {kind!r}.")
+        raise TypeError(
+            f"kind must be the class Crisp or Fuzzy, got {validation.shown(kind)}."
+        )
     return kind
 
 
@@ -272,6 +328,14 @@ def _as_float64(states: NDArray[Any]) -> FloatArray:
     if states.dtype.kind not in "fiu":
         raise ValueError(f"states must be real numbers, got dtype {states.dtype}.")
     return states.astype(np.float64)
+
+
+def _first_not_finite(states: FloatArray, slots: IntArray) -> int:
+    """A slot with a state that is not finite, `OUTSIDE` if one is no row; else -1."""
+    if slots.size and (slots.min() < 0 or slots.max() >= len(states)):
+        return OUTSIDE
+    finite = np.isfinite(states[slots]).all(axis=1)
+    return -1 if finite.all() else int(slots[np.argmin(finite)])
 
 
 def _checked_centres(axis: int, values: ArrayLike) -> FloatArray:
@@ -288,7 +352,7 @@ def _checked_centres(axis: int, values: ArrayLike) -> FloatArray:
     if not usable.all():
         raise ValueError(
             f"centres[{axis}] must be further apart than 1e-307 and closer than "
-            f"1e307, got {values!r}."
+            f"1e307, got {validation.shown(values)}."
         )
     return centres
 
@@ -301,7 +365,7 @@ def _checked_periods(
     if not isinstance(periods, Sequence) or len(periods) != len(axes):
         raise ValueError(
             f"periods must hold one entry for each of the {len(axes)} variables, "
-            f"got {periods!r}."
+            f"got {validation.shown(periods)}."
         )
     lengths: list[float | None] = []
     for axis, period in enumerate(periods):

@@ -5,11 +5,15 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit, prange
+from numba import prange
 from numpy.typing import NDArray
 
-from acl_gym.utils import compiling as _compiling  # noqa: F401 - it says what the wait is for
+from acl_gym.utils.compiling import njit
+from acl_gym.utils.threads import shared_among_threads
 from acl_gym.utils.typing import CellArray, FloatArray, IntArray
+
+OUTSIDE = -2
+"""What `locate` returns if a slot is not a row of the states."""
 
 BLOCK = 256
 """States that `locate` handles at a time, so that scratch stays in the nearest cache."""
@@ -44,7 +48,7 @@ def written_out(size: int) -> tuple[int, ...]:
     return (0,) * size if size <= MOST_WRITTEN_OUT else ()
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def locate_on_axis(
     x: FloatArray,
     edges: FloatArray,
@@ -82,7 +86,10 @@ def locate_on_axis(
         for i in range(x.size):
             x[i] -= period * np.floor((x[i] - first) / period)
     for i in range(x.size):
-        x[i] = min(max(x[i], first), end)
+        # Written so that NaN, to which huge values of a circular variable may overflow,
+        # does not pass: kernels index by the result.
+        value = x[i] if x[i] > first else first
+        x[i] = value if value < end else end
     if rate > 0.0:
         # On a regular axis the interval is known but for the rounding of the guess.
         highest = float(last)
@@ -119,7 +126,7 @@ def locate_on_axis(
         fraction[i] = (x[i] - edges[interval]) / width
 
 
-@njit(cache=True)
+@njit
 def _first_not_finite(states: FloatArray, slots: IntArray) -> int:
     for slot in slots:
         if not np.isfinite(states[slot]).all():
@@ -127,14 +134,14 @@ def _first_not_finite(states: FloatArray, slots: IntArray) -> int:
     return -1
 
 
-@njit(cache=True)
+@njit
 def scratch_for(dimensions: int) -> tuple[CellArray, FloatArray]:
     """Return the scratch of `locate_block`, for states with this many variables."""
     ends = np.empty((2 * dimensions, BLOCK), np.int32)
     return ends, np.empty((3 + dimensions, BLOCK))
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def locate_block(
     states: FloatArray,
     slots: IntArray,
@@ -153,6 +160,12 @@ def locate_block(
     """
     start = block * BLOCK
     size = min(BLOCK, slots.size - start)
+    rows = np.uint64(states.shape[0])
+    outside: Any = 0
+    for i in range(size):
+        outside += np.uint64(slots[start + i]) >= rows  # negative ones become huge
+    if outside > 0:
+        return OUTSIDE
     first, count, cells, period, rate = axes
     dimensions = len(cells)
     # What the cells below and above each state add to the index (4.8), per axis.
@@ -190,7 +203,7 @@ def locate_block(
     return -1
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@njit(error_model="numpy", inline="always")
 def _corners(
     low: CellArray,
     high: CellArray,
@@ -234,7 +247,7 @@ def _corners(
             corners *= 2
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def locate(
     states: FloatArray,
     slots: IntArray,
@@ -244,9 +257,10 @@ def locate(
     index: CellArray,
     degree: FloatArray,
 ) -> int:
-    """Fill rows of `index` and `degree`; return a slot that is not finite, or -1.
+    """Fill rows of `index` and `degree`; return -1.
 
-    `axes` holds tuples, so that the number of axes is known when the kernel is compiled
+    If a state is not finite, its slot is returned; `OUTSIDE` if a slot is not a row of
+    `states`. `axes` holds tuples, so that the number of axes is known when the kernel is compiled
     and the loops over them are unrolled.
     """
     ends, reals = scratch_for(len(axes[0]))
@@ -254,12 +268,13 @@ def locate(
         bad = locate_block(
             states, slots, edges, axes, fuzzy, index, degree, block, ends, reals
         )
-        if bad >= 0:
+        if bad != -1:
             return bad
     return -1
 
 
-@njit(cache=True, parallel=True, error_model="numpy")
+@shared_among_threads
+@njit(parallel=True, error_model="numpy")
 def locate_in_parallel(
     states: FloatArray,
     slots: IntArray,
@@ -281,12 +296,12 @@ def locate_in_parallel(
             states, slots, edges, own, fuzzy, index, degree, block, ends, reals
         )
     for slot in bad:
-        if slot >= 0:
+        if slot != -1:
             return int(slot)
     return -1
 
 
-@njit(cache=True)
+@njit
 def locate_discrete(
     states: NDArray[Any],
     slots: IntArray,
@@ -306,10 +321,13 @@ def locate_discrete(
         degree: `(>= m, 1)`, receives ones.
 
     Returns:
-        A slot and a variable whose value is not whole or not in range, or (-1, -1).
+        A slot and a variable whose value is not whole or not in range, `OUTSIDE` if the
+        slot is not a row of `states`, or (-1, -1).
     """
     for j in range(slots.size):
         slot = slots[j]
+        if not 0 <= slot < states.shape[0]:
+            return OUTSIDE, -1
         cell = 0
         for axis in range(sizes.size):
             x = states[slot, axis]

@@ -11,13 +11,14 @@ from typing import Any
 
 import numpy as np
 from gymnasium.vector import VectorEnv
-from numba import njit
 
 from acl_gym.colony.greedy import ALL, best_value
 from acl_gym.envs.control.environments import ControlVectorEnv
-from acl_gym.partitions import Partition
+from acl_gym.partitions import Partition, checked_partition, locate_all
 from acl_gym.planning.sweeps import checked_settings, sweep_until_converged
 from acl_gym.policies import TablePolicy
+from acl_gym.utils import validation
+from acl_gym.utils.compiling import njit
 from acl_gym.utils.typing import BoolArray, CellArray, FloatArray
 
 _SLOTS = 65_536  # states simulated at once
@@ -78,12 +79,13 @@ def fuzzy_q_iteration(
         TypeError: `env` is of another package, or random.
         ValueError: a parameter is out of range.
     """
-    base = env.unwrapped
+    base = getattr(env, "unwrapped", env)
     if not isinstance(base, ControlVectorEnv) or base.system.draws_per_step:
         raise TypeError(
             "env must be a deterministic vector environment of acl_gym, which can "
             f"start from any state, got {type(base).__name__}."
         )
+    checked_partition(partition)
     discount, tolerance, max_iterations = checked_settings(
         discount, tolerance, max_iterations
     )
@@ -103,9 +105,19 @@ def fuzzy_q_iteration(
 def _try_all(env: ControlVectorEnv, partition: Partition) -> _Model:
     """Take every action from the state of every cell, many cells at a time."""
     states = partition.cell_states()
+    if len(states) != partition.n_cells:
+        raise ValueError(
+            f"cell_states must give a state for each of the {partition.n_cells} cells, "
+            f"got {len(states)}."
+        )
     n_actions = int(env.system.action_space.n)
     shape = (len(states), n_actions)
     k = partition.cells_per_state
+    validation.check_memory(
+        f"the model of {len(states)} cells",
+        len(states) * n_actions * (9 + 12 * k),
+        "use fewer cells",
+    )
     model = _Model(
         reward=np.empty(shape),
         terminated=np.empty(shape, dtype=np.bool_),
@@ -121,11 +133,13 @@ def _try_all(env: ControlVectorEnv, partition: Partition) -> _Model:
             observation, reward, terminated, _, _ = trial.step(actions)
             model.reward[some, u] = reward
             model.terminated[some, u] = terminated
-            model.index[some, u], model.degree[some, u] = partition(observation)
+            model.index[some, u], model.degree[some, u] = locate_all(
+                partition, observation, len(states)
+            )
     return model
 
 
-@njit(cache=True)
+@njit
 def _sweep(
     reward: FloatArray,
     terminated: BoolArray,

@@ -13,7 +13,6 @@ import gymnasium as gym
 import numpy as np
 from gymnasium import spaces
 from gymnasium.vector import VectorEnv
-from numba import njit
 from numpy.typing import ArrayLike
 from scipy import sparse
 from scipy.sparse import csgraph
@@ -27,6 +26,7 @@ from acl_gym.planning.sweeps import (
     sweep_until_converged,
 )
 from acl_gym.policies import TablePolicy
+from acl_gym.utils.compiling import njit
 from acl_gym.utils.typing import BoolArray, FloatArray, IntArray
 
 
@@ -242,7 +242,7 @@ def _leading_to(chain: Any, target: BoolArray) -> BoolArray:
     return found
 
 
-@njit(cache=True)
+@njit
 def _action_value(
     probability: FloatArray,
     next_state: IntArray,
@@ -263,7 +263,7 @@ def _action_value(
     return total
 
 
-@njit(cache=True)
+@njit
 def _sweep(
     probability: FloatArray,
     next_state: IntArray,
@@ -286,7 +286,7 @@ def _sweep(
     return change
 
 
-@njit(cache=True)
+@njit
 def _action_values(
     probability: FloatArray,
     next_state: IntArray,
@@ -306,7 +306,7 @@ def _action_values(
     return table
 
 
-@njit(cache=True)
+@njit
 def _nearest_to_an_end(
     probability: FloatArray,
     next_state: IntArray,

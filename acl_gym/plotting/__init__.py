@@ -11,8 +11,10 @@ from acl_gym.envs.navigation.system import Navigation
 from acl_gym.envs.pendulum.system import Pendulum
 from acl_gym.plotting import grid_search, navigation, pendulum
 from acl_gym.plotting.animation import animate
-from acl_gym.plotting.learning import draw_learning_curves
+from acl_gym.plotting.learning import draw_learning_curves, plot_learning_curve
+from acl_gym.plotting.maps import plot_pheromone, plot_policy
 from acl_gym.plotting.shown import Shown
+from acl_gym.plotting.trajectories import plot_trajectory
 
 __all__ = [
     "Shown",
@@ -20,6 +22,10 @@ __all__ = [
     "draw_learning_curves",
     "draw_policies",
     "draw_trajectories",
+    "plot_learning_curve",
+    "plot_pheromone",
+    "plot_policy",
+    "plot_trajectory",
 ]
 
 _SYSTEMS: dict[type, ModuleType] = {

@@ -20,7 +20,7 @@ from acl_gym.plotting.shown import Shown
 from acl_gym.utils.typing import FloatArray, Predictor
 
 _BEST, _OTHER = "0.1", style.ORANGE
-_SHADES = LinearSegmentedColormap.from_list("cost", ["#FFFFFF", "#9CC3DE"])
+SHADES = LinearSegmentedColormap.from_list("cost", ["#FFFFFF", "#9CC3DE"])
 _WALL: dict[str, Any] = {"color": "0.25"}
 _NEVER: dict[str, Any] = {
     **{"facecolor": "#F6D8C6", "edgecolor": "#DDA98B"},
@@ -50,11 +50,17 @@ def policies(shown: list[Shown], *, paths: bool = False) -> Figure:
             ax.set_ylabel(each.title, rotation=0, ha="right", va="center")
         else:
             ax.set_title(each.title)
-    mappable = ScalarMappable(norm, _SHADES)
+    mappable = ScalarMappable(norm, SHADES)
     place: Any = {"shrink": 0.8, "pad": 0.01}
     bar = figure.colorbar(mappable, ax=axes, label="cost until the goal", **place)
     bar.ax.spines[:].set_visible(False)
-    handles = [
+    style.legend(figure, handles())
+    return figure
+
+
+def handles() -> list[Any]:
+    """What arrows, hatches and the marker stand for."""
+    return [
         *(
             Line2D([], [], color=color, marker=r"$\rightarrow$", markersize=8,
                    linestyle="", label=label)
@@ -63,8 +69,6 @@ def policies(shown: list[Shown], *, paths: bool = False) -> Figure:
         Patch(**_NEVER, label="from here never to the goal"),
         Line2D([], [], **_GOAL, label="goal"),
     ]  # fmt: skip
-    style.legend(figure, handles)
-    return figure
 
 
 def draw_policy(
@@ -92,7 +96,7 @@ def draw_policy(
     cells, costs = np.array(system.cells), np.full(letters.shape, np.nan)
     costs[tuple(cells.T)] = -policy_value(env.with_slots(1), actions)
     never = np.isinf(costs)
-    ax.imshow(np.where(never, np.nan, costs), cmap=_SHADES, norm=norm, aspect="equal")
+    ax.imshow(np.where(never, np.nan, costs), cmap=SHADES, norm=norm, aspect="equal")
     for places, look in ((never, _NEVER), (letters == "#", _WALL)):
         for row, column in np.argwhere(places):
             ax.add_patch(Rectangle((column - 0.5, row - 0.5), 1, 1, **look))

@@ -14,11 +14,12 @@ from matplotlib.ticker import MultipleLocator
 
 from acl_gym.envs.control.environments import ControlVectorEnv
 from acl_gym.envs.navigation.painter import goal_outline
+from acl_gym.envs.navigation.system import Navigation
 from acl_gym.evaluation import actions_in, record_trajectory
 from acl_gym.plotting import style
 from acl_gym.plotting.shown import Shown
 from acl_gym.utils.text import digits
-from acl_gym.utils.typing import Predictor
+from acl_gym.utils.typing import FloatArray, Predictor
 
 _ARROWS = 25
 """Positions along an axis: three between neighbours of nine centres."""
@@ -72,32 +73,49 @@ def _planes(shown: list[Shown], panels: int = 1) -> tuple[Figure, list[Axes]]:
     width = min(2.5 * columns + 0.5, style.WIDTH)
     options = {"sharex": True, "sharey": True}
     figure, axes = style.small_multiples(count, columns, 2.85, width, **options)
-    largest = system.position_max
-    fine, extent = np.linspace(-largest, largest, _SHADES), 2 * (-largest, largest)
-    shading: Any = {"interpolation": "bilinear", "zorder": 0.5}
     for ax in axes:
-        damping = system.damping(fine[None, :], fine[:, None])
-        ax.imshow(damping, _DAMPING, origin="lower", extent=extent, **shading)
-        goal = Polygon(goal_outline(system), color=style.GREEN, linewidth=0, zorder=1.5)
-        ax.add_patch(goal)
-        ax.grid(visible=False)
-        limits = (-1.04 * largest, 1.04 * largest)
-        ax.set(xlim=limits, ylim=limits, aspect="equal")
-        for axis in (ax.xaxis, ax.yaxis):
-            axis.set_major_locator(MultipleLocator(largest / 2))
+        draw_ground(ax, system)
     style.label_outer(axes, columns, "$c_1$ (m)", "$c_2$ (m)")
     return figure, axes
+
+
+def draw_ground(ax: Axes, system: Navigation) -> None:
+    """Damping and goal over the plane of positions."""
+    largest = system.position_max
+    fine, extent = np.linspace(-largest, largest, _SHADES), 2 * (-largest, largest)
+    damping = system.damping(fine[None, :], fine[:, None])
+    shading: Any = {"interpolation": "bilinear", "zorder": 0.5}
+    ax.imshow(damping, _DAMPING, origin="lower", extent=extent, **shading)
+    goal = Polygon(goal_outline(system), color=style.GREEN, linewidth=0, zorder=1.5)
+    ax.add_patch(goal)
+    ax.grid(visible=False)
+    limits = (-1.04 * largest, 1.04 * largest)
+    ax.set(xlim=limits, ylim=limits, aspect="equal")
+    for axis in (ax.xaxis, ax.yaxis):
+        axis.set_major_locator(MultipleLocator(largest / 2))
+
+
+def positions(system: Navigation) -> tuple[FloatArray, FloatArray]:
+    """Where arrows are drawn: c1 and c2, each `(n,)`."""
+    axis = np.linspace(-system.position_max, system.position_max, _ARROWS)
+    c1, c2 = np.meshgrid(axis, axis)
+    return c1.ravel(), c2.ravel()
 
 
 def draw_policy(ax: Axes, env: ControlVectorEnv, policy: Predictor) -> None:
     """An arrow for the force at each position at rest, a dot where there is none."""
     system: Any = env.system
-    axis = np.linspace(-system.position_max, system.position_max, _ARROWS)
-    c1, c2 = (each.ravel() for each in np.meshgrid(axis, axis))
+    c1, c2 = positions(system)
     states = np.stack([c1, 0 * c1, c2, 0 * c2], axis=1)
     actions = actions_in(policy, env.with_slots(len(states)), states)
-    u1, u2 = np.array(system.forces)[actions].T
-    none, spacing = (u1 == 0) & (u2 == 0), axis[1] - axis[0]
+    draw_forces(ax, system, np.array(system.forces)[actions])
+
+
+def draw_forces(ax: Axes, system: Navigation, forces: FloatArray) -> None:
+    """Arrows for the forces `(n, 2)` at `positions`, a dot where there is none."""
+    c1, c2 = positions(system)
+    u1, u2 = forces.T
+    none, spacing = (u1 == 0) & (u2 == 0), 2 * system.position_max / (_ARROWS - 1)
     ax.quiver(
         *(each[~none] for each in (c1, c2, u1, u2)),
         color=_FORCE["color"], angles="xy", scale_units="xy", units="xy", pivot="mid",

@@ -7,12 +7,11 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.axis import Axis
 from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
-from matplotlib.ticker import FuncFormatter, MaxNLocator, MultipleLocator
+from matplotlib.ticker import MaxNLocator
 
 from acl_gym.envs.control.environments import ControlVectorEnv
 from acl_gym.evaluation import actions_in, record_trajectory
@@ -77,7 +76,7 @@ def draw_policy(ax: Axes, env: ControlVectorEnv, policy: Predictor) -> None:
     ax.plot(math.pi, 0.0, **_GOAL)
     ax.set_xlim(0.0, 2 * math.pi)
     ax.set_ylim(omega[0], omega[-1])
-    multiples_of_pi(ax.xaxis)
+    style.multiples_of_pi(ax.xaxis)
     ax.yaxis.set_major_locator(MaxNLocator(6, steps=(1, 2, 3, 5, 10)))
 
 
@@ -88,12 +87,6 @@ def cells_of(policy: Any) -> tuple[int, int]:
         return 40, 41
     n_theta, n_omega = map(len, partition.centres)
     return n_theta, n_omega
-
-
-def multiples_of_pi(axis: Axis) -> None:
-    """Ticks at multiples of pi / 2."""
-    axis.set_major_locator(MultipleLocator(math.pi / 2))
-    axis.set_major_formatter(FuncFormatter(lambda value, _: style.as_pi(value)))
 
 
 def _torques(env: ControlVectorEnv) -> Any:
@@ -160,7 +153,7 @@ def trajectories(shown: list[Shown]) -> Figure:
     for ax, name in zip(outer, (THETA, OMEGA, "cost so far"), strict=True):
         ax.set_ylabel(name)
     axes[3].set_xlabel("time (s)")
-    multiples_of_pi(axes[0].yaxis)
+    style.multiples_of_pi(axes[0].yaxis)
     lowest, highest = axes[0].get_ylim()
     for goal in (-math.pi, math.pi):
         if lowest - 0.3 <= goal <= highest + 0.3:

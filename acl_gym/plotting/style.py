@@ -6,9 +6,12 @@ Nothing here uses pyplot, which keeps state.
 
 from __future__ import annotations
 
+import contextlib
 import functools
+import io
 import math
-from collections.abc import Callable, Iterable, Sequence
+import re
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -18,8 +21,15 @@ from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
+from matplotlib.ticker import (
+    FuncFormatter,
+    LogLocator,
+    MaxNLocator,
+    MultipleLocator,
+    NullFormatter,
+)
 
+from acl_gym.utils.pictures import inline_png
 from acl_gym.utils.typing import FloatArray
 
 in_style = functools.partial(
@@ -35,14 +45,74 @@ BLACK, BLUE, ORANGE, GREEN = "black", "#0072B2", "#D55E00", "#009E73"
 BOUND: dict[str, Any] = {"color": "0.2", "linewidth": 0.9, "zorder": 1.2}
 """Of a line that is a limit: the optimal cost, the goal."""
 
+SCREEN_DPI = 150
+"""Dots an inch of a new figure."""
+
 _MINUS = "\N{MINUS SIGN}"
 
 
-def new_figure(height: float, width: float = WIDTH) -> Figure:
+def new_figure(height: float, width: float = WIDTH, dpi: float | None = None) -> Figure:
     """An empty figure, in inches, with a canvas."""
-    figure = Figure(figsize=(width, height))
+    figure = Figure(figsize=(width, height), dpi=dpi)
     FigureCanvasAgg(figure)
     return figure
+
+
+class ShownAxes(Axes):
+    """Axes that a notebook shows as the picture they are in, without pyplot."""
+
+    def _repr_html_(self) -> str:
+        buffer = io.BytesIO()
+        figure: Any = self.figure
+        figure.savefig(buffer, format="png")
+        return inline_png(buffer.getvalue(), self.get_title(loc="left"))
+
+
+@contextlib.contextmanager
+def axes_or_new(ax: Any, width: float = 4.6, height: float = 3.5) -> Iterator[Axes]:
+    """Axes to draw on: those given as they are, or new ones in our style.
+
+    Args:
+        ax: of the caller, or None.
+        width: of a new figure, inches.
+        height: of a new figure, inches.
+
+    Raises:
+        TypeError: `ax` are not axes.
+    """
+    if ax is not None:
+        yield checked_axes(ax)
+        return
+    with in_style():
+        figure = new_figure(height, width, SCREEN_DPI)
+        yield figure.subplots(subplot_kw={"axes_class": ShownAxes})
+        keep_style(figure)
+
+
+def checked_axes(ax: Any) -> Axes:
+    """Return `ax` if they are axes.
+
+    Raises:
+        TypeError: they are not.
+    """
+    if not isinstance(ax, Axes):
+        raise TypeError(
+            f"ax must be Matplotlib axes or None, got {ax!r:.80}; make some with "
+            "figure, ax = plt.subplots()."
+        )
+    return ax
+
+
+def keep_style(figure: Figure) -> None:
+    """Make a tick of each axis now, in our style; others are copies of it."""
+    for ax in figure.findobj(Axes):  # bars are inside others
+        for axis, size in (
+            (ax.xaxis, mpl.rcParams["xtick.labelsize"]),
+            (ax.yaxis, mpl.rcParams["ytick.labelsize"]),
+        ):
+            axis.set_tick_params(which="both", labelsize=size)
+            axis.get_major_ticks(1)
+            axis.get_minor_ticks(1)
 
 
 def small_multiples(
@@ -121,6 +191,44 @@ def plain_numbers(axis: Axis) -> None:
     """Numbers without powers: 0.1, 1, 10."""
     axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     axis.set_minor_formatter(NullFormatter())
+
+
+def multiples_of_pi(axis: Axis) -> None:
+    """Ticks at multiples of pi / 2."""
+    axis.set_major_locator(MultipleLocator(math.pi / 2))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: as_pi(value)))
+
+
+GREEK = [
+    "alpha",
+    "beta",
+    "gamma",
+    "delta",
+    "theta",
+    "lambda",
+    "mu",
+    "omega",
+    "phi",
+    "psi",
+    "rho",
+    "sigma",
+    "tau",
+    "xi",
+]
+
+
+def symbol(name: str) -> str:
+    """The name of a variable as it is printed: "omega (rad/s)" with a Greek letter."""
+    word, bracket, unit = name.partition(" (")
+    return " ".join(map(_printed, word.split(" "))) + bracket + unit
+
+
+def _printed(word: str) -> str:
+    if word in GREEK:
+        return rf"$\{word}$"
+    if re.fullmatch(r"[a-z]\d?", word):
+        return f"${'_'.join(word)}$"
+    return word.replace("$", r"\$")
 
 
 def as_pi(value: float) -> str:

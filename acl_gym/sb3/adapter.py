@@ -8,10 +8,12 @@ from typing import Any
 
 import gymnasium as gym
 import numpy as np
-from gymnasium import spaces
-from gymnasium.vector import AutoresetMode, SyncVectorEnv, VectorEnv, VectorWrapper
+from gymnasium.vector import (
+    AutoresetMode,
+    VectorEnv,
+    VectorWrapper,
+)
 from numpy.typing import NDArray
-from stable_baselines3.common.env_util import is_wrapped
 from stable_baselines3.common.vec_env import VecEnv
 from stable_baselines3.common.vec_env.base_vec_env import (
     VecEnvIndices,
@@ -19,16 +21,17 @@ from stable_baselines3.common.vec_env.base_vec_env import (
     VecEnvStepReturn,
 )
 
+from acl_gym.envs import received
 from acl_gym.envs.wrappers.partial_reset import reset_slots
-
-_SUPPORTED_MODES = (AutoresetMode.DISABLED, AutoresetMode.SAME_STEP)
-_FINAL_KEYS = ("final_obs", "_final_obs", "final_info", "_final_info")
-_ARRAY_SPACES = (
-    spaces.Box,
-    spaces.Discrete,
-    spaces.MultiDiscrete,
-    spaces.MultiBinary,
+from acl_gym.sb3.checks import (
+    check_action_space,
+    check_observation_space,
+    settle_mode,
 )
+from acl_gym.sb3.slots import SlotEnvs, slot_envs
+from acl_gym.utils.vector_envs import require_vector_env
+
+_FINAL_KEYS = ("final_obs", "_final_obs", "final_info", "_final_info")
 
 
 class VectorEnvAdapter(VecEnv):
@@ -48,7 +51,9 @@ class VectorEnvAdapter(VecEnv):
 
     Args:
         env: a vector environment whose autoreset mode is DISABLED (preferred, because
-            observation wrappers work with it) or SAME_STEP.
+            observation wrappers work with it) or SAME_STEP. An environment of this
+            package that is not wrapped yet may have any mode: NEXT_STEP, the default of
+            `gym.make_vec`, is changed to DISABLED.
 
     Attributes:
         env: the vector environment.
@@ -64,7 +69,6 @@ class VectorEnvAdapter(VecEnv):
         >>> env = gym.make_vec(
         ...     "acl_gym/Pendulum-v0",
         ...     num_envs=8,
-        ...     autoreset_mode="Disabled",
         ...     max_episode_steps=300,
         ... )
         >>> vec_env = VecMonitor(acl_gym.VectorEnvAdapter(env))
@@ -73,24 +77,12 @@ class VectorEnvAdapter(VecEnv):
     """
 
     def __init__(self, env: VectorEnv[Any, Any, Any]) -> None:
-        if not isinstance(env, VectorEnv):
-            raise TypeError(
-                "env must be a gymnasium.vector.VectorEnv, got "
-                f"{type(env).__name__}; make it with gym.make_vec(id, num_envs=...)."
-            )
-        mode = env.metadata.get("autoreset_mode", AutoresetMode.NEXT_STEP)
-        if mode not in _SUPPORTED_MODES:
-            raise ValueError(
-                f"env must have autoreset mode DISABLED or SAME_STEP, got {mode.name}, "
-                "which inserts a meaningless step between two episodes; make it with "
-                'gym.make_vec(id, autoreset_mode="Disabled"), or if the vector '
-                "environment is built from single ones, with "
-                'vector_kwargs={"autoreset_mode": AutoresetMode.DISABLED}.'
-            )
-        _check_observation_space(env.single_observation_space)
-        _check_start("actions", env.single_action_space)
+        require_vector_env(env)
+        check_observation_space(env.single_observation_space)
+        check_action_space(env.single_action_space)
         self.env = env
-        self._resets_itself = mode is AutoresetMode.SAME_STEP
+        self._resets_itself = settle_mode(env) is AutoresetMode.SAME_STEP
+        self._slot_envs = slot_envs(env)
         self._actions: NDArray[Any] | None = None
         self._returns = np.zeros(env.num_envs)
         self._lengths = np.zeros(env.num_envs, dtype=np.int64)
@@ -160,17 +152,31 @@ class VectorEnvAdapter(VecEnv):
             )
         actions, self._actions = self._actions, None
         observations, rewards, terminated, truncated, infos = self.env.step(actions)
+        n = self.num_envs
+        received.observations(observations, n)
+        rewards = received.rewards(rewards, n)
+        terminated = received.flags("terminated", terminated, n)
+        truncated = received.flags("truncated", truncated, n)
         dones = np.logical_or(terminated, truncated)
         slots = np.flatnonzero(dones).tolist()
-        plain = {key: infos[key] for key in infos if key not in _FINAL_KEYS}
-        rows = _infos_per_slot(plain, self.num_envs)
+        rows = [
+            {key: row[key] for key in row if key not in _FINAL_KEYS}
+            for row in _infos_per_slot(infos, n)
+        ]
+        batched = received.infos(infos, n)
         if slots and self._resets_itself:
+            if "final_obs" not in batched:
+                raise ValueError(
+                    "infos['final_obs'] must hold the last observation of each slot "
+                    f"that has finished, got infos with {list(batched)}; check the "
+                    "environment and its wrappers."
+                )
             # Entries missing from final_info were written by the reset or a wrapper.
-            last = _infos_per_slot(infos.get("final_info", {}), self.num_envs)
+            last = _infos_per_slot(batched.get("final_info"), n)
             for slot in slots:
                 self.reset_infos[slot] = rows[slot]
                 rows[slot] = {**rows[slot], **last[slot]}
-                rows[slot]["terminal_observation"] = _copy(infos["final_obs"][slot])
+                rows[slot]["terminal_observation"] = _copy(batched["final_obs"][slot])
         elif slots:
             for slot in slots:
                 rows[slot]["terminal_observation"] = _row(observations, slot)
@@ -215,13 +221,15 @@ class VectorEnvAdapter(VecEnv):
         """The attribute for each slot; `set_attr` explains where it is looked up.
 
         Raises:
-            AttributeError: no environment or wrapper has it.
+            AttributeError: no environment or wrapper has it, or only some of the
+                slots have it.
         """
-        slots = self._get_indices(indices)
+        slots = list(self._get_indices(indices))
         if attr_name in ("observation_space", "action_space"):
             return [getattr(self, attr_name) for _ in slots]
-        if envs := self._single_envs_with(attr_name):
-            return [envs[slot].get_wrapper_attr(attr_name) for slot in slots]
+        envs = self._slots_with(attr_name, slots)
+        if envs is not None:
+            return envs.get(attr_name, slots)
         value = getattr(self._layer_with(attr_name), attr_name)
         return [value for _ in slots]
 
@@ -230,18 +238,21 @@ class VectorEnvAdapter(VecEnv):
     ) -> None:
         """Set an existing attribute.
 
-        In a `SyncVectorEnv` it is the attribute of the slots' single environments. In
-        any other vector environment, or if those do not have it, it is that of the
-        outermost wrapper or vector environment that has it, shared by all slots.
+        In a `SyncVectorEnv` or `AsyncVectorEnv` it is the attribute of the slots'
+        single environments. In any other vector environment, or if those do not have
+        it, it is that of the outermost wrapper or vector environment that has it, shared
+        by all slots.
 
         Raises:
-            AttributeError: no environment or wrapper has it.
-            ValueError: it is shared by all slots, but `indices` selects only some.
+            AttributeError: no environment or wrapper has it, or only some of the
+                slots have it.
+            ValueError: `indices` selects some slots only, but it is shared by all, or
+                belongs to the workers of an `AsyncVectorEnv`, which are set together.
         """
         slots = list(self._get_indices(indices))
-        if envs := self._single_envs_with(attr_name):
-            for slot in slots:
-                envs[slot].set_wrapper_attr(attr_name, value)
+        envs = self._slots_with(attr_name, slots)
+        if envs is not None:
+            envs.set(attr_name, value, slots)
             return
         layer = self._layer_with(attr_name)
         self._check_all(attr_name, slots)
@@ -261,15 +272,14 @@ class VectorEnvAdapter(VecEnv):
             once, and its result is returned for every slot.
 
         Raises:
-            AttributeError: no environment or wrapper has it.
+            AttributeError: no environment or wrapper has it, or only some of the
+                slots have it.
             ValueError: it acts on all slots, but `indices` selects only some.
         """
         slots = list(self._get_indices(indices))
-        if envs := self._single_envs_with(method_name):
-            return [
-                envs[slot].get_wrapper_attr(method_name)(*method_args, **method_kwargs)
-                for slot in slots
-            ]
+        envs = self._slots_with(method_name, slots)
+        if envs is not None:
+            return envs.call(method_name, method_args, method_kwargs, slots)
         layer = self._layer_with(method_name)
         self._check_all(method_name, slots)
         result = getattr(layer, method_name)(*method_args, **method_kwargs)
@@ -280,13 +290,17 @@ class VectorEnvAdapter(VecEnv):
         wrapper_class: type[gym.Wrapper[Any, Any, Any, Any]],
         indices: VecEnvIndices = None,
     ) -> list[bool]:
-        """Whether each slot, or the vector environment, is wrapped in this class."""
+        """Whether each slot, or the vector environment, is wrapped in this class.
+
+        Raises:
+            TypeError: the workers of an `AsyncVectorEnv` have a wrapper of a class that
+                this process does not know.
+        """
         slots = list(self._get_indices(indices))
         if any(isinstance(layer, wrapper_class) for layer in self._layers()):
             return [True for _ in slots]
-        base = self.env.unwrapped
-        if isinstance(base, SyncVectorEnv):
-            return [is_wrapped(base.envs[slot], wrapper_class) for slot in slots]
+        if self._slot_envs is not None:
+            return self._slot_envs.wrapped_in(wrapper_class, slots)
         return [False for _ in slots]
 
     def _layers(self) -> Iterator[VectorEnv[Any, Any, Any]]:
@@ -303,16 +317,26 @@ class VectorEnvAdapter(VecEnv):
                 return layer
         raise AttributeError(f"neither {self.env} nor what it wraps has {name!r}.")
 
-    def _single_envs_with(self, name: str) -> Sequence[gym.Env[Any, Any]]:
-        """The slots' single environments if they are accessible and have `name`."""
-        base = self.env.unwrapped
-        if isinstance(base, SyncVectorEnv) and all(
-            env.has_wrapper_attr(name) for env in base.envs
-        ):
-            return base.envs
-        return ()
+    def _slots_with(self, name: str, slots: list[int]) -> SlotEnvs | None:
+        """The single environments if those asked have `name`, None if none of them has.
 
-    def _check_all(self, name: str, slots: Iterable[int]) -> None:
+        Raises:
+            AttributeError: only some have it.
+        """
+        if self._slot_envs is None:
+            return None
+        has = self._slot_envs.has(name)
+        reached = self._slot_envs.reached(slots)
+        missing = [slot for slot in reached if not has[slot]]
+        if missing and len(missing) < len(reached):
+            raise AttributeError(
+                f"each of the slots {list(reached)[:10]} must have {name!r}, but slots "
+                f"{missing[:10]} do not; name those that have it by indices, in a "
+                "SyncVectorEnv."
+            )
+        return None if missing else self._slot_envs
+
+    def _check_all(self, name: str, slots: Sequence[int]) -> None:
         if set(slots) != set(range(self.num_envs)):
             raise ValueError(
                 f"{name!r} is shared by all {self.num_envs} slots, got indices "
@@ -320,28 +344,18 @@ class VectorEnvAdapter(VecEnv):
             )
 
 
-def _check_observation_space(space: spaces.Space[Any]) -> None:
-    parts = space.spaces.values() if isinstance(space, spaces.Dict) else [space]
-    for part in parts:
-        if not isinstance(part, _ARRAY_SPACES):
-            raise ValueError(
-                "observations must be a Box, Discrete, MultiDiscrete, MultiBinary or "
-                f"a Dict of those, got {part}; use gymnasium's FlattenObservation."
-            )
-        _check_start("observations", part)
+def _infos_per_slot(infos: Any, count: int) -> list[dict[str, Any]]:
+    """Split batched infos into one dict per slot, following the mask of each key.
 
+    Infos that are a list with a dict for each slot already are taken as they are.
 
-def _check_start(what: str, space: spaces.Space[Any]) -> None:
-    """Stable-Baselines3 assumes that discrete values start from 0."""
-    if np.any(getattr(space, "start", 0)):
-        raise ValueError(
-            f"{what} must start from 0, got {space}; shift them with gymnasium's "
-            f"{'TransformAction' if what == 'actions' else 'TransformObservation'}."
-        )
-
-
-def _infos_per_slot(infos: dict[str, Any], count: int) -> list[dict[str, Any]]:
-    """Split batched infos into one dict per slot, following the mask of each key."""
+    Raises:
+        ValueError: they are neither.
+    """
+    if isinstance(infos, list):
+        received.infos(infos, count)
+        return [dict(row) for row in infos]
+    infos = received.infos(infos, count)
     rows: list[dict[str, Any]] = [{} for _ in range(count)]
     for key, values in infos.items():
         if key.startswith("_") and key[1:] in infos:

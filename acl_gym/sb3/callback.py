@@ -9,11 +9,14 @@ import numpy as np
 from gymnasium.vector import VectorEnv
 from numpy.typing import NDArray
 from stable_baselines3.common.callbacks import BaseCallback
+from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper
 from torch import Tensor
 
 from acl_gym.evaluation import PolicyCost, evaluate_policy_cost, policy_measures
+from acl_gym.sb3.adapter import VectorEnvAdapter
 from acl_gym.utils import validation
 from acl_gym.utils.typing import Row
+from acl_gym.utils.vector_envs import require_vector_env
 
 
 class PolicyCostCallback(BaseCallback):
@@ -25,7 +28,8 @@ class PolicyCostCallback(BaseCallback):
 
     Args:
         env: where to evaluate, with the observations that the model learns from: a
-            `scaled_env` for a model of `make_dqn`. See `evaluate_policy_cost`.
+            `scaled_env` for a model of `make_dqn`. See `evaluate_policy_cost`. Not the
+            environment that the model learns in, which would be reset under way.
         states: initial states; None takes those of the environment.
         every: steps between evaluations, >= 1. The policy at the end of `learn` is
             always evaluated.
@@ -40,6 +44,10 @@ class PolicyCostCallback(BaseCallback):
             `PolicyCost`.
         best: the evaluation with the lowest cost, which is the highest return, so far.
         best_parameters: the parameters of that policy, for `restore_best`.
+
+    Raises:
+        TypeError: `env` is not a vector environment, or a number is not an integer.
+        ValueError: a number is too small.
     """
 
     def __init__(
@@ -52,6 +60,7 @@ class PolicyCostCallback(BaseCallback):
         seed: int | None = 0,
     ) -> None:
         super().__init__()
+        require_vector_env(env)
         self.env = env
         self.states = states
         self.every = validation.integer("every", every, at_least=1)
@@ -78,6 +87,11 @@ class PolicyCostCallback(BaseCallback):
             raise ValueError(
                 f"env must have the observation space of the model, {wanted}, got "
                 f"{given}; for a model of make_dqn make it with scaled_env(id)."
+            )
+        if _learns_in(self.model.get_env(), self.env):
+            raise ValueError(
+                "env must be another environment than the one the model learns in, "
+                "which evaluations would reset under way; make a second one."
             )
 
     def _on_training_start(self) -> None:
@@ -121,3 +135,12 @@ class PolicyCostCallback(BaseCallback):
                 for name, value in self.model.policy.state_dict().items()
             }
         self._clock = time.perf_counter()
+
+
+def _learns_in(vec_env: VecEnv | None, env: VectorEnv[Any, Any, Any]) -> bool:
+    """Whether a model with this `VecEnv` steps a vector environment."""
+    while isinstance(vec_env, VecEnvWrapper):
+        vec_env = vec_env.venv
+    return (
+        isinstance(vec_env, VectorEnvAdapter) and vec_env.env.unwrapped is env.unwrapped
+    )

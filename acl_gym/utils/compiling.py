@@ -1,18 +1,59 @@
-"""A log message while kernels are compiled on first use, which takes a while."""
+"""Kernels that are compiled on first use and cached where a folder may be written.
+
+Compiling takes a while, so a log message says what the wait is for.
+"""
 
 from __future__ import annotations
 
+import functools
 import logging
 import threading
 import time
-from typing import Any
+from collections.abc import Callable
+from typing import Any, TypeVar, overload
 
+import numba
 from numba.core.event import Event, Listener, register
 
 logger = logging.getLogger("acl_gym")
 
+Kernel = TypeVar("Kernel", bound=Callable[..., Any])
+
 PATIENCE = 1.0
 """Seconds of compilation after which the message is logged."""
+
+
+@overload
+def njit(function: Kernel, /) -> Kernel: ...
+
+
+@overload
+def njit(**options: Any) -> Callable[[Kernel], Kernel]: ...
+
+
+def njit(function: Any = None, /, **options: Any) -> Any:
+    """Compile a kernel as `numba.njit(cache=True)` does, without the cache if need be.
+
+    Numba raises an error where it finds no folder for its cache: in containers and on
+    clusters, where neither the package nor the home folder may be written.
+
+    Args:
+        function: the kernel, where the decorator stands without options.
+        **options: those of `numba.njit`.
+    """
+    if function is None:
+        return functools.partial(_compiled, **options)
+    return _compiled(function)
+
+
+def _compiled(function: Any, **options: Any) -> Any:
+    try:
+        return numba.njit(cache=True, **options)(function)
+    except RuntimeError as error:
+        if "cannot cache" not in str(error):
+            raise
+        announcer.report_no_cache()
+        return numba.njit(**options)(function)
 
 
 class Announcer(Listener):
@@ -29,6 +70,7 @@ class Announcer(Listener):
         self._depth = 0  # compiling a kernel compiles those that it calls
         self._began = 0.0
         self._announced = False
+        self._cached = True
         self._timer: threading.Timer | None = None
 
     def on_start(self, event: Event) -> None:
@@ -57,9 +99,21 @@ class Announcer(Listener):
             self._timer.cancel()
             self._timer = None
 
+    def report_no_cache(self) -> None:
+        """Log, once, that compiled kernels cannot be kept for the next process."""
+        if self._cached:
+            self._cached = False
+            logger.warning(
+                "acl-gym finds no folder that it may write its compiled kernels to, so "
+                "that each process compiles them anew, which may take half a minute; "
+                "set NUMBA_CACHE_DIR to a folder that may be written."
+            )
+
     def _announce(self) -> None:
-        if not self._announced:
-            self._announced = True
+        if self._announced:
+            return
+        self._announced = True
+        if self._cached:  # else the user has been told what to expect
             logger.warning(
                 "acl-gym is compiling its kernels for their first use, which may take "
                 "half a minute in total; they are cached on disk for later runs."

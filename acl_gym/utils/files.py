@@ -1,51 +1,32 @@
-"""Agents as files: NumPy arrays and JSON in one `.npz`, read without pickle.
-
-An untrusted file cannot run code: arrays are read without pickle, and everything else
-is JSON.
-"""
+"""Names of files, and the one way in which this package writes them."""
 
 from __future__ import annotations
 
-import io
-import json
+import contextlib
+import errno
+import hashlib
 import os
+import platform
+import re
+import secrets
+import stat
+import time
+from functools import cache
 from pathlib import Path
-from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
+from acl_gym.utils import validation
 
-FORMAT = "acl-gym agent"
-VERSION = 1
+_TEMPORARY = re.compile(r"\.acl-([0-9a-f]{8})-(\d+)-[0-9a-f]{12}\.tmp")
+"""Machine, process and a random number: short, whatever the file is called."""
+
+_OLD = 24 * 3600.0
+"""Seconds after which a temporary file of another machine is taken for left behind."""
 
 
-def with_suffix(path: str | Path) -> Path:
+def with_suffix(path: str | os.PathLike[str]) -> Path:
     """Add `.npz` to a path that lacks it."""
-    path = Path(path)
+    path = validation.path("path", path)
     return path if path.suffix == ".npz" else path.with_name(path.name + ".npz")
-
-
-def save(
-    path: str | Path, header: dict[str, Any], arrays: dict[str, NDArray[Any]]
-) -> Path:
-    """Write header and arrays in one atomic step.
-
-    Returns:
-        The path written.
-
-    Raises:
-        FileNotFoundError: the folder of the file does not exist.
-    """
-    target = with_suffix(path)
-    text = json.dumps(
-        {"format": FORMAT, "version": VERSION, **header}, default=_plain_number
-    )
-    checked_target(target)
-    buffer = io.BytesIO()
-    content = np.frombuffer(text.encode(), dtype=np.uint8)
-    np.savez_compressed(buffer, header=content, **arrays)  # type: ignore[arg-type]
-    write_atomically(target, buffer.getvalue())
-    return target
 
 
 def checked_target(path: Path) -> Path:
@@ -53,64 +34,94 @@ def checked_target(path: Path) -> Path:
 
     Raises:
         FileNotFoundError: the folder of the file does not exist.
+        IsADirectoryError: the path is a folder.
     """
     if not path.parent.is_dir():
         raise FileNotFoundError(
             f"there is no folder {path.parent} to save {path.name} in; make it first."
         )
+    if path.is_dir():
+        raise IsADirectoryError(f"{path} is a folder; give the name of a file.")
     return path
 
 
-def write_atomically(path: Path, content: bytes) -> None:
-    """Write a file so that it appears complete or not at all."""
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+def write_atomically(path: str | os.PathLike[str], content: bytes) -> None:
+    """Write a file so that it appears complete or not at all.
+
+    The content goes to a file with a name of its own beside the target, which then takes
+    the target's place: whoever reads meanwhile, and whoever writes the same path in
+    another thread or process, sees whole files only. As with `open`, a symbolic link
+    stays and the file that it points to is written, a new file gets the permissions that
+    the umask leaves, an existing one keeps its own, and devices and pipes are written
+    directly. Files left behind by processes that were killed while they wrote into the
+    same folder are removed.
+
+    Raises:
+        OSError: it cannot be written; what was there before is still there.
+    """
+    target = Path(os.path.realpath(path))
+    if target.is_symlink():  # a circle of links
+        raise OSError(errno.ELOOP, os.strerror(errno.ELOOP), str(path))
+    before = target.stat() if target.exists() else None
+    if before is not None and not stat.S_ISREG(before.st_mode):
+        with target.open("wb") as file:
+            file.write(content)
+        return
+    if before is not None and not os.access(target, os.W_OK):
+        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(target))
+    remove_stale(target.parent)
+    temporary = target.with_name(
+        f".acl-{_machine()}-{os.getpid()}-{secrets.token_hex(6)}.tmp"
+    )
     try:
-        with temporary.open("wb") as file:
+        # Unlike tempfile.mkstemp, "x" gives the permissions that open() gives; like it,
+        # it follows no link and takes no file that is there already.
+        with temporary.open("xb") as file:
+            if before is not None:
+                with contextlib.suppress(PermissionError):
+                    temporary.chmod(stat.S_IMODE(before.st_mode))
             file.write(content)
             file.flush()
             os.fsync(file.fileno())
-        temporary.replace(path)
+        os.replace(temporary, target)
     finally:
         temporary.unlink(missing_ok=True)
 
 
-def load(path: str | Path) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
-    """Read what `save` wrote.
+def remove_stale(directory: Path) -> None:
+    """Remove temporary files of `write_atomically` whose process is gone.
 
-    Raises:
-        FileNotFoundError: there is no such file.
-        ValueError: it is not a file of this package, is damaged, or is of a later
-            version.
+    Files of other machines, for whose processes one cannot ask, go after a day.
     """
-    source = with_suffix(path)
-    if not source.is_file():
-        source = Path(path)
-    if not source.is_file():
-        raise FileNotFoundError(f"no agent file at {with_suffix(path)}.")
+    with contextlib.suppress(OSError), os.scandir(directory) as entries:
+        for entry in entries:
+            match = _TEMPORARY.fullmatch(entry.name)
+            if match is None:
+                continue
+            with contextlib.suppress(OSError):  # another process may remove it first
+                if entry.is_file(follow_symlinks=False) and _is_left(entry, match):
+                    os.unlink(entry.path)
+
+
+def _is_left(entry: os.DirEntry[str], match: re.Match[str]) -> bool:
+    # On Windows a signal of 0 is no question but Ctrl-C.
+    if match[1] == _machine() and os.name == "posix":
+        try:
+            os.kill(int(match[2]), 0)
+        except (ProcessLookupError, OverflowError):
+            return True
+        except PermissionError:
+            return False
+    age = time.time() - entry.stat(follow_symlinks=False).st_mtime
+    return age > _OLD
+
+
+@cache
+def _machine() -> str:
+    """Eight digits for the machine, or container, within which process numbers count."""
     try:
-        with source.open("rb") as file, np.load(file, allow_pickle=False) as archive:
-            arrays = {name: archive[name] for name in archive.files}
-        header = json.loads(arrays.pop("header").tobytes())
-        kind, number = header.get("format"), header.get("version")
-    except Exception as error:
-        # NumPy, zipfile, zlib and json raise a dozen kinds of errors, which all mean
-        # the same here.
-        raise ValueError(
-            f"{source} is not an agent saved by acl-gym, or is damaged "
-            f"({type(error).__name__}); save the agent again or use another copy."
-        ) from error
-    if kind != FORMAT or number != VERSION:
-        raise ValueError(
-            f"{source} must be of format {FORMAT!r} version {VERSION}, got "
-            f"{kind!r} version {number!r}."
-        )
-    return header, arrays
-
-
-def _plain_number(value: Any) -> Any:
-    """Turn a NumPy number, which a callback may have added, into a Python number."""
-    if isinstance(value, np.generic):
-        return value.item()
-    raise TypeError(
-        f"an agent's settings and history must be numbers and strings, got {value!r}."
-    )
+        namespace = os.readlink("/proc/self/ns/pid")
+    except OSError:
+        namespace = ""
+    name = f"{platform.node()} {namespace}"
+    return hashlib.blake2b(name.encode(), digest_size=4).hexdigest()

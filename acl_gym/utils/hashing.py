@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from pathlib import Path
 from typing import Any
 
 
@@ -11,3 +12,27 @@ def hashed(value: Any) -> str:
     """The SHA-256 hash of JSON types, in hexadecimal digits."""
     text = json.dumps(value, sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()
+
+
+def digest(path: Path) -> str:
+    """The SHA-256 hash of a file, in hexadecimal digits."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+_CHECKSUM = "checksum"
+
+
+def with_checksum(values: dict[str, Any]) -> dict[str, Any]:
+    """The values and, under `checksum`, the hash over them; all JSON types."""
+    return {**values, _CHECKSUM: hashed(json.loads(json.dumps(values)))}
+
+
+def without_checksum(values: dict[str, Any]) -> dict[str, Any]:
+    """The values that `with_checksum` was given."""
+    return {name: value for name, value in values.items() if name != _CHECKSUM}
+
+
+def checksum_fits(values: dict[str, Any]) -> bool:
+    """Whether values are as they were when `with_checksum` was called."""
+    return values.get(_CHECKSUM) == hashed(without_checksum(values))

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import inspect
-from typing import Any
+from typing import Any, ClassVar
 
-from acl_gym.utils.validation import Range, number
+from acl_gym.utils.validation import Range, number, shown
 
 
 class Parameter:
@@ -91,11 +91,28 @@ class Parameter:
         return number(f"{self.name} in trial {trial}", setting(trial), self.range)
 
 
+class Fixed:
+    """Base of classes some of whose attributes cannot be set again.
+
+    Kernels rely on them, or on arrays that were derived from them.
+    """
+
+    _fixed: ClassVar[tuple[str, ...]] = ()
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        if name in self._fixed and name in self.__dict__:
+            raise AttributeError(
+                f"{name} of a {type(self).__name__} is fixed once it is made, got "
+                f"{shown(value)}; make a new one."
+            )
+        super().__setattr__(name, value)
+
+
 def fixed(name: str, value: Any) -> AttributeError:
     """The error for setting what only the constructor of an agent sets."""
     return AttributeError(
-        f"{name} is fixed once the agent is made, got {value!r}; make a new agent with "
-        f"{name}={value!r}."
+        f"{name} is fixed once the agent is made, got {shown(value)}; make a new agent "
+        f"with {name}={shown(value)}."
     )
 
 

@@ -5,6 +5,21 @@ from __future__ import annotations
 import sys
 
 
+def count(number: float) -> str:
+    """A number of things in short: 950, 2.6k, 13M."""
+    for size, unit in ((1e9, "G"), (1e6, "M"), (1e3, "k")):
+        if number >= size:
+            places = 0 if number >= 10 * size else 1
+            return f"{number / size:.{places}f}{unit}"
+    return f"{number:g}"
+
+
+def short(text: str, length: int = 44) -> str:
+    """A text on one line, cut where it is longer."""
+    line = " ".join(text.split())
+    return line if len(line) <= length else f"{line[: length - 3]}..."
+
+
 def digits(value: float) -> str:
     """A number to three digits, without powers of ten: 2590, 44.7."""
     return f"{float(f'{value:.3g}'):g}"

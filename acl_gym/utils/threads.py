@@ -8,6 +8,11 @@ order of the ants. So a result does not depend on the number of threads or their
 
 from __future__ import annotations
 
+import functools
+import threading
+from collections.abc import Callable
+from typing import Any
+
 from acl_gym.utils import validation
 
 LEAST_ANTS = 2_000
@@ -16,6 +21,33 @@ LEAST_ANTS = 2_000
 
 class _Setting:
     count = 1
+
+
+_one_at_a_time = threading.Lock()
+
+
+def shared_among_threads(kernel: Callable[..., Any]) -> Callable[..., Any]:
+    """Make a parallel kernel safe to call from any Python thread; a decorator.
+
+    Numba keeps the number of threads for each Python thread by itself, and two of them
+    inside parallel kernels at once end the process under its `workqueue` layer. Here
+    the count of `set_num_threads` holds everywhere, and Python threads take turns.
+
+    Args:
+        kernel: compiled with `parallel=True`.
+
+    Returns:
+        A function that takes the same arguments.
+    """
+    import numba
+
+    @functools.wraps(kernel)
+    def call(*arguments: Any) -> Any:
+        with _one_at_a_time:
+            numba.set_num_threads(_Setting.count)
+            return kernel(*arguments)
+
+    return call
 
 
 def set_num_threads(count: int) -> None:

@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import math
+import os
+import sys
 from collections.abc import Collection
 from dataclasses import dataclass
 from difflib import get_close_matches
 from numbers import Integral, Real
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 _MANY = 10
+_LONGEST = 200  # letters of a value that a message shows
 
 
 @dataclass(frozen=True)
@@ -76,7 +80,7 @@ def number(
     """
     if isinstance(value, bool) or not isinstance(value, Real):
         raise TypeError(
-            f"{name} must be a real number, got {value!r} of type "
+            f"{name} must be a real number, got {shown(value)} of type "
             f"{type(value).__name__}; pass an int or a float."
         )
     try:
@@ -85,23 +89,37 @@ def number(
         result = math.inf
     interval = Range(**bounds) if within is None else within
     if result not in interval:
-        raise ValueError(f"{name} must lie in {interval}, got {value!r}.")
+        raise ValueError(f"{name} must lie in {interval}, got {shown(value)}.")
     return result
 
 
-def integer(name: str, value: Any, *, at_least: int) -> int:
+def integer(
+    name: str, value: Any, *, at_least: int, at_most: int | None = sys.maxsize
+) -> int:
     """Return `value` as an int of at least `at_least`.
+
+    Args:
+        name: what the number is called in the error message.
+        value: the candidate.
+        at_least: the smallest that is allowed.
+        at_most: the largest; by default what an int64 holds, because arrays and
+            kernels take no more. None sets no limit, as for seeds.
 
     Raises:
         TypeError: `value` is not an integer.
-        ValueError: `value` is too small.
+        ValueError: `value` is too small or too large.
     """
     if isinstance(value, bool) or not isinstance(value, Integral):
         raise TypeError(
-            f"{name} must be an integer, got {value!r} of type {type(value).__name__}."
+            f"{name} must be an integer, got {shown(value)} of type "
+            f"{type(value).__name__}."
         )
     if value < at_least:
-        raise ValueError(f"{name} must be at least {at_least}, got {value}.")
+        raise ValueError(
+            f"{name} must be at least {at_least}, got {shown(int(value))}."
+        )
+    if at_most is not None and int(value) > at_most:
+        raise ValueError(f"{name} must be at most {at_most}, got {shown(int(value))}.")
     return int(value)
 
 
@@ -125,7 +143,8 @@ def real_array(
 ) -> NDArray[np.float64]:
     """Return `values` as a new float64 array that is not empty.
 
-    Strings, complex numbers and ragged lists are rejected, not converted.
+    Strings, complex numbers, ragged lists and arrays with masked entries are rejected,
+    not converted.
 
     Args:
         name: what the array is called in the error message.
@@ -137,21 +156,94 @@ def real_array(
     Raises:
         ValueError: `values` are not such an array.
     """
-    try:
-        array = np.asarray(values)
-    except ValueError:  # ragged
-        array = np.empty(0)
+    array = as_array(values)
     valid = (
-        array.dtype.kind in ("iufb" if boolean else "iuf")
+        array is not None
+        and array.dtype.kind in ("iufb" if boolean else "iuf")
         and array.size > 0
         and ndim in (None, array.ndim)
         and (not finite or bool(np.isfinite(array).all()))
     )
-    if not valid:
+    if array is None or not valid:
         kind = "an array" if ndim is None else f"an array of {ndim} axes"
         numbers = "finite real numbers" if finite else "real numbers"
-        raise ValueError(f"{name} must be {kind} of {numbers}, got {values!r}.")
+        raise ValueError(f"{name} must be {kind} of {numbers}, got {shown(values)}.")
     return array.astype(np.float64)
+
+
+def as_array(values: Any) -> NDArray[Any] | None:
+    """Return `values` as an array; None if they are ragged or have masked entries."""
+    try:
+        if isinstance(values, np.ma.MaskedArray) and np.ma.is_masked(values):
+            return None
+        return np.asarray(values)
+    except (TypeError, ValueError, OverflowError):
+        return None
+
+
+def path(name: str, value: Any) -> Path:
+    """Return the path of a file or folder.
+
+    Raises:
+        TypeError: `value` is neither text nor a path.
+        ValueError: `value` is empty or holds a NUL, which no name does.
+    """
+    try:
+        text = os.fsdecode(value)
+    except TypeError:
+        raise TypeError(
+            f"{name} must be a path, text or pathlib.Path, got {shown(value)} of type "
+            f"{type(value).__name__}."
+        ) from None
+    if not text or "\0" in text:
+        raise ValueError(f"{name} must be the name of a file, got {shown(value)}.")
+    return Path(text)
+
+
+def read_only(array: NDArray[Any]) -> NDArray[Any]:
+    """Return a view of `array` that cannot be written to."""
+    view = array.view()
+    view.flags.writeable = False
+    return view
+
+
+def shown(value: Any) -> str:
+    """Return what a message shows of a value: its repr, shortened.
+
+    Works for any value: one whose repr fails is described by its type.
+    """
+    try:
+        text = repr(value)
+    except Exception:
+        return f"an object of type {type(value).__name__}"
+    return text if len(text) <= _LONGEST else f"{text[:_LONGEST]}..."
+
+
+def check_memory(what: str, n_bytes: int, remedy: str) -> None:
+    """Refuse to reserve more memory than the machine has, before anything is reserved.
+
+    Args:
+        what: what the memory is for, in the plural, such as "solutions of 10 ants".
+        n_bytes: how much they need.
+        remedy: what to do about it, an imperative.
+
+    Raises:
+        ValueError: it is more than the machine has.
+    """
+    most = _memory_of_the_machine()
+    if n_bytes > most:
+        raise ValueError(
+            f"{what} must fit into {most:,} bytes of memory, but need {n_bytes:,} "
+            f"bytes; {remedy}."
+        )
+
+
+def _memory_of_the_machine() -> int:
+    """Bytes of physical memory; where they are unknown, more than any machine has."""
+    try:
+        return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    except (AttributeError, ValueError, OSError):  # pragma: no cover - not on Linux
+        return 2**48
 
 
 def one_of(name: str, value: Any, allowed: Collection[str]) -> str:
@@ -161,12 +253,16 @@ def one_of(name: str, value: Any, allowed: Collection[str]) -> str:
         ValueError: it is not; the message suggests the most similar one, if any, and then does not
             list the others where they are many.
     """
-    if value not in allowed:
+    if not isinstance(value, str) or value not in allowed:
         choices = ", ".join(repr(choice) for choice in allowed)
-        message = f"{name} must be one of {choices}, got {value!r}."
-        if similar := get_close_matches(str(value), allowed, 1):
+        message = f"{name} must be one of {choices}, got {shown(value)}."
+        if isinstance(value, str) and (
+            similar := get_close_matches(value[:_LONGEST], allowed, 1)
+        ):
             if len(allowed) > _MANY:
-                message = f"{name} must be one of {len(allowed)} names, got {value!r}."
+                message = (
+                    f"{name} must be one of {len(allowed)} names, got {shown(value)}."
+                )
             message += f" Did you mean {similar[0]!r}?"
         raise ValueError(message)
     return str(value)

@@ -313,10 +313,10 @@ def test_a_new_table_is_what_the_ants_choose_by() -> None:
     left[:, 0] = right[:, 1] = 1e9
     colony.set_table(right)
     colony.learn(trials=2)
-    assert colony.history[-1]["ants_success_rate"] == 1.0
+    assert colony.rollout.terminated.all()
     colony.set_table(left)
     colony.learn(trials=2)
-    assert colony.history[-1]["ants_success_rate"] == 0.0
+    assert not colony.rollout.terminated.any()
 
 
 def test_the_live_table_cannot_be_written_to() -> None:

@@ -41,7 +41,7 @@ def test_a_cost_replaces_the_rewards() -> None:
 
     def way(solution: Episode) -> float:
         assert len(solution.observations) == len(solution.actions) + 1
-        assert solution.success == (solution.observations[-1, 0] == 5.0)
+        assert solution.terminated == (solution.observations[-1, 0] == 5.0)
         return 1.0 + float(np.abs(np.diff(solution.observations[:, 0])).sum())
 
     agent = colony(chains(8, reward=0.0), cost=way).learn(trials=40)
@@ -69,7 +69,7 @@ def test_episodes_end_where_the_ants_do() -> None:
         np.testing.assert_array_equal(episodes.lengths, rollout.length)
         for ant in range(6):
             episode = episodes[ant]
-            assert (episode.observations[-1, 0] == 5.0) == episode.success
+            assert (episode.observations[-1, 0] == 5.0) == episode.terminated
             moves = np.diff(episode.observations[:, 0])
             wall = episode.observations[:-1, 0] == 0.0
             expected = np.where(episode.actions == 1, 1.0, np.where(wall, 0.0, -1.0))

@@ -17,7 +17,7 @@ from stable_baselines3.common.monitor import Monitor
 from acl_gym import ACL, Crisp, Fuzzy, Partition, QLearning
 from acl_gym.agents.base import TabularAgent
 from acl_gym.policies import TablePolicy
-from acl_gym.utils import files
+from acl_gym.utils import archives
 from tests.agents.reference_colony import Chain, chains
 
 ROW = Crisp([np.arange(6.0)])
@@ -315,24 +315,27 @@ def test_notes_are_in_the_file(tmp_path: Path) -> None:
     loaded = ACL.load(agent.save(tmp_path / "agent"))
     assert loaded.metadata == {"env": "Chain", "args": {"slip": 0.2, "list": [1]}}
     agent.metadata = {"env": object()}
-    with pytest.raises(TypeError, match="must be numbers and strings"):
+    with pytest.raises(TypeError, match=r"metadata\['env'\] must be numbers, text"):
         agent.save(tmp_path / "agent")
     agent.metadata = ["env"]  # type: ignore[assignment]
-    with pytest.raises(ValueError, match="metadata must be a dict"):
-        ACL.load(agent.save(tmp_path / "agent"))
+    with pytest.raises(TypeError, match="metadata must be a dict"):
+        agent.save(tmp_path / "agent")
+    with pytest.raises(TypeError, match="metadata must be a dict"):
+        agent.learn(trials=1)
+    assert agent.trials == 0
 
 
 def test_a_file_from_before_there_were_notes_is_read(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     agent = on_chain(ACL)
-    save = files.save
+    save = archives.save
 
     def old(path: Path, header: dict[str, Any], arrays: Any) -> Path:
         del header["metadata"]
         return save(path, header, arrays)
 
-    monkeypatch.setattr(files, "save", old)
+    monkeypatch.setattr(archives, "save", old)
     assert ACL.load(agent.save(tmp_path / "agent")).metadata == {}
 
 

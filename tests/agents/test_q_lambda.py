@@ -122,14 +122,14 @@ def follow(
             case["accumulate"],
             0.0,
             ants,
-            *memory.arrays,
+            *memory.with_room(k),
         )
         stays = ~terminated
         stays[rng.random(m) < 0.1] = False
         ants = ants[stays]
         if not ants.size:
             break
-    assert not memory.arrays[-1].any()  # the marks are wiped
+    assert not memory.with_room(0)[-1].any()  # the marks are wiped
     return values, expected
 
 
@@ -170,7 +170,7 @@ def test_traces_that_fade_at_once_are_no_traces(seed: int, slots: int, k: int) -
         memory.greedy[:] = True
         q_learning._update(one, *step)
         q_learning._update_traced(
-            other, *step, 0.0, False, 1e-4, np.arange(slots), *memory.arrays
+            other, *step, 0.0, False, 1e-4, np.arange(slots), *memory.with_room(k)
         )
     assert one.tobytes() == other.tobytes()
 
@@ -189,9 +189,9 @@ def test_traces_below_the_cutoff_are_dropped() -> None:
         q_learning._update_traced(
             *(values, state, one, action, np.ones(1), np.zeros(1, dtype=np.bool_)),
             *(following, one, ALL, 0.5, 1.0, 0.1, False, 1e-4, np.zeros(1, np.int64)),
-            *memory.arrays,
+            *memory.with_room(1),
         )
-    _, pair, trace, count, _ = memory.arrays
+    _, pair, trace, count, _ = memory.with_room(0)
     # 1, 0.1, 0.01, 0.001; the next has come to 1e-4, give or take a rounding.
     assert count[0] in (4, 5)
     assert pair[0, : count[0]].tolist() == list(range(11))[-count[0] :]
@@ -458,3 +458,21 @@ def test_moves_that_fail_with_a_falling_rate(trace_decay: float) -> None:
         agent.learning_rate = 1 / (1 + 0.2 * trial)
         agent.learn(trials=1)
     np.testing.assert_allclose(agent.table[:, 0], -(6 - np.arange(7)) / 0.7, rtol=0.1)
+
+
+@pytest.mark.parametrize("traces", q_learning.TRACES)
+def test_memory_that_grows_changes_nothing(
+    traces: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """From room for one trace on, to the last bit; and none is made beforehand."""
+    whole = on_chain(traces=traces).learn(trials=5)
+    monkeypatch.setattr(q_learning, "FIRST_TRACES", 1)
+    grown = on_chain(traces=traces)
+    grown._max_steps = 10**12
+    grown.set_env(grown.env)
+    grown.rollout.max_steps = whole.max_steps
+    grown.learn(trials=5)
+    assert grown.table.tobytes() == whole.table.tobytes()
+    memory = grown._traces
+    assert memory is not None
+    assert memory.with_room(0)[1].shape[1] <= grown.table.size

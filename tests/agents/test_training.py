@@ -116,25 +116,18 @@ def test_bad_budgets(name: str, value: Any, error: type[Exception]) -> None:
 def test_rows_hold_the_measures_of_their_trial(kind: type) -> None:
     agent = make(kind, slots=5, seed=2)
     policies = [agent.policy.best_actions()]
-    seen: list[tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]] = []
+    seen: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
 
     def note(agent: TabularAgent, row: dict[str, float]) -> None:
         rollout = agent.rollout
-        seen.append(
-            (
-                rollout.cost.copy(),
-                rollout.length.copy(),
-                rollout.terminated.copy(),
-                agent.table.copy(),
-            )
-        )
+        seen.append((rollout.cost.copy(), rollout.length.copy(), agent.table.copy()))
         policies.append(agent.policy.best_actions())
 
     agent.learn(trials=6, callback=note).learn(trials=4, callback=note)
     steps, seconds = 0, 0.0
-    columns = {"trial", "env_steps", "seconds", "ants_cost", "ants_success_rate"}
+    columns = {"trial", "env_steps", "seconds", "ants_cost", "ants_return"}
     columns |= {"policy_variation"} | ({"sensitivity"} if kind is ACL else set())
-    for k, (row, (cost, length, success, table)) in enumerate(
+    for k, (row, (cost, length, table)) in enumerate(
         zip(agent.history, seen, strict=True)
     ):
         steps += length.sum()
@@ -143,7 +136,7 @@ def test_rows_hold_the_measures_of_their_trial(kind: type) -> None:
         assert row["env_steps"] == steps
         assert row["seconds"] > seconds
         assert row["ants_cost"] == cost.mean() == length.mean()
-        assert row["ants_success_rate"] == success.mean()
+        assert row["ants_return"] == -cost.mean()
         changed = np.mean(policies[k + 1] != policies[k])
         assert row["policy_variation"] == changed
         if kind is ACL:
@@ -282,7 +275,8 @@ def test_a_line_every_so_many_trials(
     for line, row in zip(lines, agent.history[2::3], strict=False):
         assert line.startswith(f"trial {row['trial']:>4}")
         assert f"{row['env_steps']:,}" in line
-        assert f"ants' cost {row['ants_cost']:.1f}" in line
+        assert f"ants' return {row['ants_return']:.1f}" in line
+        assert "cost" not in line
 
 
 @BOTH
@@ -297,7 +291,7 @@ def test_the_progress_bar_goes_to_standard_error(
     assert out == ""
     assert kind.__name__ in err
     assert total in err
-    assert "ants' cost" in err
+    assert "ants' return" in err
 
 
 def test_a_policy_cost_that_a_callback_adds_is_shown(

@@ -384,6 +384,8 @@ class TestTensorBoard:
 def test_without_tensorboard_it_says_what_to_install(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setitem(sys.modules, "torch.utils.tensorboard", None)
+    monkeypatch.setitem(
+        sys.modules, "tensorboard.summary.writer.event_file_writer", None
+    )
     with pytest.raises(ModuleNotFoundError, match=r"pip install \"acl-gym\[tensorb"):
         TensorBoardLog(tmp_path)

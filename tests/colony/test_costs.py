@@ -166,7 +166,7 @@ def test_measures_of_the_response_against_a_loop(record: Episodes) -> None:
                 one.actions[:, None],
                 one.stage_costs[:, None],
                 np.array([len(one.actions)]),
-                np.array([one.success]),
+                np.array([one.terminated]),
             )
             np.testing.assert_allclose(together[ant], cost(alone)[0])
 

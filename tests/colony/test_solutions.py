@@ -148,8 +148,8 @@ def test_kernels_agree_with_themselves_as_plain_python() -> None:
         for t in range(3):
             ants = np.flatnonzero(length > t)
             index = ants[:, None].astype(np.int32)
-            append(ants, seen[t], True, actions[t, ants], rows, action, walked)
-            append(ants, index, False, actions[t, ants], cells, own, again)
+            append(ants, seen[t], True, actions[t, ants], 5, 3, rows, action, walked)
+            append(ants, index, False, actions[t, ants], 5, 3, cells, own, again)
         np.testing.assert_array_equal(walked, length)
         places, out = np.zeros(5, np.int64), np.zeros(5, np.uint8)
         getattr(module._collect, name)(0, 3, walked, action, places, out)
@@ -172,3 +172,33 @@ def test_every_step_has_a_place_of_its_own(steps: int, n_ants: int) -> None:
     ]
     assert len(set(places)) == len(places)
     assert max(places) < solutions._size
+
+
+@pytest.mark.parametrize(
+    "partition", [Crisp.from_box(SQUARE, 3), Fuzzy.from_box(SQUARE, 3)]
+)
+@pytest.mark.parametrize("steps", [1, 5, 6, 23])
+def test_memory_grows_with_the_steps_that_are_made(
+    partition: Partition, steps: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Whatever the limit of steps, and what was there stays, trial after trial."""
+    monkeypatch.setattr(module, "FIRST_STEPS", 5)
+    rng = np.random.default_rng(steps)
+    found = []
+    for limit in (steps, 10**12):
+        solutions = Solutions(3, limit, 4, partition)
+        rng = np.random.default_rng(steps)
+        for _ in range(2):
+            solutions.clear()
+            for t in range(steps):
+                ants = np.flatnonzero(np.array([steps, steps // 2, 1]) > t)
+                seen = rng.random((3, 2))
+                index = partition(seen[ants])[0]
+                solutions.append(ants, seen, index, rng.integers(4, size=ants.size))
+        found.append(
+            [(b.index, b.degree, b.action, b.ends) for b in solutions.blocks()]
+        )
+        assert solutions._size <= 3 * max(2 * steps + 5, 10)
+    for one, other in zip(*found, strict=True):
+        for left, right in zip(one, other, strict=True):
+            np.testing.assert_array_equal(left, right)

@@ -25,8 +25,8 @@ from acl_gym.colony.update_rules import (
     Reinforcement,
     as_update,
     update_from_settings,
-    update_to_settings,
 )
+from acl_gym.utils.serialization import to_settings
 from tests.agents import reference_colony as reference
 from tests.agents.reference_colony import chains
 from tests.colony.test_pheromone import Trial, trials
@@ -199,7 +199,7 @@ class Counting(UpdateRule):
         assert episodes is not None
         costs = np.where(episodes.taken(), episodes.stage_costs, 0.0).sum(axis=0)
         np.testing.assert_allclose(costs, result.costs)
-        np.testing.assert_array_equal(episodes.success, result.success)
+        np.testing.assert_array_equal(episodes.terminated, result.terminated)
         np.testing.assert_array_equal(result.deposits, 1.0 / result.costs)
         self.log.append((gamma, rho))
         self.total += float(result.costs.sum())
@@ -231,7 +231,7 @@ def test_a_rule_of_ones_own_sees_the_trial(tmp_path: Path) -> None:
     np.testing.assert_array_equal(
         restored.predict(states)[0], colony.predict(states)[0]
     )
-    with pytest.raises(ValueError, match=r"the rule 'Counting'.*set agent\.update"):
+    with pytest.raises(ValueError, match=r"was '.*:Counting'.*set agent\.update"):
         restored.learn(trials=1)
     assert restored.parameters() == colony.parameters()
 
@@ -279,4 +279,4 @@ def test_what_is_no_rule_is_refused() -> None:
         update_from_settings({"type": "Linear"})
     with pytest.raises(ValueError, match="update must be an UpdateRule"):
         update_from_settings(3)
-    assert update_from_settings(update_to_settings(EachVisit())) == EachVisit()
+    assert update_from_settings(to_settings(EachVisit())) == EachVisit()

@@ -52,6 +52,17 @@ def beside_masks(infos: dict[str, Any]) -> dict[str, Any]:
     return {key: infos[key] for key in infos if not key.endswith("action_mask")}
 
 
+def success_at_ends(result: StepResult) -> StepResult:
+    """The step of single environments, which tell `is_success` in every step, as a
+    native environment gives it: told where episodes end, and only then."""
+    *rest, terminated, truncated, infos = result
+    finished, told = terminated | truncated, infos.get("_is_success")
+    infos = {key: infos[key] for key in infos if not key.endswith("is_success")}
+    if told is not None and (told & finished).any():
+        infos |= {"is_success": terminated, "_is_success": told & finished}
+    return (*rest, terminated, truncated, infos)
+
+
 def arrays_in(value: Any) -> list[np.ndarray]:
     """Every array of numbers in what `reset` or `step` returned."""
     if isinstance(value, dict):

@@ -158,13 +158,14 @@ def test_a_foreign_environment_starts_where_its_seed_says() -> None:
     np.testing.assert_array_equal(results[0].lengths, results[0].costs)
     np.testing.assert_array_equal(results[0].costs, results[1].costs)
     assert (results[0].costs != results[2].costs).any()
-    assert results[0].success_rate == 1.0
+    np.testing.assert_array_equal(results[0].returns, -results[0].costs)
+    assert results[0].success is results[0].success_rate is None
 
 
 def test_a_foreign_environment_is_left_after_300_steps() -> None:
     result = evaluate_policy_cost(Always(0), chains(2), seed=0)
     assert result.lengths.tolist() == [300, 300]
-    assert result.success_rate == 0.0
+    assert result.mean_return == -300.0
 
 
 @pytest.mark.parametrize(
@@ -208,7 +209,7 @@ def test_what_cannot_predict_is_refused_at_once(model: Any) -> None:
 
 
 def test_the_result_cannot_be_changed() -> None:
-    result = PolicyCost(np.ones(2), np.ones(2, dtype=bool), np.ones(2, dtype=int))
+    result = PolicyCost(np.ones(2), None, np.ones(2, dtype=int), -np.ones(2))
     with pytest.raises(AttributeError):
         result.costs = np.zeros(2)  # type: ignore[misc]
 

@@ -21,6 +21,7 @@ from acl_gym.experiments.runner import FolderInUseError, list_jobs, run_studies
 from acl_gym.experiments.store import Job, Store
 from acl_gym.experiments.study import Study
 from acl_gym.experiments.systems import grid_1d, pendulum
+from acl_gym.utils import files
 
 SHORT = replace(grid_1d(), trials=2)
 OTHER = replace(grid_1d(alpha=2.0), trials=2)
@@ -176,7 +177,10 @@ def test_killed_it_leaves_nothing_running_and_goes_on(
     running.kill()
     assert gone(workers), "a worker must not outlive the runner"
     before = times_of(runs)
-    (runs / ".half.parquet.77.tmp").write_text("{")
+    # What a write leaves that was killed half way.
+    half = f".acl-{files._machine()}-{running.pid}-0123456789ab.tmp"
+    running.wait()
+    (runs / half).write_text("{")
     found = run_studies([SHORT, OTHER], [0], runs, workers=1)
     assert times_of(runs) == before
     assert len(found.runs(OTHER)) == 1

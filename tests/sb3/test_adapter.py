@@ -1,19 +1,12 @@
 """The adapter: what Stable-Baselines3 expects of a `VecEnv`, checked piece by piece."""
 
-from collections.abc import Callable
-from typing import Any
-
 import gymnasium as gym
 import numpy as np
 import pytest
-from gymnasium import spaces
-from gymnasium.vector import AutoresetMode, SyncVectorEnv
-from gymnasium.vector.utils import batch_space
-from gymnasium.wrappers.vector import RecordEpisodeStatistics
+from gymnasium.vector import SyncVectorEnv
 from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.vec_env import DummyVecEnv
 
-import acl_gym
 from acl_gym.sb3.adapter import VectorEnvAdapter
 from tests.sb3.vector_envs import (
     COASTING,
@@ -25,75 +18,6 @@ from tests.sb3.vector_envs import (
     pendulums,
     step,
 )
-
-# --- what goes in ---------------------------------------------------------------
-
-
-def test_next_step_is_refused_with_a_remedy() -> None:
-    with pytest.raises(ValueError, match=r"NEXT_STEP.*autoreset_mode=.Disabled"):
-        VectorEnvAdapter(pendulums(2, "NextStep"))
-
-
-def test_a_mode_that_is_not_stated_counts_as_next_step() -> None:
-    env = pendulums(2)
-    env.metadata = {}
-    with pytest.raises(ValueError, match="NEXT_STEP"):
-        VectorEnvAdapter(env)
-
-
-@pytest.mark.parametrize("make", [lambda: gym.make(PENDULUM), lambda: None, lambda: 3])
-def test_only_vector_environments(make: Callable[[], Any]) -> None:
-    with pytest.raises(TypeError, match=r"gymnasium\.vector\.VectorEnv"):
-        VectorEnvAdapter(make())
-
-
-def _with_spaces(observation: spaces.Space[Any], action: spaces.Space[Any]) -> Any:
-    env = pendulums(2)
-    env.single_observation_space = observation
-    env.single_action_space = action
-    env.observation_space = batch_space(observation, 2)
-    env.action_space = batch_space(action, 2)
-    return env
-
-
-@pytest.mark.parametrize(
-    ("observation", "action", "message"),
-    [
-        (DICT_SPACE, spaces.Discrete(3, start=1), "actions must start from 0"),
-        (
-            spaces.Discrete(3, start=-1),
-            spaces.Discrete(3),
-            "observations must start from 0",
-        ),
-        (
-            spaces.Box(0, 1, (2,)),
-            spaces.MultiDiscrete([2, 2], start=[0, 1]),
-            "actions must start from 0",
-        ),
-        (spaces.Tuple([spaces.Discrete(2)]), spaces.Discrete(2), "FlattenObservation"),
-        (
-            spaces.Dict({"a": spaces.Dict({"b": spaces.Discrete(2)})}),
-            spaces.Discrete(2),
-            "FlattenObservation",
-        ),
-    ],
-)
-def test_spaces_that_sb3_would_misread_are_refused(
-    observation: spaces.Space[Any], action: spaces.Space[Any], message: str
-) -> None:
-    with pytest.raises(ValueError, match=message):
-        VectorEnvAdapter(_with_spaces(observation, action))
-
-
-def test_spaces_are_those_of_one_slot() -> None:
-    env = pendulums(3)
-    adapter = VectorEnvAdapter(env)
-    assert adapter.num_envs == 3
-    assert adapter.observation_space == env.single_observation_space
-    assert adapter.action_space == spaces.Discrete(3)
-    assert adapter.spec is env.spec
-    assert adapter.env is env
-
 
 # --- what comes out --------------------------------------------------------------
 
@@ -203,7 +127,7 @@ def test_infos_are_taken_apart(mode: str) -> None:
 def test_the_same_as_sb3s_own_vector_environment(mode: str) -> None:
     """Step for step what `DummyVecEnv` gives for the same single environments."""
     ours = VectorEnvAdapter(countdowns(2, 3, 5, mode=mode))
-    theirs = DummyVecEnv([lambda n=n: Countdown(n) for n in (2, 3, 5)])  # type: ignore[misc]
+    theirs = DummyVecEnv([lambda n=n: Monitor(Countdown(n)) for n in (2, 3, 5)])  # type: ignore[misc]
     for env in (ours, theirs):
         env.seed(11)
     np.testing.assert_array_equal(ours.reset(), theirs.reset())
@@ -219,6 +143,11 @@ def test_the_same_as_sb3s_own_vector_environment(mode: str) -> None:
             # With SAME_STEP, Gymnasium adds the info of the reset.
             assert ("begun" in mine) == (mode == "SameStep" and last is not None)
             mine.pop("begun", None)
+            episode, counted = mine.pop("episode", None), other.pop("episode", None)
+            assert (episode is None) == (counted is None) == (last is None)
+            if episode is not None:
+                assert episode["r"] == pytest.approx(counted["r"])
+                assert episode["l"] == counted["l"]
             assert mine == other
 
 
@@ -308,58 +237,7 @@ def test_options_for_single_slots_are_refused() -> None:
         env.set_options([{}, {}])
 
 
-# --- attributes, methods, wrappers, frames -----------------------------------------
-
-
-def test_attributes_of_a_native_vector_environment() -> None:
-    env = VectorEnvAdapter(
-        acl_gym.ScaledVectorObservation(pendulums(3, max_episode_steps=9), [0])
-    )
-    assert env.get_attr("max_episode_steps") == [9, 9, 9]
-    assert env.get_attr("max_episode_steps", indices=1) == [9]
-    assert env.get_attr("scaling", [0, 2])[1].circular == (0,)
-    assert env.get_attr("observation_space") == [env.observation_space] * 3
-    assert env.get_attr("action_space", 0) == [spaces.Discrete(3)]
-    assert not env.has_attr("no_such_attribute")
-    env.set_attr("max_episode_steps", 5)
-    assert env.env.unwrapped.max_episode_steps == 5
-    with pytest.raises(ValueError, match="by all 3 slots"):
-        env.set_attr("max_episode_steps", 7, indices=[0])
-    with pytest.raises(AttributeError, match="no_such_attribute"):
-        env.set_attr("no_such_attribute", 1)
-
-
-def test_methods_of_a_native_vector_environment() -> None:
-    env = VectorEnvAdapter(pendulums(3))
-    others = env.env_method("with_slots", 7)
-    assert len(others) == 3
-    assert others[0] is others[2]
-    assert others[0].num_envs == 7
-    with pytest.raises(ValueError, match="by all 3 slots"):
-        env.env_method("with_slots", 7, indices=1)
-    with pytest.raises(AttributeError, match="no_such_method"):
-        env.env_method("no_such_method")
-
-
-def test_attributes_and_methods_of_single_environments() -> None:
-    env = VectorEnvAdapter(countdowns(2, 3, 5))
-    assert env.get_attr("length") == [2, 3, 5]
-    assert env.get_attr("length", [2, 0]) == [5, 2]
-    env.set_attr("length", 4, indices=1)
-    assert env.get_attr("length") == [2, 4, 5]
-    assert env.env_method("double", 10) == [40, 80, 100]
-    assert env.env_method("double", number=1, indices=[2]) == [10]
-
-
-def test_wrappers_are_found() -> None:
-    native = VectorEnvAdapter(RecordEpisodeStatistics(pendulums(2)))
-    assert native.env_is_wrapped(RecordEpisodeStatistics) == [True, True]  # type: ignore[arg-type]
-    assert native.env_is_wrapped(Monitor) == [False, False]
-    monitored = SyncVectorEnv(
-        [lambda: Monitor(Countdown()), Countdown],
-        autoreset_mode=AutoresetMode.DISABLED,
-    )
-    assert VectorEnvAdapter(monitored).env_is_wrapped(Monitor) == [True, False]
+# --- frames and the end -------------------------------------------------------
 
 
 def test_frames() -> None:

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import logging
 import os
+import shutil
 import subprocess
 import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
@@ -102,3 +104,60 @@ def test_the_first_run_says_what_the_wait_is_for_and_the_second_nothing(
         said.append(done.stderr)
     assert "compiling its kernels for their first use" in said[0]
     assert said[1] == ""
+
+
+def test_without_a_folder_for_the_cache_kernels_are_compiled_without_it(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    def refuse(**options: Any) -> Any:
+        def compiled(function: Any) -> Any:
+            if "cache" in options:
+                raise RuntimeError(f"cannot cache function {function!r}: no locator")
+            return options, function
+
+        return compiled
+
+    monkeypatch.setattr(compiling.numba, "njit", refuse)
+    monkeypatch.setattr(compiling, "announcer", compiling.Announcer())
+    with caplog.at_level(logging.WARNING, logger="acl_gym"):
+        assert compiling.njit(len) == ({}, len)
+        assert compiling.njit(parallel=True)(len) == ({"parallel": True}, len)
+    assert len(caplog.messages) == 1
+    assert "NUMBA_CACHE_DIR" in caplog.messages[0]
+
+
+def test_other_faults_of_compilation_are_not_hidden(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def fail(function: Any) -> Any:
+        raise RuntimeError("no memory")
+
+    monkeypatch.setattr(compiling.numba, "njit", lambda **_: fail)
+    with pytest.raises(RuntimeError, match="no memory"):
+        compiling.njit(len)
+
+
+@pytest.mark.slow
+def test_an_installation_that_may_not_be_written_works(tmp_path: Path) -> None:
+    """A file in the place of every __pycache__ keeps even root from writing there."""
+    package = tmp_path / "site" / "acl_gym"
+    source = Path(compiling.__file__).parents[1]
+    shutil.copytree(source, package, ignore=shutil.ignore_patterns("__pycache__"))
+    for folder in (package, *(path for path in package.rglob("*") if path.is_dir())):
+        (folder / "__pycache__").touch(mode=0o444)
+    nowhere = "/dev/null/home"
+    kept = {k: v for k, v in os.environ.items() if not k.startswith("NUMBA")}
+    done = subprocess.run(
+        [sys.executable, "-B", "-c", TRIAL],
+        capture_output=True,
+        text=True,
+        cwd=tmp_path,
+        env={
+            **kept,
+            "HOME": nowhere,
+            "XDG_CACHE_HOME": nowhere,
+            "PYTHONPATH": str(package.parent),
+        },
+        check=True,
+    )
+    assert done.stderr.count("NUMBA_CACHE_DIR") == 1

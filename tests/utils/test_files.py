@@ -1,364 +1,277 @@
-"""Files are complete or absent, and harmless whatever is in them."""
+"""A file is written whole or not at all, wherever its name leads."""
 
 from __future__ import annotations
 
-import io
-import json
 import os
-import pickle
-import zipfile
-from collections.abc import Callable
+import re
+import subprocess
+import sys
+import threading
+import time
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
 
-from acl_gym import ACL, Crisp, QLearning
+import acl_gym
+from acl_gym import ACL, Crisp, CSVLog
 from acl_gym.utils import files
+from acl_gym.utils.files import remove_stale, write_atomically
 from tests.agents.reference_colony import chains
 
 ROW = Crisp([np.arange(6.0)])
-PATH = settings(
-    suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=100
-)
+LONGEST = 255
+"""Bytes of a name on the file systems in use."""
 
 
-def agent_file(path: Path, kind: type = ACL) -> bytes:
-    """A file of an agent that has learned for two trials."""
-    parameters = {"tau0": 1e-3} if kind is ACL else {}
-    agent = kind(chains(2), ROW, max_steps=5, seed=0, **parameters).learn(trials=2)
-    return agent.save(path).read_bytes()
+def agent() -> ACL:
+    return ACL(chains(2), ROW, tau0=1e-3, max_steps=5, seed=0)
 
 
-@pytest.fixture(scope="module")
-def saved(tmp_path_factory: pytest.TempPathFactory) -> bytes:
-    """The content of a file."""
-    return agent_file(tmp_path_factory.mktemp("saved") / "a")
+def temporary(pid: int, machine: str | None = None) -> str:
+    return f".acl-{machine or files._machine()}-{pid}-0123456789ab.tmp"
 
 
-def refuse_or_load(path: Path, content: bytes) -> bool:
-    """Whether the content loads; if not, that is a ValueError that names the file."""
-    path.write_bytes(content)
+# --- names ---------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("length", [LONGEST - 20, LONGEST])
+def test_long_names(length: int, tmp_path: Path) -> None:
+    log = tmp_path / ("c" * (length - 4) + ".csv")
+    path = (
+        agent()
+        .learn(trials=1, callback=CSVLog(log))
+        .save(tmp_path / "m".ljust(length - 4, "m"))
+    )
+    assert len(path.name) == length
+    assert ACL.load(path).trials == 1
+    assert log.read_text().startswith("trial,")
+    assert len(os.listdir(tmp_path)) == 2
+
+
+def test_permissions_are_those_that_open_gives(tmp_path: Path) -> None:
+    path, other = tmp_path / "a", tmp_path / "b"
+    before = os.umask(0o027)
     try:
-        agent = ACL.load(path)
-    except ValueError as error:
-        message = str(error)
-    else:
-        assert agent.predict([[0.0], [4.0]])[0].shape == (2,)
-        return True
-    assert path.name in message
-    return False
+        write_atomically(path, b"1")
+        with other.open("wb"):
+            pass
+        assert path.stat().st_mode == other.stat().st_mode
+        path.chmod(0o604)
+        write_atomically(path, b"2")
+        assert path.stat().st_mode & 0o777 == 0o604
+    finally:
+        os.umask(before)
 
 
-def unpacked(content: bytes) -> dict[str, np.ndarray]:
-    with np.load(io.BytesIO(content)) as file:
-        return {name: file[name] for name in file.files}
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may write everything")
+def test_a_file_that_is_read_only_stays(tmp_path: Path) -> None:
+    path = tmp_path / "a"
+    path.write_bytes(b"kept")
+    path.chmod(0o444)
+    with pytest.raises(PermissionError):
+        write_atomically(path, b"2")
+    assert path.read_bytes() == b"kept"
 
 
-def packed(**arrays: Any) -> bytes:
-    buffer = io.BytesIO()
-    np.savez(buffer, **arrays)
-    return buffer.getvalue()
+# --- links ---------------------------------------------------------------------
 
 
-def rewrite(content: bytes, change: Callable[[dict[str, Any]], None]) -> bytes:
-    """The content of an agent's file with another header."""
-    arrays = unpacked(content)
-    header = json.loads(arrays.pop("header").tobytes())
-    change(header)
-    text = np.frombuffer(json.dumps(header).encode(), dtype=np.uint8)
-    return packed(header=text, **arrays)
+def test_a_link_stays_and_the_file_behind_it_is_written(tmp_path: Path) -> None:
+    store = tmp_path / "store"
+    store.mkdir()
+    (tmp_path / "second").symlink_to(tmp_path / "first")
+    (tmp_path / "first").symlink_to(Path("store") / "file")
+    for content in (b"new", b"newer"):  # the first time, the file is not there
+        write_atomically(tmp_path / "second", content)
+        assert (store / "file").read_bytes() == content
+    assert (tmp_path / "first").is_symlink()
+    assert (tmp_path / "second").is_symlink()
+    assert os.listdir(store) == ["file"]
 
 
-# --- round trip ----------------------------------------------------------------
+def test_a_log_through_a_link(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").touch()
+    (tmp_path / "log.csv").symlink_to(tmp_path / "a.csv")
+    agent().learn(trials=2, callback=CSVLog(tmp_path / "log.csv"))
+    assert (tmp_path / "log.csv").is_symlink()
+    assert len((tmp_path / "a.csv").read_text().splitlines()) == 3
+
+
+def test_a_circle_of_links_is_an_error(tmp_path: Path) -> None:
+    (tmp_path / "a").symlink_to(tmp_path / "b")
+    (tmp_path / "b").symlink_to(tmp_path / "a")
+    with pytest.raises(OSError, match="symbolic links"):
+        write_atomically(tmp_path / "a", b"1")
+    assert sorted(os.listdir(tmp_path)) == ["a", "b"]
+
+
+def test_planted_links_are_not_followed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Neither under the name of a temporary file, could it be guessed."""
+    victim = tmp_path / "victim"
+    victim.write_bytes(b"kept")
+    monkeypatch.setattr(files.secrets, "token_hex", lambda n: "0123456789ab")
+    (tmp_path / temporary(os.getpid())).symlink_to(victim)
+    with pytest.raises(FileExistsError):
+        write_atomically(tmp_path / "a", b"1")
+    assert victim.read_bytes() == b"kept"
+
+
+def test_devices_and_pipes_are_written_not_replaced(tmp_path: Path) -> None:
+    pipe, found = tmp_path / "pipe", []
+    os.mkfifo(pipe)
+    reader = threading.Thread(target=lambda: found.append(pipe.read_bytes()))
+    reader.start()
+    write_atomically(pipe, b"content")
+    reader.join(timeout=10)
+    assert found == [b"content"]
+    assert pipe.is_fifo()
+    write_atomically("/dev/null", b"content")
+    assert Path("/dev/null").is_char_device()
+    with pytest.raises(IsADirectoryError):
+        write_atomically(tmp_path, b"content")
+
+
+# --- what killed processes leave -------------------------------------------------
+
+
+@pytest.fixture
+def dead() -> int:
+    """The number of a process that is no more."""
+    process = subprocess.Popen([sys.executable, "-c", ""])
+    process.wait()
+    return process.pid
+
+
+def test_files_of_dead_processes_go(dead: int, tmp_path: Path) -> None:
+    (tmp_path / temporary(dead)).write_text("half")
+    write_atomically(tmp_path / "a", b"1")
+    assert os.listdir(tmp_path) == ["a"]
 
 
 @pytest.mark.parametrize(
-    ("given_name", "written"),
-    [("a", "a.npz"), ("a.npz", "a.npz"), ("a.b", "a.b.npz"), (".a", ".a.npz")],
+    "name",
+    [
+        temporary(os.getpid()),
+        temporary(os.getppid()),
+        temporary(2**22 + 1, machine="00000000"),
+        ".acl-notes.tmp",
+        ".mine.123.tmp",
+        "acl-00000000-1-0123456789ab.tmp",
+    ],
 )
-def test_what_is_saved_is_loaded(given_name: str, written: str, tmp_path: Path) -> None:
-    header = {"text": "τ0 <= ρ / J", "list": [1, 2.5, None, True], "nan": float("inf")}
-    arrays = {"x": np.arange(6.0).reshape(2, 3), "y": np.zeros(0, dtype=np.int32)}
-    for name in (tmp_path / given_name, str(tmp_path / given_name)):
-        assert files.save(name, header, arrays) == tmp_path / written
-        loaded, values = files.load(name)
-        assert {key: loaded[key] for key in header} == header
-        assert values.keys() == arrays.keys()
-        for key, value in arrays.items():
-            np.testing.assert_array_equal(values[key], value)
-            assert values[key].dtype == value.dtype
-    assert os.listdir(tmp_path) == [written]
+def test_other_files_stay(name: str, tmp_path: Path) -> None:
+    (tmp_path / name).write_text("kept")
+    write_atomically(tmp_path / "a", b"1")
+    assert (tmp_path / name).read_text() == "kept"
 
 
-@given(values=st.lists(st.floats()))
-@settings(PATH, max_examples=25)
-def test_numbers_survive_to_the_last_bit(values: list[float], tmp_path: Path) -> None:
-    files.save(tmp_path / "a", {"values": values}, {})
-    loaded = files.load(tmp_path / "a")[0]["values"]
-    assert [repr(value) for value in loaded] == [repr(value) for value in values]
+def test_files_of_other_machines_go_after_a_day(tmp_path: Path) -> None:
+    path = tmp_path / temporary(1, machine="00000000")
+    path.touch()
+    remove_stale(tmp_path)
+    assert path.exists()
+    long_ago = time.time() - 2 * 24 * 3600
+    os.utime(path, (long_ago, long_ago))
+    remove_stale(tmp_path)
+    assert not path.exists()
 
 
-def test_saving_again_replaces(tmp_path: Path) -> None:
-    files.save(tmp_path / "a", {"x": 1}, {"y": np.ones(1000)})
-    files.save(tmp_path / "a", {"x": 2}, {})
-    header, arrays = files.load(tmp_path / "a")
-    assert (header["x"], arrays) == (2, {})
+def test_folders_and_links_of_such_names_stay(dead: int, tmp_path: Path) -> None:
+    victim = tmp_path / "victim"
+    victim.touch()
+    (tmp_path / temporary(dead)).symlink_to(victim)
+    (tmp_path / temporary(dead + 2**24)).mkdir()
+    remove_stale(tmp_path)
+    remove_stale(tmp_path / "not there")
+    assert len(os.listdir(tmp_path)) == 3
 
 
-def test_the_name_given_to_save_is_good_for_load(tmp_path: Path) -> None:
-    """Also where something else has that name without the suffix."""
-    (tmp_path / "a").write_text("my notes on a")
-    files.save(tmp_path / "a", {"x": 1}, {})
-    assert files.load(tmp_path / "a")[0]["x"] == 1
-    (tmp_path / "b").mkdir()
-    files.save(tmp_path / "b", {"x": 2}, {})
-    assert files.load(tmp_path / "b")[0]["x"] == 2
+KILLED = """
+import sys
+from acl_gym.utils.files import write_atomically
+print("ready", flush=True)
+while True:
+    for letter in b"abcdefgh":
+        write_atomically(sys.argv[1], bytes([letter]) * 300_000)
+"""
 
 
-# --- saving fails --------------------------------------------------------------
+def test_killed_in_the_middle_a_writer_leaves_whole_files(tmp_path: Path) -> None:
+    path = tmp_path / "file"
+    for wait in (0.02, 0.05, 0.11):
+        process = subprocess.Popen(
+            [sys.executable, "-c", KILLED, path], stdout=subprocess.PIPE
+        )
+        assert process.stdout is not None
+        assert process.stdout.readline() == b"ready\n"
+        time.sleep(wait)
+        process.kill()
+        process.communicate()
+        if path.exists():
+            assert re.fullmatch(rb"(.)\1{299999}", path.read_bytes())
+    write_atomically(path, b"end")
+    assert os.listdir(tmp_path) == ["file"]
 
 
-def test_a_missing_directory(tmp_path: Path) -> None:
-    with pytest.raises(FileNotFoundError):
-        files.save(tmp_path / "missing" / "a", {}, {})
-    assert os.listdir(tmp_path) == []
+def test_threads_never_tear_a_file(tmp_path: Path) -> None:
+    path, torn = tmp_path / "file", []
+    write_atomically(path, b"a" * 200_000)
+    stop = threading.Event()
+
+    def write(letter: bytes) -> None:
+        while not stop.is_set():
+            write_atomically(path, letter * 200_000)
+
+    writers = [threading.Thread(target=write, args=(each,)) for each in (b"a", b"b")]
+    for writer in writers:
+        writer.start()
+    for _ in range(200):
+        content = path.read_bytes()
+        if len(content) != 200_000 or len(set(content)) != 1:
+            torn.append(content[:10])
+    stop.set()
+    for writer in writers:
+        writer.join()
+    assert not torn
+    assert os.listdir(tmp_path) == ["file"]
 
 
-def test_a_file_where_the_directory_should_be(tmp_path: Path) -> None:
-    (tmp_path / "file").write_text("kept")
-    with pytest.raises(OSError, match="file"):
-        files.save(tmp_path / "file" / "a", {}, {})
-    assert (tmp_path / "file").read_text() == "kept"
+# --- everyone writes in this way -------------------------------------------------
+
+WRITERS = re.compile(
+    r"write_text\(|write_bytes\(|to_csv\(|np\.savez?\(|savez_compressed\((?!buffer)"
+    r"|savefig\((?!buffer)|write_table\((?!content, buffer)|open\([^)]*[\"'][wx]b?[\"']"
+)
 
 
-@pytest.mark.parametrize("broken", ["os.fsync", "pathlib.Path.replace"])
-@pytest.mark.parametrize("kind", [ACL, QLearning])
-def test_a_disk_error_leaves_the_old_file_and_no_other(
-    broken: str, kind: type, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+def test_nothing_in_the_package_writes_otherwise() -> None:
+    """A line that does anything like it stands in `write_atomically` alone."""
+    root = Path(acl_gym.__file__).parent
+    found = [
+        f"{path.relative_to(root)}: {line.strip()}"
+        for path in sorted(root.rglob("*.py"))
+        for line in path.read_text(encoding="utf-8").splitlines()
+        if WRITERS.search(line) and path != root / "utils" / "files.py"
+    ]
+    assert found == []
+
+
+@pytest.mark.parametrize("fail", ["os.fsync", "os.replace"])
+def test_a_failure_leaves_what_was_there(
+    fail: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    before = agent_file(tmp_path / "a", kind)
-    agent = kind(None, ROW, n_actions=2)
+    write_atomically(tmp_path / "a", b"before")
 
     def full(*_: Any) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(broken, full)
-    with pytest.raises(OSError, match="No space left"):
-        agent.save(tmp_path / "a")
-    with pytest.raises(OSError, match="No space left"):
-        agent.save(tmp_path / "new")
-    assert os.listdir(tmp_path) == ["a.npz"]
-    assert (tmp_path / "a.npz").read_bytes() == before
-
-
-def test_what_json_does_not_know_is_refused_before_anything_is_written(
-    tmp_path: Path,
-) -> None:
-    with pytest.raises((TypeError, ValueError)):
-        files.save(tmp_path / "a", {"x": object()}, {})
-    assert os.listdir(tmp_path) == []
-
-
-# --- loading what is not ours --------------------------------------------------
-
-
-def test_a_missing_file(tmp_path: Path) -> None:
-    for name in ("a", "a.npz"):
-        with pytest.raises(FileNotFoundError, match=r"a\.npz"):
-            ACL.load(tmp_path / name)
-    with pytest.raises(FileNotFoundError):
-        ACL.load(tmp_path)
-
-
-def test_every_cut_is_refused(saved: bytes, tmp_path: Path) -> None:
-    for length in [*range(0, len(saved), 7), *range(len(saved) - 30, len(saved))]:
-        assert not refuse_or_load(tmp_path / "cut.npz", saved[:length])
-
-
-def test_every_changed_byte_is_refused_or_harmless(
-    saved: bytes, tmp_path: Path
-) -> None:
-    """Most changes meet a checksum; some are in fields of the zip that nobody reads."""
-    refused = 0
-    for position in range(len(saved)):
-        changed = bytearray(saved)
-        changed[position] ^= 0xFF if position % 2 else 1 << (position % 8)
-        refused += not refuse_or_load(tmp_path / "b.npz", bytes(changed))
-    assert refused > len(saved) / 2
-
-
-@given(st.lists(st.tuples(st.integers(0, 10**6), st.binary(max_size=8)), min_size=1))
-@PATH
-def test_bytes_written_over_a_file(
-    saved: bytes, tmp_path: Path, changes: list[tuple[int, bytes]]
-) -> None:
-    content = bytearray(saved)
-    for position, patch in changes:
-        start = position % len(content)
-        content[start : start + len(patch)] = patch
-    refuse_or_load(tmp_path / "a.npz", bytes(content))
-
-
-@given(
-    st.binary(max_size=300), st.sampled_from([b"", b"PK\x03\x04", b"\x93NUMPY\x01\0"])
-)
-@PATH
-def test_random_bytes_are_refused(tmp_path: Path, content: bytes, magic: bytes) -> None:
-    assert not refuse_or_load(tmp_path / "a.npz", magic + content)
-
-
-class Malice:
-    """What an untrusted pickle may do."""
-
-    def __init__(self, target: Path) -> None:
-        self.target = str(target)
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return (os.mkdir, (self.target,))
-
-
-@pytest.mark.parametrize("name", ["header", "table", "ranks", "more", None])
-def test_pickles_are_never_run(name: str | None, saved: bytes, tmp_path: Path) -> None:
-    trap, path = tmp_path / "trapped", tmp_path / "a.npz"
-    content = pickle.dumps(Malice(trap))
-    if name is not None:
-        malice = np.array([Malice(trap)], dtype=object)
-        content = packed(**{**unpacked(saved), name: malice})
-    assert not refuse_or_load(path, content)
-    assert not trap.exists()
-
-
-def foreign_files() -> dict[str, bytes]:
-    """Valid files that are not agents."""
-    files = {"empty": b"", "text": b"no agent", "null": b"\0" * 100}
-    buffer = io.BytesIO()
-    np.save(buffer, np.ones(3))
-    files["npy"] = buffer.getvalue()
-    archives: dict[str, dict[str, Any]] = {
-        "other arrays": {"x": np.ones(3)},
-        "no arrays": {},
-        "header of numbers": {"header": np.ones(3)},
-        "header without axis": {"header": np.uint8(3)},
-    }
-    for text in (
-        "",
-        "{",
-        "[]",
-        "3",
-        "null",
-        '"agent"',
-        "{}",
-        '{"format": 1}',
-        "[" * 10**5,
-    ):
-        array = np.frombuffer(text.encode(), dtype=np.uint8)
-        archives[f"header {text[:20]}"] = {"header": array}
-    files |= {name: packed(**arrays) for name, arrays in archives.items()}
-    buffer = io.BytesIO()
-    with zipfile.ZipFile(buffer, "w") as file:
-        file.writestr("notes.txt", "a zip")
-    files["zip"] = buffer.getvalue()
-    return files
-
-
-FOREIGN = foreign_files()
-
-
-@pytest.mark.parametrize("name", FOREIGN)
-def test_foreign_files_are_refused(name: str, tmp_path: Path) -> None:
-    assert not refuse_or_load(tmp_path / "a.npz", FOREIGN[name])
-
-
-@pytest.mark.parametrize(
-    "version", [2, 0, "1", None, 1.5, [1], pytest.param(..., id="none")]
-)
-def test_other_versions_are_refused_by_number(
-    version: Any, saved: bytes, tmp_path: Path
-) -> None:
-    content = rewrite(saved, lambda old: put(old, "version", version))
-    (tmp_path / "a.npz").write_bytes(content)
-    with pytest.raises(ValueError, match=r"a\.npz must be of format .* version 1, got"):
-        ACL.load(tmp_path / "a")
-
-
-NONSENSE = [None, True, -1, 2.5, 10**400, float("nan"), "text", [], [1], {}, {"a": 1}]
-PLACES = [
-    "agent",
-    "parameters",
-    "partition",
-    "n_actions",
-    "generators",
-    "num_timesteps",
-    "trials",
-    "seconds",
-    "history",
-    "parameters/tau0",
-    "parameters/alpha",
-    "parameters/selection",
-    "parameters/max_steps",
-    "parameters/seed",
-    "parameters/unknown",
-    "partition/type",
-    "partition/centres",
-    "partition/periods",
-    "generators/0",
-    "generators/0/bit_generator",
-    "generators/0/state",
-    "generators/0/state/state",
-    "generators/1/has_uint32",
-    "generators/1/uinteger",
-]
-
-
-def put(header: dict[str, Any], place: str, value: Any) -> None:
-    """Set one entry of the header; `...` takes it out."""
-    *way, last = [int(key) if key.isdigit() else key for key in place.split("/")]
-    inner: Any = header
-    for key in way:
-        inner = inner[key]
-    if value is not ...:
-        inner[last] = value
-    elif last in inner or isinstance(inner, list):
-        del inner[last]
-
-
-@pytest.mark.parametrize("place", PLACES)
-def test_nonsense_in_the_header_is_a_value_error_if_anything(
-    place: str, saved: bytes, tmp_path: Path
-) -> None:
-    failures = []
-    for value in [*NONSENSE, ...]:
-        content = rewrite(saved, lambda old, v=value: put(old, place, v))
-        (tmp_path / "b.npz").write_bytes(content)
-        try:
-            ACL.load(tmp_path / "b")
-        except ValueError:
-            pass
-        except Exception as error:
-            failures.append(f"{value!r:.20}: {error!r:.90}")
-    assert not failures, "\n".join(failures)
-
-
-@pytest.mark.parametrize("place", ["num_timesteps", "trials", "seconds", "history"])
-@pytest.mark.parametrize("value", [None, "text", {}, -1], ids=repr)
-def test_a_record_of_the_wrong_kind_is_refused(
-    place: str, value: Any, saved: bytes, tmp_path: Path
-) -> None:
-    """Else it would be found out in the next `learn`, after a trial."""
-    content = rewrite(saved, lambda old: put(old, place, value))
-    assert not refuse_or_load(tmp_path / "b.npz", content)
-
-
-@pytest.mark.parametrize("name", ["table", "ranks"])
-@pytest.mark.parametrize("shape", [(1, 2), (6, 1), (), (12,), (6, 3), (0,)])
-def test_arrays_of_another_shape_are_refused(
-    name: str, shape: tuple[int, ...], saved: bytes, tmp_path: Path
-) -> None:
-    arrays = unpacked(saved)
-    other = np.ones(shape, dtype=arrays.pop(name).dtype)
-    for content in (packed(**arrays, **{name: other}), packed(**arrays)):
-        assert not refuse_or_load(tmp_path / "a.npz", content)
+    monkeypatch.setattr(fail, full)
+    for name in ("a", "b"):
+        with pytest.raises(OSError, match="No space left"):
+            write_atomically(tmp_path / name, b"after")
+    assert os.listdir(tmp_path) == ["a"]
+    assert (tmp_path / "a").read_bytes() == b"before"

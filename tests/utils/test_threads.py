@@ -35,6 +35,30 @@ print(json.dumps(tables))
 """
 
 
+TWO_PYTHON_THREADS = """
+import json, threading
+import gymnasium as gym
+import numba
+from acl_gym import ACL, Fuzzy, set_num_threads
+from acl_gym.utils import threads
+threads.LEAST_ANTS = 1
+set_num_threads(2)
+learned, used = {}, {}
+def learn(name):
+    env = gym.make_vec("acl_gym/Pendulum-v0", num_envs=500)
+    grid = Fuzzy.from_box(env.single_observation_space, (20, 21), circular=[0])
+    learned[name] = ACL(env, grid, seed=3, max_steps=50).learn(trials=4).table.sum()
+    used[name] = numba.get_num_threads()
+workers = [threading.Thread(target=learn, args=(name,)) for name in "abc"]
+for worker in workers:
+    worker.start()
+for worker in workers:
+    worker.join()
+learn("main")
+print(json.dumps([sorted(set(learned.values())), used]))
+"""
+
+
 @pytest.fixture(autouse=True)
 def one_thread_afterwards(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     monkeypatch.setattr(threads, "LEAST_ANTS", 1)  # small colonies wake threads too
@@ -132,3 +156,22 @@ def test_a_number_of_threads_that_cannot_be(
     with pytest.raises(error, match=words):
         acl_gym.set_num_threads(count)
     assert acl_gym.get_num_threads() == 1
+
+
+def test_colonies_in_several_python_threads_share_kernels_and_setting() -> None:
+    """Under the layer that ends the process where two threads enter kernels at once."""
+    done = subprocess.run(
+        [sys.executable, "-c", TWO_PYTHON_THREADS],
+        check=False,
+        capture_output=True,
+        text=True,
+        env={
+            **os.environ,
+            "NUMBA_NUM_THREADS": "4",
+            "NUMBA_THREADING_LAYER": "workqueue",
+        },
+    )
+    assert done.returncode == 0, done.stderr
+    tables, used = json.loads(done.stdout)
+    assert len(tables) == 1
+    assert used == dict.fromkeys("abc", 2) | {"main": 2}

@@ -62,7 +62,64 @@ def test_bounds(
             validation.number("rate", value, **bounds)
 
 
-@pytest.mark.parametrize("value", [1, 7, np.int32(3), np.uint8(200), 10**30])
+@pytest.mark.parametrize("value", [2**63, 10**30, 10**5000, np.uint64(2**63)])
+def test_integers_must_fit_into_arrays_unless_told_otherwise(value: Any) -> None:
+    with pytest.raises(ValueError, match=r"^count must be at most 9223372036854775807"):
+        validation.integer("count", value, at_least=1)
+    assert validation.integer("seed", value, at_least=0, at_most=None) == value
+    assert validation.seed(value) == value
+
+
+def test_a_seed_is_none_or_a_whole_number() -> None:
+    assert validation.seed(None) is None
+    with pytest.raises(ValueError, match=r"^seed must be at least 0, got -1\."):
+        validation.seed(-1)
+    with pytest.raises(TypeError, match=r"^seed must be an integer, got 1\.5"):
+        validation.seed(1.5)
+
+
+class _NoRepr:
+    def __repr__(self) -> str:
+        raise RuntimeError
+
+
+def test_any_value_is_shown_shortly() -> None:
+    assert validation.shown(1.5) == "1.5"
+    assert len(validation.shown("x" * 10_000)) < 300  # the limit and the dots
+    assert validation.shown(_NoRepr()) == "an object of type _NoRepr"
+    assert validation.shown(10**5000) == "an object of type int"  # too long for Python
+
+
+@pytest.mark.parametrize("value", [None, 3, [], 1.5, np.ones(2)])
+def test_paths_are_text_or_paths(value: Any) -> None:
+    with pytest.raises(TypeError, match=r"^file must be a path, text or pathlib\.Path"):
+        validation.path("file", value)
+
+
+@pytest.mark.parametrize("value", ["", "a\0b"])
+def test_paths_have_a_name(value: str) -> None:
+    with pytest.raises(ValueError, match=r"^file must be the name of a file, got"):
+        validation.path("file", value)
+    assert validation.path("file", "a/b").name == "b"
+
+
+def test_more_memory_than_there_is_is_refused() -> None:
+    validation.check_memory("a few numbers", 1000, "use fewer")
+    with pytest.raises(
+        ValueError, match=r"^all must fit into .* need 10,000,000,000,0"
+    ):
+        validation.check_memory("all", 10**19, "use fewer")
+
+
+@pytest.mark.parametrize(
+    "values", [np.ma.masked_array([1.0, 2.0], [True, False]), [[1], [1, 2]], object()]
+)
+def test_masked_and_ragged_values_are_no_numbers(values: Any) -> None:
+    with pytest.raises(ValueError, match=r"^x must be an array of finite real numbers"):
+        validation.real_array("x", values)
+
+
+@pytest.mark.parametrize("value", [1, 7, np.int32(3), np.uint8(200), 2**63 - 1])
 def test_integers_become_ints(value: Any) -> None:
     result = validation.integer("count", value, at_least=1)
     assert type(result) is int

@@ -8,11 +8,11 @@ import gymnasium as gym
 import numpy as np
 from gymnasium.error import ResetNeeded
 from gymnasium.vector import AutoresetMode
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from acl_gym.envs.control.system import ControlSystem
 from acl_gym.utils import validation
+from acl_gym.utils.compiling import njit
 from acl_gym.utils.typing import BoolArray, FloatArray, IntArray
 
 
@@ -20,6 +20,11 @@ def checked_options(
     options: dict[str, Any] | None, allowed: tuple[str, ...]
 ) -> dict[str, Any]:
     """Refuse reset options that would otherwise be ignored silently."""
+    if options is not None and not isinstance(options, dict):
+        raise TypeError(
+            f"reset options must be a dict, got {validation.shown(options)} of type "
+            f"{type(options).__name__}."
+        )
     unknown = sorted(set(options or ()) - set(allowed), key=str)
     if unknown:
         raise ValueError(
@@ -29,7 +34,7 @@ def checked_options(
     return dict(options or {})
 
 
-@njit(cache=True)
+@njit
 def count_step(
     limit: int, steps: IntArray, terminated: BoolArray, truncated: BoolArray
 ) -> int:
@@ -42,7 +47,7 @@ def count_step(
     return n_finished
 
 
-@njit(cache=True)
+@njit
 def finish(
     terminated: BoolArray, truncated: BoolArray, finished: BoolArray, walking: IntArray
 ) -> int:
@@ -55,7 +60,7 @@ def finish(
     return n_walking
 
 
-@njit(cache=True)
+@njit
 def copy_if_below(actions: IntArray, n_actions: int, copied: IntArray) -> bool:
     """Copy actions; return whether all are in 0..n_actions - 1, vectorised."""
     good = True
@@ -159,7 +164,7 @@ def checked_autoreset_mode(mode: str | AutoresetMode) -> AutoresetMode:
     except ValueError:
         choices = ", ".join(repr(choice.value) for choice in AutoresetMode)
         raise ValueError(
-            f"autoreset_mode must be one of {choices}, got {mode!r}."
+            f"autoreset_mode must be one of {choices}, got {validation.shown(mode)}."
         ) from None
 
 
@@ -168,7 +173,7 @@ def checked_render_mode(mode: str | None, metadata: dict[str, Any]) -> str | Non
     if mode is not None and mode not in metadata["render_modes"]:
         raise ValueError(
             f"render_mode must be None or one of {metadata['render_modes']}, "
-            f"got {mode!r}."
+            f"got {validation.shown(mode)}."
         )
     return mode
 

@@ -80,14 +80,13 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
         render_mode: str | None = None,
         **parameters: Any,
     ) -> None:
-        self.num_envs = validation.integer("num_envs", num_envs, at_least=1)
+        self._num_envs = validation.integer("num_envs", num_envs, at_least=1)
         self._trial_steps: int | None = None  # T of the trial under way
         self.max_episode_steps = max_episode_steps
-        self.autoreset_mode = checked_autoreset_mode(autoreset_mode)
-        self.metadata = {**self.metadata, "autoreset_mode": self.autoreset_mode}
+        self.set_autoreset_mode(autoreset_mode)
         self.render_mode = checked_render_mode(render_mode, self.metadata)
         self.parameters = copy.deepcopy(parameters)  # the caller may change a list
-        self.system = self.system_type(**parameters)
+        self._system = self.system_type(**parameters)
         self.single_observation_space = self.system.observation_space
         self.single_action_space = self.system.action_space
         self.observation_space = batch_space(
@@ -116,6 +115,17 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
     def max_episode_steps(self, value: int | None) -> None:
         self._max_episode_steps = checked_limit(value)
         self._limit = trial_limit(self._max_episode_steps, self._trial_steps)
+
+    # Not to be replaced: kernels rely on arrays of these sizes.
+    @property
+    def num_envs(self) -> int:  # type: ignore[override]
+        """The number of slots."""
+        return self._num_envs
+
+    @property
+    def system(self) -> ControlSystem:
+        """The parameters and dynamics of the system."""
+        return self._system
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -266,6 +276,20 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
         """Draw a table over the frames from now on; see `ControlEnv.show_table`."""
         self._renderer.show_table(table)
 
+    def set_autoreset_mode(self, mode: str | AutoresetMode) -> None:
+        """Change what happens to a slot that finishes from now on.
+
+        Wrappers around the environment keep the mode that they found.
+
+        Args:
+            mode: see `autoreset_mode` of the constructor.
+
+        Raises:
+            ValueError: there is no such mode.
+        """
+        self.autoreset_mode = checked_autoreset_mode(mode)
+        self.metadata = {**self.metadata, "autoreset_mode": self.autoreset_mode}
+
     def with_slots(self, num_envs: int) -> Self:
         """Make a new environment that differs only in the number of slots.
 
@@ -299,6 +323,7 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
         """Start `slots` in the given `(state_size, n)` states, or in random ones."""
         if states is None:
             states = self.system.sample_states(self.np_random, slots.size)
+        self._check_new(states, slots.size)
         if slots.size == self.num_envs:
             self._state = states
         else:
@@ -307,6 +332,22 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
         self._finished[slots] = False
         walking = np.flatnonzero(~self._finished)
         self._walking = None if walking.size == self.num_envs else walking
+
+    def _check_new(self, states: FloatArray, count: int) -> None:
+        """Hold what a system of a user's own has given to what kernels rely on."""
+        good = (
+            isinstance(states, np.ndarray)
+            and states.ndim == 2
+            and states.dtype == np.float64
+            and states.shape[1] == count
+            and (self._state is None or len(states) == len(self._state))
+        )
+        if not good:
+            raise ValueError(
+                f"sample_states and checked_states of {type(self.system).__name__} must "
+                f"give float64 states of a fixed size for {count} slots, got "
+                f"{validation.shown(states)}."
+            )
 
     def _infos(self) -> dict[str, Any]:
         mask = self.system.action_mask(self._states)

@@ -6,8 +6,10 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import njit, types
+from numba import types
 from numba.extending import intrinsic, overload
+
+from acl_gym.utils.compiling import njit
 
 # pi as the sum of two floats, the first with trailing zeros: n * PI_HIGH is exact for
 # the small n that occur, which keeps the reduced argument of the sine accurate.
@@ -15,7 +17,7 @@ _PI_HIGH = 3.1415926218032837
 _PI_LOW = 3.178650954705639e-08
 
 
-@njit(cache=True, inline="always")
+@njit(inline="always")
 def sine(x: float) -> float:
     """Sine without branches, so that LLVM vectorises the loop it is called in.
 
@@ -75,7 +77,7 @@ def _compiled_power_of_two(rounded: Any) -> Any:
     return implementation
 
 
-@njit(cache=True, inline="always")
+@njit(inline="always")
 def exponential(x: float) -> float:
     """Exponential function without branches, so that LLVM vectorises its loop.
 

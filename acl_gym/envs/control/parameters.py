@@ -12,6 +12,10 @@ from acl_gym.envs.control.system import ControlSystem
 from acl_gym.utils import validation
 from acl_gym.utils.typing import FloatArray
 
+MOST_SUBSTEPS = 10_000
+"""Integration steps in one sampling time: a kernel cannot be interrupted, and with more
+a step of an environment would take longer than one waits."""
+
 
 def set_canonical(system: ControlSystem, values: dict[str, Any]) -> None:
     """Set the fields of a frozen dataclass to plain tuples and numbers.

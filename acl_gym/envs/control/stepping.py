@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
-from acl_gym.envs.control.system import ControlSystem
+from acl_gym.envs.control.system import ControlSystem, SlotError
+from acl_gym.utils.compiling import njit
 from acl_gym.utils.typing import BoolArray, FloatArray, IntArray
 
 RESTORE_ABOVE = 0.75
@@ -66,7 +66,24 @@ class PartialStep:
             if self._before.shape != states.shape:
                 self._before = np.empty_like(states)
             np.copyto(self._before, states)
-            self._system.advance(states, actions, None, rewards, terminated)
+            try:
+                self._system.advance(states, actions, None, rewards, terminated)
+            except SlotError:
+                # Perhaps in an idle slot: without these it fails for good or not at all.
+                np.copyto(states, self._before)
+                rewards.fill(0.0)
+                terminated.fill(False)
+                return self._step_part(
+                    limit,
+                    slots,
+                    states,
+                    steps,
+                    actions,
+                    None,
+                    rewards,
+                    terminated,
+                    truncated,
+                )
             return int(
                 put_idle_back(
                     idle,
@@ -79,11 +96,41 @@ class PartialStep:
                     truncated,
                 )
             )
+        return self._step_part(
+            limit,
+            slots,
+            states,
+            steps,
+            actions,
+            uniforms,
+            rewards,
+            terminated,
+            truncated,
+        )
+
+    def _step_part(
+        self,
+        limit: int,
+        slots: IntArray,
+        states: FloatArray,
+        steps: IntArray,
+        actions: IntArray,
+        uniforms: FloatArray | None,
+        rewards: FloatArray,
+        terminated: BoolArray,
+        truncated: BoolArray,
+    ) -> int:
+        """Gather the slots that step, advance them, and put them back."""
         part, part_actions, part_rewards, part_reached = self._scratch_for(
             slots, states
         )
         gather_slots(slots, states, actions, part, part_actions)
-        self._system.advance(part, part_actions, uniforms, part_rewards, part_reached)
+        try:
+            self._system.advance(
+                part, part_actions, uniforms, part_rewards, part_reached
+            )
+        except SlotError as error:
+            raise SlotError(error.message, int(slots[error.slot])) from error
         n_finished: int = put_slots_back(
             slots,
             part,
@@ -113,7 +160,7 @@ class PartialStep:
         return scratch
 
 
-@njit(cache=True)
+@njit
 def gather_slots(
     slots: IntArray,
     states: FloatArray,
@@ -129,7 +176,7 @@ def gather_slots(
             part[row, j] = states[row, slot]
 
 
-@njit(cache=True)
+@njit
 def put_slots_back(
     slots: IntArray,
     part: FloatArray,
@@ -159,7 +206,7 @@ def put_slots_back(
     return n_finished
 
 
-@njit(cache=True)
+@njit
 def put_idle_back(
     idle: BoolArray,
     before: FloatArray,

@@ -7,14 +7,31 @@ from typing import Any, ClassVar
 
 import numpy as np
 from gymnasium import spaces
-from numba import njit
 from numpy.typing import NDArray
 
-from acl_gym.utils import compiling as _compiling  # noqa: F401 - it says what the wait is for
+from acl_gym.envs.control.signals import Signals
+from acl_gym.utils import validation
+from acl_gym.utils.compiling import njit
 from acl_gym.utils.typing import BoolArray, FloatArray, IntArray
 
 BLOCK = 512
 """Slots that a kernel advances at a time, so that their data stays in the nearest cache."""
+
+
+class SlotError(ValueError):
+    """A step failed in one slot.
+
+    Args:
+        message: in which `<slot>` stands for the number of the slot.
+        slot: its number, counted among the states that were advanced.
+    """
+
+    def __init__(self, message: str, slot: int) -> None:
+        super().__init__(message, slot)  # both, so that it can be pickled
+        self.message, self.slot = message, slot
+
+    def __str__(self) -> str:
+        return self.message.replace("<slot>", str(self.slot))
 
 
 class ControlSystem(ABC):
@@ -48,6 +65,11 @@ class ControlSystem(ABC):
     @abstractmethod
     def action_space(self) -> spaces.Discrete:
         """The space of one action."""
+
+    @property
+    def signals(self) -> Signals | None:
+        """Names of observations and inputs, and the inputs of each action, if known."""
+        return None
 
     @property
     @abstractmethod
@@ -117,7 +139,7 @@ class ControlSystem(ABC):
         if cells is not None:
             raise ValueError(
                 f"cells must be None for {type(self).__name__}, for which the thesis "
-                f"has no centres, got {cells!r}."
+                f"has no centres, got {validation.shown(cells)}."
             )
         return None
 
@@ -139,7 +161,7 @@ class ControlSystem(ABC):
         return None
 
 
-@njit(cache=True)
+@njit
 def _transpose(states: FloatArray, observations: FloatArray) -> None:
     """Copy the transpose, several times as fast as NumPy if it has few columns."""
     for row in range(states.shape[0]):

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from numba import njit
-
+from acl_gym.utils.compiling import njit
 from acl_gym.utils.typing import BoolArray, FloatArray, IntArray
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def move(
     states: FloatArray,
     actions: IntArray,
@@ -33,7 +32,7 @@ def move(
         reached[i] = goal[cell]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def move_or_fail(
     states: FloatArray,
     actions: IntArray,

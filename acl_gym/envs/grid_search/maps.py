@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 
 from acl_gym.utils import validation
+from acl_gym.utils.files import write_atomically
 from acl_gym.utils.typing import BoolArray, IntArray
 
 WALL, FREE, GOAL = "#", ".", "G"
@@ -245,6 +246,6 @@ def main(arguments: Sequence[str] | None = None) -> None:
         text = "\n".join(make_map(**how)) + "\n"
         if write:
             folder = Path(__file__).parent / "layouts"
-            (folder / f"{name}.txt").write_text(text, encoding="ascii")
+            write_atomically(folder / f"{name}.txt", text.encode("ascii"))
         else:
             sys.stdout.write(f"{name}\n{text}\n")

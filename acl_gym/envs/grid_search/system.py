@@ -13,6 +13,7 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from acl_gym.envs.control.families import NumberedSystem
+from acl_gym.envs.control.signals import Signals
 from acl_gym.envs.grid_search import kernels
 from acl_gym.envs.grid_search.maps import FREE, GOAL, MAPS, WALL, checked_map, load_map
 from acl_gym.utils import validation
@@ -140,6 +141,16 @@ class GridSearch(NumberedSystem):
         return spaces.Discrete(len(self.directions))
 
     @property
+    def signals(self) -> Signals:
+        """The number of the cell is observed, a move is made."""
+        moves = tuple((float(south), float(east)) for south, east in self.directions)
+        return Signals(
+            ("number of the cell",),
+            ("rows to the south", "columns to the east"),
+            moves,
+        )
+
+    @property
     def max_stage_cost(self) -> float:
         """1, the cost of every step."""
         return 1.0
@@ -208,12 +219,16 @@ class GridSearch(NumberedSystem):
         return np.flatnonzero(~self._goal).astype(np.float64)[:, None]
 
 
+MOST_STATES = 1_000_000
+"""Of a row: tables of what each move leads to are made for all of them."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class GridSearch1D(GridSearch):
     """A row of states (§3.6.2); actions 0 west, 1 east; the goal is the last state.
 
     Attributes:
-        n_states: the length of the row, goal included, >= 2.
+        n_states: the length of the row, goal included, 2 to 1,000,000.
         transition_probability: p, in (0, 1]: a move fails with probability 1 - p.
         mask_blocked: whether infos carry `"action_mask"`, U_q of (3.4), which leaves
             out the blocked move of the first state.
@@ -226,7 +241,9 @@ class GridSearch1D(GridSearch):
     mask_blocked: bool = False
 
     def __post_init__(self) -> None:
-        n_states = validation.integer("n_states", self.n_states, at_least=2)
+        n_states = validation.integer(
+            "n_states", self.n_states, at_least=2, at_most=MOST_STATES
+        )
         object.__setattr__(self, "n_states", n_states)
         self._check_moves()
 

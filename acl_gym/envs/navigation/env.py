@@ -34,6 +34,11 @@ class NavigationEnv(ControlEnv):
     | 2   | position c2, upwards          | -5  | 5   | m    |
     | 3   | velocity v2 along c2          | -2  | 2   | m/s  |
 
+    Stable-Baselines3 casts them to float32 by itself. For code that does not, such as a
+    network fed from a replay buffer of the space's dtype, wrap the environment in
+    `gymnasium.wrappers.DtypeObservation(env, np.float32)`, a vector environment in that
+    of `gymnasium.wrappers.vector`.
+
     ## Rewards
     The reward is the negative stage cost, after the step: `-(x' Q x + u' R u)` (3.2)
     with `cost="quadratic"`, -1 with `cost="time"` (§4.5.3). The return is -J.

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 from typing import Any
 
-from numba import njit, prange
+from numba import prange
 
 from acl_gym.envs.control.fast_math import exponential
 from acl_gym.envs.control.system import BLOCK
+from acl_gym.utils.compiling import njit
+from acl_gym.utils.threads import shared_among_threads
 from acl_gym.utils.typing import BoolArray, FloatArray, IntArray
 
 Peak = tuple[float, float, float, float, float]
 Row = tuple[float, float, float, float]
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@njit(error_model="numpy", inline="always")
 def damping_at(c1: float, c2: float, base: float, peaks: tuple[float, ...]) -> float:
     """The damping at one position; a peak is height, m1, m2, 1 / sigma1, 1 / sigma2.
 
@@ -31,7 +33,7 @@ def damping_at(c1: float, c2: float, base: float, peaks: tuple[float, ...]) -> f
     return total
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def integrate(
     c1: FloatArray,
     v1: FloatArray,
@@ -74,7 +76,7 @@ def integrate(
             v2[i] = sa2 + sixth * (ra2 + 2.0 * (rb2 + rc2) + rd2)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def settle(
     c1: FloatArray,
     v1: FloatArray,
@@ -124,7 +126,7 @@ def settle(
             reached[i] = near & (max(s1, s2) <= goal_velocity)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def advance_block(
     states: FloatArray,
     actions: IntArray,
@@ -160,7 +162,7 @@ def advance_block(
     )
 
 
-@njit(cache=True)
+@njit
 def advance(
     states: FloatArray,
     actions: IntArray,
@@ -174,7 +176,8 @@ def advance(
         advance_block(states, actions, dynamics, goal_and_cost, rewards, reached, block)
 
 
-@njit(cache=True, parallel=True, error_model="numpy")
+@shared_among_threads
+@njit(parallel=True, error_model="numpy")
 def advance_in_parallel(
     states: FloatArray,
     actions: IntArray,

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 
 from acl_gym.envs.control import parameters, sampling
 from acl_gym.envs.control.families import BlockSystem
+from acl_gym.envs.control.signals import Signals
 from acl_gym.envs.navigation import kernels
 from acl_gym.envs.navigation.kernels import Peak, Row
 from acl_gym.utils import validation
@@ -194,6 +195,20 @@ class Navigation(BlockSystem):
         return spaces.Discrete(len(self.forces))
 
     @property
+    def signals(self) -> Signals:
+        """Positions and velocities are observed, two forces are set."""
+        return Signals(
+            (
+                "position c1, m",
+                "velocity v1, m/s",
+                "position c2, m",
+                "velocity v2, m/s",
+            ),
+            ("force u1, N", "force u2, N"),
+            self.forces,
+        )
+
+    @property
     def max_stage_cost(self) -> float:
         """The largest stage cost over the corners of X and the forces."""
         corners = np.array(list(itertools.product((-1.0, 1.0), repeat=4)))
@@ -326,12 +341,12 @@ def _checked_peaks(values: Any) -> tuple[Peak, ...]:
     if peaks.shape[1] != 5 or (peaks[:, 0] < 0).any() or (peaks[:, 3:] <= 0).any():
         raise ValueError(
             "peaks must be rows (height >= 0, mean_1, mean_2, sigma_1 > 0, "
-            f"sigma_2 > 0), got {values!r}."
+            f"sigma_2 > 0), got {validation.shown(values)}."
         )
     if (peaks[:, 3:] < 1e-50).any() or (np.abs(peaks) > 1e100).any():
         raise ValueError(
             "peaks must have widths of at least 1e-50 m and no number beyond 1e100, "
-            f"got {values!r}."
+            f"got {validation.shown(values)}."
         )
     return tuple(map(tuple, peaks.tolist()))
 
@@ -348,7 +363,9 @@ def _checked_forces(values: Any) -> tuple[tuple[float, float], ...]:
 def _checked_pair(name: str, values: Any) -> tuple[float, float]:
     pair = validation.real_array(name, values, ndim=1)
     if pair.size != 2 or (pair <= 0).any():
-        raise ValueError(f"{name} must be two numbers > 0 (m, m/s), got {values!r}.")
+        raise ValueError(
+            f"{name} must be two numbers > 0 (m, m/s), got {validation.shown(values)}."
+        )
     position, velocity = pair.tolist()
     return position, velocity
 
@@ -360,6 +377,6 @@ def _checked_weight(values: Any) -> tuple[Any, ...]:
     if not parameters.is_weight(weight, 4):
         raise ValueError(
             "state_weight must be a symmetric positive semi-definite (4, 4) matrix or "
-            f"the 4 numbers >= 0 of its diagonal, got {values!r}."
+            f"the 4 numbers >= 0 of its diagonal, got {validation.shown(values)}."
         )
     return tuple(map(tuple, weight.tolist()))

@@ -32,6 +32,11 @@ class PendulumEnv(ControlEnv):
     | 0   | angle theta, 0 hangs down  | 0      | 2 pi   | rad   |
     | 1   | angular velocity omega     | -9     | 9      | rad/s |
 
+    Stable-Baselines3 casts them to float32 by itself. For code that does not, such as a
+    network fed from a replay buffer of the space's dtype, wrap the environment in
+    `gymnasium.wrappers.DtypeObservation(env, np.float32)`, a vector environment in that
+    of `gymnasium.wrappers.vector`.
+
     ## Rewards
     The reward is the negative stage cost (5.4), `-(e' Q e + R u^2)`, with the error
     e = [theta - pi, omega] taken after the step. The return is -J.

@@ -6,16 +6,18 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import njit, prange
+from numba import prange
 
 from acl_gym.envs.control.fast_math import sine
 from acl_gym.envs.control.system import BLOCK
+from acl_gym.utils.compiling import njit
+from acl_gym.utils.threads import shared_among_threads
 from acl_gym.utils.typing import BoolArray, FloatArray, IntArray
 
 TWO_PI = 2.0 * math.pi
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def integrate(
     theta: FloatArray,
     omega: FloatArray,
@@ -51,7 +53,7 @@ def integrate(
             omega[i] = speed1 + sixth * (rate1 + 2.0 * (rate2 + rate3) + rate4)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def settle(
     theta: FloatArray,
     omega: FloatArray,
@@ -86,7 +88,7 @@ def settle(
         reached[i] = near & (abs(speed) <= bound_omega)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def advance_block(
     states: FloatArray,
     actions: IntArray,
@@ -118,7 +120,7 @@ def advance_block(
     )
 
 
-@njit(cache=True)
+@njit
 def advance(
     states: FloatArray,
     actions: IntArray,
@@ -132,7 +134,8 @@ def advance(
         advance_block(states, actions, dynamics, goal_and_cost, rewards, reached, block)
 
 
-@njit(cache=True, parallel=True, error_model="numpy")
+@shared_among_threads
+@njit(parallel=True, error_model="numpy")
 def advance_in_parallel(
     states: FloatArray,
     actions: IntArray,

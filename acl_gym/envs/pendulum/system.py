@@ -13,6 +13,7 @@ from gymnasium import spaces
 
 from acl_gym.envs.control import parameters, sampling
 from acl_gym.envs.control.families import BlockSystem
+from acl_gym.envs.control.signals import Signals
 from acl_gym.envs.pendulum import kernels
 from acl_gym.envs.pendulum.kernels import TWO_PI
 from acl_gym.utils import validation
@@ -124,6 +125,15 @@ class Pendulum(BlockSystem):
         return spaces.Discrete(len(self.torques))
 
     @property
+    def signals(self) -> Signals:
+        """Angle and angular velocity are observed, the torque is set."""
+        return Signals(
+            ("angle theta, rad, 0 hangs down", "angular velocity omega, rad/s"),
+            ("torque u, N m",),
+            tuple((torque,) for torque in self.torques),
+        )
+
+    @property
     def max_stage_cost(self) -> float:
         """The largest stage cost (5.4) over the corners of X and the torques."""
         weight = np.array(self.state_weight)
@@ -193,7 +203,7 @@ class Pendulum(BlockSystem):
         if not isinstance(pair, Sequence | np.ndarray) or len(pair) != 2:
             raise ValueError(
                 "cells of the pendulum must be two integers (n_theta, n_omega), such "
-                f"as (40, 41), got {cells!r}."
+                f"as (40, 41), got {validation.shown(cells)}."
             )
         n_theta = validation.integer("n_theta", pair[0], at_least=3)
         n_omega = validation.integer("n_omega", pair[1], at_least=3)
@@ -207,13 +217,13 @@ class Pendulum(BlockSystem):
         if bounds.size != 2 or (bounds <= 0).any():
             raise ValueError(
                 "goal_bounds must be two half-widths > 0 (rad, rad/s), got "
-                f"{self.goal_bounds!r}."
+                f"{validation.shown(self.goal_bounds)}."
             )
         share = np.minimum(bounds / (math.pi, self.omega_max), 1.0).prod()
         if share > 0.99:
             raise ValueError(
                 "goal_bounds must leave 1% or more of the state space to start from, "
-                f"got {self.goal_bounds!r}, which leave {1 - share:.2%}."
+                f"got {validation.shown(self.goal_bounds)}, which leave {1 - share:.2%}."
             )
         return bounds
 
@@ -244,6 +254,6 @@ def _weight_matrix(values: Any) -> FloatArray:
     if not parameters.is_weight(weight, 2):
         raise ValueError(
             "state_weight must be a symmetric positive semi-definite (2, 2) matrix, "
-            f"got {values!r}."
+            f"got {validation.shown(values)}."
         )
     return weight

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from numba import njit
-
+from acl_gym.utils.compiling import njit
 from acl_gym.utils.typing import BoolArray, FloatArray, IntArray
 
 FIRST, SECOND, AT_GOAL = 0, 1, 2
 """The states q, q' and the goal."""
 
 
-@njit(cache=True)
+@njit
 def advance(
     states: FloatArray,
     actions: IntArray,

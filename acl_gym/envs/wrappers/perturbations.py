@@ -85,7 +85,9 @@ class ActionNoise(VectorActionWrapper[Any, Any, Any, Any]):
 
     def __init__(self, env: AnyVectorEnv, probability: float) -> None:
         super().__init__(env)
-        self.probability = probability
+        self.probability = validation.number(
+            "probability", probability, at_least=0, at_most=1
+        )
         self._rng = np.random.default_rng()
 
     def reset(
@@ -124,9 +126,17 @@ class ObservationNoise(VectorObservationWrapper[FloatArray, Any, Any, Any]):
         circular: Sequence[int] = (),
     ) -> None:
         super().__init__(env)
-        space: Any = self.single_observation_space
+        space = _box(self.single_observation_space)
         self._low, self._high = space.low, space.high
-        self._deviations = np.asarray(deviations, dtype=np.float64)
+        self._deviations = validation.real_array("deviations", deviations)
+        if (
+            self._deviations.shape not in ((), space.shape)
+            or (self._deviations < 0).any()
+        ):
+            raise ValueError(
+                f"deviations must be {space.shape[0]} numbers >= 0, one a variable, got "
+                f"{validation.shown(deviations)}."
+            )
         self._circular = tuple(circular)
         self._rng = np.random.default_rng()
 
@@ -163,7 +173,13 @@ class RoundedObservation(VectorObservationWrapper[FloatArray, Any, Any, Any]):
 
     def __init__(self, env: AnyVectorEnv, counts: Sequence[int]) -> None:
         super().__init__(env)
-        self._counts = tuple(counts)
+        size = _box(self.single_observation_space).shape[0]
+        self._counts = _integers("counts", counts)
+        if len(self._counts) != size or not all(n == 0 or n >= 2 for n in self._counts):
+            raise ValueError(
+                f"counts must be {size} integers, one a variable, each 0 or >= 2, got "
+                f"{validation.shown(counts)}."
+            )
 
     def observations(self, observations: FloatArray) -> FloatArray:
         """Return rounded observations, `(num_envs, d)`."""
@@ -193,11 +209,17 @@ class HiddenVariables(VectorObservationWrapper[FloatArray, Any, Any, Any]):
 
     def __init__(self, env: AnyVectorEnv, variables: Sequence[int]) -> None:
         super().__init__(env)
-        space: Any = env.single_observation_space
-        self.shown = tuple(i for i in range(space.shape[0]) if i not in variables)
+        space = _box(env.single_observation_space)
+        hidden = set(_integers("variables", variables))
+        if not hidden < set(range(space.shape[0])):
+            raise ValueError(
+                f"variables must be among 0..{space.shape[0] - 1} and leave one or more, "
+                f"got {validation.shown(variables)}."
+            )
+        self.shown = tuple(i for i in range(space.shape[0]) if i not in hidden)
         shown = list(self.shown)
         self.single_observation_space = spaces.Box(
-            space.low[shown], space.high[shown], dtype=space.dtype
+            space.low[shown], space.high[shown], dtype=space.dtype.type
         )
         self.observation_space = batch_space(
             self.single_observation_space, self.num_envs
@@ -253,6 +275,30 @@ class ReversedDraws:
     def integers(self, high: int) -> int:
         """One integer from [0, `high`), the same as that of the generator."""
         return int(self._rng.integers(high))
+
+
+def _box(space: spaces.Space[Any]) -> spaces.Box:
+    """The space if it is a Box of one axis."""
+    if not isinstance(space, spaces.Box) or len(space.shape) != 1:
+        raise ValueError(f"observations must be a Box of one axis, got {space}.")
+    return space
+
+
+def _integers(name: str, values: Any) -> tuple[int, ...]:
+    """Integers >= 0 from a sequence of them."""
+    array = validation.as_array(values)
+    if (
+        array is None
+        or array.ndim != 1
+        or (array.size and array.dtype.kind not in "iu")
+    ):
+        raise TypeError(
+            f"{name} must be a sequence of integers, got {validation.shown(values)}."
+        )
+    return tuple(
+        validation.integer(f"{name}[{i}]", value, at_least=0)
+        for i, value in enumerate(array)
+    )
 
 
 def _reversed(slots: NDArray[Element]) -> NDArray[Element]:

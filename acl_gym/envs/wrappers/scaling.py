@@ -15,7 +15,9 @@ from gymnasium.vector import AutoresetMode, VectorEnv, VectorObservationWrapper
 from gymnasium.vector.utils import batch_space
 from numpy.typing import ArrayLike, NDArray
 
+from acl_gym.utils.boxes import declared_bounds
 from acl_gym.utils.typing import Float32Array
+from acl_gym.utils.vector_envs import require_vector_env
 
 TWO_PI = 2.0 * math.pi
 
@@ -135,10 +137,10 @@ class ScaledVectorObservation(
     def __init__(
         self, env: VectorEnv[NDArray[Any], Any, Any], circular: Iterable[int] = ()
     ) -> None:
+        require_vector_env(env)
         # The base class refuses this mode too, since the last observations would
         # stay as they were in infos["final_obs"]; here the message has a remedy.
-        mode = getattr(env, "metadata", {}).get("autoreset_mode")
-        if mode is AutoresetMode.SAME_STEP:
+        if env.metadata.get("autoreset_mode") is AutoresetMode.SAME_STEP:
             raise ValueError(
                 "env must have autoreset mode NEXT_STEP or DISABLED, got SAME_STEP, "
                 "whose infos['final_obs'] an observation wrapper does not reach; "
@@ -160,7 +162,7 @@ def _bounds(space: spaces.Space[Any]) -> tuple[NDArray[np.float64], ...]:
             f"observations must be a Box of one axis, got {space}; use "
             "gymnasium's FlattenObservation first."
         )
-    low, high = space.low.astype(np.float64), space.high.astype(np.float64)
+    low, high = declared_bounds(space)
     for axis in range(low.size):
         if not (np.isfinite([low[axis], high[axis]]).all() and low[axis] < high[axis]):
             raise ValueError(

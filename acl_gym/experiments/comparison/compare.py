@@ -70,6 +70,7 @@ def compare(
 
     Raises:
         RunFailedError: a run failed; the others are kept.
+        FigureFailedError: a figure failed; results and report are written without it.
     """
     count = PRESETS[preset] if seeds is None else seeds
     experiment = experiment_of(system, preset, agents)
@@ -82,20 +83,21 @@ def compare(
     )
     _write(system, preset, experiment, results, directory)
     names = ",".join(experiment.options["agents"].values())
-    plots.save(experiment, results, directory, ("png",))
-    for other in {*_PLOTS, *_FOREIGN_PLOTS} - set(experiment.plots):  # of before
-        (directory / f"{other}.png").unlink(missing_ok=True)
-    report.write_report(
-        directory / "report.html",
-        title=experiment.title,
-        experiments=[outcome.summary(experiment, results)],
-        figures=directory,
-        command=f"acl-gym compare --env {system.env_id} --preset {preset} --agents "
-        f"{names} --seeds {count} --seed {first_seed}",
-        made=results.made(experiment.everything),
-        facts=f"{system.env_id}, preset {preset}, {count} runs of each method",
-        notes=_NOTES if system.has_model else _FOREIGN_NOTES,
-    )
+    for old in (*_PLOTS, *_FOREIGN_PLOTS):  # of other runs, or of a system before
+        (directory / f"{old}.png").unlink(missing_ok=True)
+    with plots.drawing(directory) as draw:
+        draw(plots.save, experiment, results, directory, ("png",))
+        report.write_report(
+            directory / "report.html",
+            title=experiment.title,
+            experiments=[outcome.summary(experiment, results)],
+            figures=directory,
+            command=f"acl-gym compare --env {system.env_id} --preset {preset} --agents "
+            f"{names} --seeds {count} --seed {first_seed}",
+            made=results.made(experiment.everything),
+            facts=f"{system.env_id}, preset {preset}, {count} runs of each method",
+            notes=_NOTES if system.has_model else _FOREIGN_NOTES,
+        )
     return experiment, results
 
 
@@ -149,6 +151,8 @@ def _write(
     if "success_rate" not in frame:
         frame["success_rate"] = None  # not known in environments of other packages
     rows = frame[_COLUMNS].astype({"env_steps": np.int64})
+    # Before what is computed from them.
+    write_atomically(directory / "results.parquet", rows.to_parquet(index=False))
     found = {
         "env": system.env_id,
         "preset": preset,
@@ -158,7 +162,6 @@ def _write(
     }
     text = json.dumps(found, indent=1)
     write_atomically(directory / "results.json", text.encode())
-    write_atomically(directory / "results.parquet", rows.to_parquet(index=False))
 
 
 def _reference(

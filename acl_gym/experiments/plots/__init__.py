@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import io
 import tomllib
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from importlib.resources import files
 from pathlib import Path
+from typing import Any
 
 from matplotlib.figure import Figure
 
@@ -66,7 +68,53 @@ def file_name(experiment: Experiment, plot: str) -> str:
     return experiment.name if len(experiment.plots) == 1 else plot
 
 
-@in_style()
+class FigureFailedError(RuntimeError):
+    """Figures could not be drawn or written; the results are there.
+
+    Args:
+        directory: where the results are.
+        failures: what the figures raised.
+    """
+
+    def __init__(self, directory: Path, failures: Sequence[Exception]) -> None:
+        first = failures[0]
+        super().__init__(
+            f"figures of {directory} failed ({len(failures)}), the first with "
+            f"{type(first).__name__}: {str(first).rstrip('.')}; all results are written, "
+            "and the report without these figures. Give the same command again when the "
+            "cause is removed."
+        )
+        self.failures = failures
+
+
+@contextmanager
+def drawing(directory: Path) -> Iterator[Callable[..., None]]:
+    """Draw figures so that one that fails stops neither the others nor the report.
+
+    Args:
+        directory: where the results are, for the message.
+
+    Yields:
+        A function that calls its first argument with the others.
+
+    Raises:
+        FigureFailedError: at the end, if a call has failed.
+    """
+    failures: list[Exception] = []
+
+    def attempt(draw: Callable[..., None], *arguments: Any) -> None:
+        try:
+            draw(*arguments)
+        except FigureFailedError as error:
+            failures.extend(error.failures)
+        except Exception as error:
+            failures.append(error)
+
+    yield attempt
+    if failures:
+        raise FigureFailedError(directory, failures) from failures[0]
+
+
 def save(
     experiment: Experiment,
     results: Results,
@@ -80,17 +128,32 @@ def save(
         results: its runs.
         directory: where; each file appears complete or not at all.
         kinds: endings of files.
+
+    Raises:
+        FigureFailedError: a figure failed; the others are written.
     """
-    for plot in experiment.plots:
-        figure = draw(plot, experiment, results)
-        for kind in kinds:
-            buffer = io.BytesIO()
-            figure.savefig(buffer, format=kind)
-            path = directory / f"{file_name(experiment, plot)}.{kind}"
-            write_atomically(path, buffer.getvalue())
+    with drawing(directory) as attempt:
+        for plot in experiment.plots:
+            attempt(_save_figure, plot, experiment, results, directory, kinds)
+
+
+@in_style()
+def _save_figure(
+    plot: str,
+    experiment: Experiment,
+    results: Results,
+    directory: Path,
+    kinds: tuple[str, ...],
+) -> None:
+    figure = draw(plot, experiment, results)
+    for kind in kinds:
+        buffer = io.BytesIO()
+        figure.savefig(buffer, format=kind)
+        path = directory / f"{file_name(experiment, plot)}.{kind}"
+        write_atomically(path, buffer.getvalue())
 
 
 def write_animation(path: Path, trials: tuple[int, ...] = SHOWN) -> None:
     """Write how 250 ants learn the fuzzy pendulum of Table 5.2, see `animate`."""
     study = systems.pendulum("fuzzy")
-    animate(path, make_agent(study, seed=0), study.task.make_system_env(1), trials)
+    animate(make_agent(study, seed=0), path, trials=trials)

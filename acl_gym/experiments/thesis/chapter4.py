@@ -288,7 +288,7 @@ def _c12(results: Results) -> Iterator[Part]:
     yield below_one(statement, *late_costs(results, "time"))
     statement = "the best fuzzy policy reaches the goal from at least 90% of the starts"
     starts = evaluate_policy_cost(fuzzy, make_env(study.slots), max_steps=steps)
-    arrive = starts.success_rate
+    arrive = float(np.asarray(starts.success).mean())
     yield Part(statement, f"{arrive:.0%}", arrive >= 0.9)
     ours, theirs = (mean_damping(policy, study) for policy in (fuzzy, q_iteration))
     yield Part(
@@ -299,7 +299,7 @@ def _c12(results: Results) -> Iterator[Part]:
     )
     corners = evaluate_policy_cost(crisp, make_env(4), CORNERS, max_steps=steps)
     statement = "the best crisp policy fails from at least one corner of the field"
-    failed = int((~corners.success).sum())
+    failed = int((~np.asarray(corners.success, dtype=np.bool_)).sum())
     yield Part(statement, f"{failed} of 4", failed > 0)
 
 

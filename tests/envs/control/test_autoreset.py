@@ -20,6 +20,7 @@ from tests.envs.vector_helpers import (
     mask_of,
     random_states,
     step_and_reset,
+    success_at_ends,
 )
 
 N, LIMIT = 7, 9
@@ -67,7 +68,7 @@ def test_native_is_the_synchronous_one(
     seen = {"terminated": 0, "truncated": 0, "restarted": 0}
     for _ in range(150):
         actions = rng.integers(0, case.n_actions, N)
-        ours, theirs = native.step(actions), sync.step(actions)
+        ours, theirs = native.step(actions), success_at_ends(sync.step(actions))
         finished = theirs[2] | theirs[3]
         restarted = {
             "NextStep": waiting,
@@ -87,7 +88,8 @@ def test_native_is_the_synchronous_one(
             observations, infos = native.reset(options=options)
             assert_same_bits(observations, theirs[0])
             # What was said of the last states is the same, and of the new ones now.
-            last = {key: ours[4][key] for key in ours[4] if "final" in key}
+            said = ("final", "is_success")
+            last = {k: ours[4][k] for k in ours[4] if any(word in k for word in said)}
             assert_same_infos({**last, **infos}, theirs[4])
         if mode == "Disabled" and finished.any():
             states = random_states(native, rng)
@@ -133,8 +135,16 @@ def test_both_flags_on_the_last_step(case: SystemCase, mode: str) -> None:
 
 
 @pytest.mark.parametrize("case", LASTING, ids=by_id)
-def test_no_limit_unless_one_is_set(case: SystemCase, mode: str) -> None:
-    env = gym.make_vec(case.env_id, num_envs=2, autoreset_mode=mode, **case.narrow)
+@pytest.mark.parametrize("none", [-1, None])
+def test_a_limit_can_be_removed(case: SystemCase, mode: str, none: int | None) -> None:
+    env = gym.make_vec(
+        case.env_id,
+        num_envs=2,
+        autoreset_mode=mode,
+        max_episode_steps=none,
+        **case.narrow,
+    )
+    assert env.unwrapped.max_episode_steps is None
     env.reset(options={"state": case.rows(case.away, case.away)})
     assert not any(env.step([0, 0])[3].any() for _ in range(1000))
 
@@ -232,7 +242,12 @@ def test_waiting_slots_stand_still_and_the_others_walk_on(
             assert_same_bits(observations[~was_walking], previous[~was_walking])
             assert not rewards[~was_walking].any()
             assert not (terminated | truncated)[~was_walking].any()
-            assert beside_masks(infos) == {}
+            told = beside_masks(infos)
+            assert bool(told) == (terminated | truncated).any()
+            if told:
+                assert_same_bits(told.pop("is_success"), terminated)
+                assert_same_bits(told.pop("_is_success"), terminated | truncated)
+            assert not told
             walking &= ~(terminated | truncated)
             ends["terminated"] += terminated.sum()
             ends["truncated"] += (truncated & ~terminated).sum()
@@ -287,7 +302,7 @@ def test_waiting_can_begin_with_a_masked_reset(case: SystemCase, mode: str) -> N
     env.reset(options={"reset_mask": mask_of(2, 1), "state": states, **WAIT})
     observations, _, terminated, _, infos = env.step([case.near_action] * 2)
     assert terminated.all()
-    assert beside_masks(infos) == {}
+    assert set(beside_masks(infos)) == {"is_success", "_is_success"}
     assert_same_bits(env.step([0, 1])[0], observations)
 
 
@@ -330,3 +345,26 @@ def test_statistics_of_episodes_are_recorded(case: SystemCase, mode: str) -> Non
     assert list(env.length_queue) == episodes[-100:]
     assert max(episodes) == LIMIT or not case.lasting
     assert min(episodes) < LIMIT
+
+
+def test_the_mode_can_be_changed(case: SystemCase, mode: str) -> None:
+    """The episodes are those of an environment that was made with the mode."""
+    made = native_env(case, mode, **case.easy)
+    for old in AutoresetMode:
+        env = native_env(case, old.value, **case.easy)
+        env.reset(seed=1)  # the change holds in the midst of episodes, too
+        env.set_autoreset_mode(mode)
+        assert env.autoreset_mode.value == env.metadata["autoreset_mode"].value == mode
+        assert type(env).metadata["autoreset_mode"] is AutoresetMode.NEXT_STEP
+        rng = np.random.default_rng(2)
+        made.reset(seed=1)
+        for _ in range(2 * LIMIT):
+            actions = rng.integers(0, case.n_actions, N)
+            result = made.step(actions)
+            assert_same_step(result, env.step(actions))
+            finished = result[2] | result[3]
+            if mode == "Disabled" and finished.any():
+                for each in (made, env):
+                    each.reset(options={"reset_mask": finished})
+    with pytest.raises(ValueError, match=r"^autoreset_mode must be one of"):
+        made.set_autoreset_mode("Sometimes")

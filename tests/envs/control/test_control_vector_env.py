@@ -50,8 +50,9 @@ def test_what_is_returned(case: SystemCase, mode: str) -> None:
         assert np.all((rewards <= 0.0) & (rewards >= -env.system.max_stage_cost))
         for flags in (terminated, truncated):
             assert (flags.shape, flags.dtype) == ((5,), np.bool_)
-        ended = mode == "SameStep" and (terminated | truncated).any()
+        ended = (terminated | truncated).any()
         assert bool(beside_masks(infos)) == ended
+        assert ("final_info" in infos) == (ended and mode == "SameStep")
 
 
 def test_make_vec_takes_the_mode_as_a_string(case: SystemCase, mode: str) -> None:
@@ -84,7 +85,8 @@ def test_mode_may_be_an_enum_member(case: SystemCase, mode: str) -> None:
         ("num_envs", "2"),
         ("num_envs", True),
         ("max_episode_steps", 0),
-        ("max_episode_steps", -1),
+        ("max_episode_steps", -2),
+        ("max_episode_steps", True),
         ("max_episode_steps", 10.0),
         ("autoreset_mode", "nextstep"),
         ("autoreset_mode", None),

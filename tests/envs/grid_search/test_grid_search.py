@@ -413,3 +413,10 @@ def test_parameters_pass_through_the_registry() -> None:
     env = gym.make("acl_gym/GridSearch2D-v0", desc=["..", ".G"])
     assert gym.make(env.spec).observation_space == spaces.Discrete(4)
     assert '".G"' in env.spec.to_json()
+
+
+@pytest.mark.parametrize("n_states", [1_000_001, 10**12])
+def test_a_row_has_an_end(n_states: int) -> None:
+    """Not by way of an empty MemoryError, or of none."""
+    with pytest.raises(ValueError, match="n_states must be at most 1000000, got"):
+        GridSearch1D(n_states=n_states)

@@ -82,6 +82,7 @@ BAD = [
     *((name, value) for name in NOT_NEGATIVE for value in (-1e-9, NAN, -INF)),
     *((name, value) for name in POSITIVE + NOT_NEGATIVE for value in NO_NUMBER),
     *(("substeps", value) for value in (0, -1, 1.0, 1.5, NAN, "2", None, True)),
+    *(("substeps", value) for value in (10_001, 10**12)),
     *((name, value) for name in PAIRS for value in NO_PAIR),
     *(("peaks", value) for value in NO_PEAKS),
     *(("forces", value) for value in NO_FORCES),

@@ -43,6 +43,7 @@ BAD = [
     *((name, value) for name in NOT_NEGATIVE for value in (-1e-9, NAN, -INF)),
     *((name, value) for name in POSITIVE + NOT_NEGATIVE for value in NO_NUMBER),
     *(("substeps", value) for value in (0, -1, 1.0, 1.5, NAN, "2", None, True)),
+    *(("substeps", value) for value in (10_001, 10**12)),
     *(("torques", value) for value in NO_VECTOR),
     *(("goal_bounds", value) for value in NO_VECTOR),
     *(

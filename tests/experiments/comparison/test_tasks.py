@@ -149,7 +149,7 @@ def test_costs_of_whole_episodes() -> None:
         actions=np.array([[0], [1], [0]]),
         stage_costs=np.ones((3, 1)),
         lengths=np.array([2]),
-        success=np.array([False]),
+        terminated=np.array([False]),
     )
     assert Switches()(episodes).tolist() == [1.0]
     assert Peak(1)(episodes).tolist() == [5.0]

@@ -1,0 +1,41 @@
+"""The system behind an environment, and what its numbers mean."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+from gymnasium.vector import SyncVectorEnv, VectorEnv
+
+from acl_gym.envs.control.signals import Signals
+from acl_gym.envs.control.system import ControlSystem
+
+
+def system_of(env: Any) -> ControlSystem | None:
+    """The system of an environment of this package, None for any other.
+
+    Args:
+        env: a single or a vector environment; wrappers are looked through, and so is
+            a `SyncVectorEnv`.
+    """
+    base = getattr(env, "unwrapped", None)
+    if isinstance(base, SyncVectorEnv):
+        base = base.envs[0].unwrapped
+    system = getattr(base, "system", None)
+    return system if isinstance(system, ControlSystem) else None
+
+
+def signals_of(env: Any) -> Signals | None:
+    """What observations and actions of an environment mean; None if unknown.
+
+    Where a wrapper changes the observations, their names are left out.
+    """
+    system = system_of(env)
+    if system is None or system.signals is None:
+        return None
+    single = "single_" if isinstance(env, VectorEnv) else ""
+    if getattr(env, f"{single}action_space") != system.action_space:
+        return None
+    if getattr(env, f"{single}observation_space") != system.observation_space:
+        return replace(system.signals, observations=())
+    return system.signals

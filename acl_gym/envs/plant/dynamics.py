@@ -1,0 +1,249 @@
+"""The user's equations: checked on sample states, then integrated for all slots."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numba.core.dispatcher import Dispatcher
+from numba.core.errors import NumbaError
+
+from acl_gym.envs.plant import kernels
+from acl_gym.envs.plant.models import Model, is_model
+from acl_gym.utils.typing import FloatArray, IntArray
+
+_SAMPLES = 7  # no usual number of variables, so that mixed-up axes are noticed
+
+
+class Equations:
+    """x' = f(x, u) or x(t+1) = f(x, u), for many states at once.
+
+    Args:
+        dynamics: see `plant`.
+        samples: states to try it on, `(state_size, n)`.
+        inputs: `(n_actions, n_inputs)`.
+        discrete_time: whether it gives the next state.
+
+    Raises:
+        TypeError: `dynamics` cannot be called.
+        ValueError: it fails, or does not give finite numbers of the right shape.
+    """
+
+    def __init__(
+        self,
+        dynamics: Any,
+        samples: FloatArray,
+        inputs: FloatArray,
+        discrete_time: bool,
+    ) -> None:
+        self._dynamics = dynamics
+        self._discrete_time = discrete_time
+        self._compiled: kernels.Advance | None = None
+        if is_model(dynamics):
+            self._dynamics = _checked_model(dynamics, samples, inputs)
+        elif hasattr(dynamics, "ninputs"):
+            raise TypeError(
+                "dynamics must be a python-control system with a state, got "
+                f"{type(dynamics).__name__}; convert it with control.tf2ss."
+            )
+        elif not callable(dynamics):
+            raise TypeError(
+                "dynamics must be a function of (x, u) or a python-control system, "
+                f"got {dynamics!r}."
+            )
+        elif isinstance(dynamics, Dispatcher):
+            self._check_compiled(samples, inputs)
+        else:
+            _check(dynamics, samples, inputs)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """A kernel is compiled again in each process."""
+        return {**self.__dict__, "_compiled": None}
+
+    def advance(
+        self,
+        states: FloatArray,
+        actions: IntArray,
+        inputs: FloatArray,
+        step: float,
+        substeps: int,
+    ) -> int:
+        """Advance states in place; see `kernels.Advance`."""
+        if isinstance(self._dynamics, Dispatcher):
+            if self._compiled is None:
+                self._compiled = self._compile(states, inputs)
+            return self._compiled(states, actions, inputs, step, substeps)
+        f, u = self._dynamics, inputs.T[:, actions]
+        # What is not finite is an error of its own; no need to warn of it as well.
+        with np.errstate(all="ignore"):
+            x = states
+            if self._discrete_time:
+                x = _stacked(f(x, u), x.shape)
+            else:
+                for _ in range(substeps):
+                    k1 = _stacked(f(x, u), x.shape)
+                    k2 = _stacked(f(x + 0.5 * step * k1, u), x.shape)
+                    k3 = _stacked(f(x + 0.5 * step * k2, u), x.shape)
+                    k4 = _stacked(f(x + step * k3, u), x.shape)
+                    x = x + step / 6.0 * (k1 + 2.0 * (k2 + k3) + k4)
+            finite = np.isfinite(x)
+        if finite.all():
+            states[:] = x
+            return -1
+        good = finite.all(axis=0)
+        states[:, good] = x[:, good]
+        return int(np.argmin(good))
+
+    def _compile(self, states: FloatArray, inputs: FloatArray) -> kernels.Advance:
+        given = self._dynamics(np.ascontiguousarray(states[:, 0]), inputs[0])
+        put = kernels.put_sequence
+        if isinstance(given, tuple):
+            put = kernels.put_tuple
+        make = kernels.advance_map if self._discrete_time else kernels.advance_ode
+        return make(self._dynamics, len(states), put)
+
+    def _check_compiled(self, samples: FloatArray, inputs: FloatArray) -> None:
+        """Check a function that takes one state after the other."""
+        size = len(samples)
+        expects = (
+            f"dynamics compiled by Numba must take a state x of shape ({size},) and an "
+            f"input u of shape ({inputs.shape[1]},), and return {size} finite numbers, "
+            "such as (x[1], -x[0] + u[0])"
+        )
+        for j, x in enumerate(np.ascontiguousarray(samples.T)):
+            u = inputs[j % len(inputs)]
+            try:
+                given = self._dynamics(x.copy(), u.copy())
+                values = np.asarray(given, dtype=np.float64)
+            except (
+                NumbaError,
+                ArithmeticError,
+                LookupError,
+                TypeError,
+                ValueError,
+            ) as error:
+                raise ValueError(
+                    f"{expects}; it failed: {_first_line(error)}"
+                ) from error
+            if values.shape != (size,) or not np.isfinite(values).all():
+                raise ValueError(
+                    f"{expects}, got {given!r} for x = {x.tolist()}, u = {u.tolist()}."
+                )
+        try:
+            self._compiled = self._compile(samples, inputs)
+            actions = np.zeros(1, dtype=np.int64)
+            self._compiled(samples[:, :1].copy(), actions, inputs, 0.0, 1)
+        except NumbaError as error:
+            raise ValueError(f"{expects}; it failed: {_first_line(error)}") from error
+
+
+def sample_count() -> int:
+    """How many states equations are tried on."""
+    return _SAMPLES
+
+
+def _stacked(values: Any, shape: tuple[int, ...]) -> FloatArray:
+    """What `dynamics` returned as an array; numbers count for all slots."""
+    if isinstance(values, np.ndarray) and values.shape == shape:
+        return values
+    stacked = np.empty(shape)
+    for row, value in zip(stacked, values, strict=True):
+        row[...] = value
+    return stacked
+
+
+def _checked_model(
+    system: Any, samples: FloatArray, inputs: FloatArray
+) -> Callable[[FloatArray, FloatArray], Any]:
+    """A python-control system as a function; one by one if it takes no arrays."""
+    size, n_inputs = system.nstates, system.ninputs
+    if (size, n_inputs) != (len(samples), inputs.shape[1]):
+        raise ValueError(
+            f"low, high and inputs must fit the system {system.name}, which has {size} "
+            f"states and {n_inputs} inputs, got {len(samples)} states and "
+            f"{inputs.shape[1]} inputs."
+        )
+    model = Model(system)
+    try:
+        _check(model, samples, inputs)
+    except ValueError:
+        model = Model(system, one_by_one=True)
+        _check(model, samples, inputs)
+    u = _inputs_for(samples, inputs)
+    now, later = (
+        _stacked(model.at(time, samples, u), samples.shape) for time in (0.0, 17.3)
+    )
+    if not np.array_equal(now, later):
+        raise ValueError(
+            f"the system {system.name} must not depend on time, which a policy of the "
+            "state does not see; make the time, or what follows it, a state."
+        )
+    return model
+
+
+def _inputs_for(samples: FloatArray, inputs: FloatArray) -> FloatArray:
+    return inputs.T[:, np.arange(samples.shape[1]) % len(inputs)]
+
+
+def _check(dynamics: Any, samples: FloatArray, inputs: FloatArray) -> None:
+    """Check a function of many states on samples, together and one by one."""
+    count = samples.shape[1]
+    u = _inputs_for(samples, inputs)
+    together = _tried(dynamics, samples, u)
+    for j in range(count):
+        alone = _tried(dynamics, samples[:, j : j + 1], u[:, j : j + 1])
+        if not np.allclose(alone[:, 0], together[:, j], rtol=1e-9, atol=1e-12):
+            raise ValueError(
+                "dynamics must treat each column of x and u by itself, and the same "
+                f"each time; for x = {samples[:, j].tolist()}, u = {u[:, j].tolist()} "
+                f"it gave {together[:, j].tolist()} among {count} columns and "
+                f"{alone[:, 0].tolist()} alone."
+            )
+
+
+def _tried(dynamics: Any, x: FloatArray, u: FloatArray) -> FloatArray:
+    size, count = x.shape
+    expects = (
+        f"dynamics must take states x of shape ({size}, n) and inputs u of shape "
+        f"({len(u)}, n), so that x[0] is the first variable of all n states, and return "
+        f"{size} rows of n numbers, such as [x[1], -np.sin(x[0]) + u[0]]"
+    )
+    x, u = x.copy(), u.copy()
+    x.flags.writeable = u.flags.writeable = False
+    try:
+        with np.errstate(all="ignore"):
+            given = dynamics(x, u)
+    except Exception as error:  # whatever the user's code raises
+        hint = ""
+        if "truth value" in str(error):
+            hint = "; np.where chooses for each state where `if` cannot"
+        if "read-only" in str(error):
+            hint = "; it must not change x and u"
+        raise ValueError(
+            f"{expects}; for {count} states it raised {_first_line(error)}{hint}"
+        ) from error
+    try:
+        rows = [np.asarray(row) for row in given]
+        stacked = np.stack([np.broadcast_to(row, (count,)) for row in rows])
+    except (TypeError, ValueError) as error:
+        shape = getattr(given, "shape", None)
+        got = f"shape {shape}" if shape is not None else f"{given!r:.200}"
+        raise ValueError(f"{expects}, got {got} for {count} states.") from error
+    if len(stacked) != size or stacked.dtype.kind not in "iuf":
+        raise ValueError(
+            f"{expects}, got shape {stacked.shape} of {stacked.dtype} for {count} states."
+        )
+    if not np.isfinite(stacked).all():
+        j = int(np.flatnonzero(~np.isfinite(stacked).all(axis=0))[0])
+        raise ValueError(
+            f"dynamics must be finite within low and high, got {stacked[:, j].tolist()} "
+            f"for x = {x[:, j].tolist()}, u = {u[:, j].tolist()}; check divisions, "
+            "roots and logarithms, or narrow the bounds."
+        )
+    return stacked.astype(np.float64)
+
+
+def _first_line(error: Exception) -> str:
+    lines = [line for line in str(error).splitlines() if line.strip()]
+    return f"{type(error).__name__}: {lines[0] if lines else ''}"

@@ -1,0 +1,286 @@
+"""A system from the user's own equations: parameters, bounds, goal and cost."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import numpy as np
+from gymnasium import spaces
+
+from acl_gym.envs.control import sampling
+from acl_gym.envs.control.signals import Signals
+from acl_gym.envs.control.system import ControlSystem, SlotError
+from acl_gym.envs.plant import kernels, targets
+from acl_gym.envs.plant.dynamics import Equations, sample_count
+from acl_gym.envs.plant.models import Model, is_model
+from acl_gym.utils import validation
+from acl_gym.utils.typing import BoolArray, FloatArray, IntArray
+
+_EVALUATED = 100  # states, as many as the pendulum has
+
+
+class Plant(ControlSystem):
+    """A system of the user's own; the arguments are those of `acl_gym.plant`.
+
+    Args:
+        evaluation_steps: T of an evaluation, `max_episode_steps` of `plant`.
+
+    Attributes:
+        low: lower ends of the variables, `(state_size,)`.
+        high: upper ends.
+        inputs: of each action, `(n_actions, n_inputs)`.
+    """
+
+    circular: tuple[int, ...]  # type: ignore[misc]
+    evaluation_steps: int  # type: ignore[misc]
+
+    def __init__(
+        self,
+        *,
+        dynamics: Any,
+        low: Any,
+        high: Any,
+        inputs: Any,
+        sampling_time: float,
+        goal: Any,
+        cost: Any,
+        tolerance: Any = None,
+        circular: Iterable[int] = (),
+        substeps: int = 1,
+        discrete_time: bool = False,
+        initial: Any = None,
+        evaluation_states: Any = None,
+        evaluation_steps: int = 300,
+        state_names: Sequence[str] | None = None,
+        input_names: Sequence[str] | None = None,
+    ) -> None:
+        self.low, self.high = _bounds(low, high)
+        self.inputs = _inputs(inputs)
+        self.sampling_time = validation.number("sampling_time", sampling_time, above=0)
+        self.substeps = validation.integer("substeps", substeps, at_least=1)
+        self.evaluation_steps = validation.integer(
+            "evaluation_steps", evaluation_steps, at_least=1
+        )
+        if self.substeps > targets.MOST_SUBSTEPS:
+            raise ValueError(
+                f"substeps must be at most {targets.MOST_SUBSTEPS:,}, got {substeps}; "
+                "a step would take seconds."
+            )
+        size = self.low.size
+        self.circular = targets.checked_axes(circular, size)
+        self._period = np.zeros(size)
+        rounds = list(self.circular)
+        self._period[rounds] = (self.high - self.low)[rounds]
+        if is_model(dynamics):
+            model = Model(dynamics)
+            self._check_time_of(model)
+            discrete_time = model.discrete_time
+            state_names = state_names or model.state_names
+            input_names = input_names or model.input_names
+        self.discrete_time = bool(discrete_time)
+        samples = self._draw(np.random.default_rng(0), sample_count())
+        self._equations = Equations(dynamics, samples, self.inputs, self.discrete_time)
+        self._goal = targets.Goal(goal, tolerance, self.low, self.high, self._period)
+        self._cost = targets.Cost(cost, self._goal, self.inputs, self.sampling_time)
+        self._goal.check(samples)
+        self._cost.check(samples)
+        self._signals = Signals(
+            targets.checked_names("state_names", state_names, "x", size),
+            targets.checked_names(
+                "input_names", input_names, "u", self.inputs.shape[1]
+            ),
+            tuple(map(tuple, self.inputs.tolist())),
+        )
+        self._initial = self._checked_initial(initial)
+        self._evaluation_states = (
+            self._default_evaluation_states()
+            if evaluation_states is None
+            else self.checked_states(evaluation_states)
+        )
+
+    @property
+    def observation_space(self) -> spaces.Box:
+        """The state itself, within `low` and `high`, float64."""
+        return spaces.Box(self.low, self.high, dtype=np.float64)
+
+    @property
+    def action_space(self) -> spaces.Discrete:
+        """One action for each row of `inputs`."""
+        return spaces.Discrete(len(self.inputs))
+
+    @property
+    def signals(self) -> Signals:
+        """The names of states and inputs, and the inputs of each action."""
+        return self._signals
+
+    @property
+    def goal_box(self) -> FloatArray | None:
+        """The lower and upper ends of the goal, `(2, state_size)`; None if it has none."""
+        return self._goal.box
+
+    @property
+    def max_stage_cost(self) -> float:
+        """A bound on the cost of one step; for a cost of your own, an estimate.
+
+        The estimate is the largest cost over the corners of X and 1,000 random states.
+        """
+        rng = np.random.default_rng(0)
+        states = self._draw(rng, 1000)
+        if self.low.size <= 10:
+            ends = np.stack([self.low, self.high])
+            corners = np.array(list(itertools.product(*ends.T))).T
+            states = np.concatenate([states, corners], axis=1)
+        return self._cost.largest(states)
+
+    def sample_states(self, rng: np.random.Generator, count: int) -> FloatArray:
+        """Draw initial states; those drawn from a box lie outside the goal."""
+        if callable(self._initial):
+            rows = self.checked_states(self._initial(rng, count))
+            if len(rows) != count:
+                raise ValueError(
+                    f"initial must return {count} states, one a row, got {len(rows)}."
+                )
+            return np.ascontiguousarray(rows.T)
+        if self._initial is not None and not isinstance(self._initial, spaces.Box):
+            rows = self._initial[rng.integers(len(self._initial), size=count)]
+            return np.ascontiguousarray(rows.T)
+        return sampling.sample_outside(
+            lambda n: self._draw_initial(rng, n), self._goal.reached, count
+        )
+
+    def checked_states(self, states: Any) -> FloatArray:
+        """Return states `(n, state_size)`, circular variables brought into X.
+
+        Raises:
+            ValueError: wrong shape, not finite, or beyond `low` and `high`.
+        """
+        size = self.low.size
+        array = validation.real_array("states", states, finite=False)
+        if array.ndim == 1 and size == 1:
+            array = array[:, None]
+        if array.ndim != 2 or array.shape[1] != size:
+            raise ValueError(
+                f"states must be rows of {size} variables, shape (n, {size}), got "
+                f"{array.shape}."
+            )
+        if not np.isfinite(array).all():
+            row = int(np.flatnonzero(~np.isfinite(array).all(axis=1))[0])
+            raise ValueError(
+                f"states must be finite, got {array[row].tolist()} in row {row}."
+            )
+        outside = ((array < self.low) | (array > self.high)) & (self._period == 0)
+        if outside.any():
+            row, axis = np.argwhere(outside)[0]
+            raise ValueError(
+                f"states must lie within low and high, variable {axis} in "
+                f"[{self.low[axis]:g}, {self.high[axis]:g}], got {array[row, axis]:g} in "
+                f"row {row}."
+            )
+        columns = np.ascontiguousarray(array.T)
+        kernels.settle(columns, self.low, self.high, self._period)
+        return np.ascontiguousarray(columns.T)
+
+    def advance(
+        self,
+        states: FloatArray,
+        actions: IntArray,
+        uniforms: FloatArray | None,
+        rewards: FloatArray,
+        reached: BoolArray,
+    ) -> None:
+        """One sampling time; see `ControlSystem.advance`.
+
+        Raises:
+            SlotError: a next state or a cost is not finite.
+        """
+        step = self.sampling_time / self.substeps
+        bad = self._equations.advance(states, actions, self.inputs, step, self.substeps)
+        if bad >= 0:
+            raise SlotError(
+                "the dynamics gave no finite next state in slot <slot>, from the state "
+                f"{states[:, bad].tolist()} with the input "
+                f"{self.inputs[actions[bad]].tolist()}; use more substeps or a shorter "
+                "sampling_time, or narrow low and high.",
+                bad,
+            )
+        kernels.settle(states, self.low, self.high, self._period)
+        self._cost.judge(states, actions, self._goal, rewards, reached)
+
+    def evaluation_states(self) -> FloatArray:
+        """The states given, or 100 initial ones drawn once, `(n, state_size)`."""
+        return self._evaluation_states.copy()
+
+    def _check_time_of(self, model: Model) -> None:
+        own = model.sampling_time
+        if own is not None and own != self.sampling_time:
+            raise ValueError(
+                f"sampling_time must be that of the discrete-time system, {own:g} s, got "
+                f"{self.sampling_time:g} s."
+            )
+
+    def _draw(self, rng: np.random.Generator, count: int) -> FloatArray:
+        """States anywhere in X, uniform, `(state_size, count)`."""
+        span = (self.high - self.low)[:, None]
+        return self.low[:, None] + span * rng.random((self.low.size, count))
+
+    def _draw_initial(self, rng: np.random.Generator, count: int) -> FloatArray:
+        if not isinstance(self._initial, spaces.Box):
+            return self._draw(rng, count)
+        low, high = self._initial.low[:, None], self._initial.high[:, None]
+        return low + (high - low) * rng.random((self.low.size, count))
+
+    def _checked_initial(self, initial: Any) -> Any:
+        size = self.low.size
+        if isinstance(initial, spaces.Box):
+            self.checked_states(np.stack([initial.low, initial.high]).reshape(2, -1))
+            initial = spaces.Box(
+                initial.low.astype(float), initial.high.astype(float), dtype=np.float64
+            )
+        elif initial is not None and not callable(initial):
+            rows = np.asarray(initial)
+            return self.checked_states(rows[None] if rows.shape == (size,) else rows)
+        self._initial = initial
+        if callable(initial) and not isinstance(initial, spaces.Box):
+            self.sample_states(np.random.default_rng(0), 3)
+            return initial
+        drawn = self._draw_initial(np.random.default_rng(0), 1000)
+        if self._goal.reached(drawn).mean() > 0.99:
+            raise ValueError(
+                "the goal must leave 1% or more of the initial states outside it; "
+                "narrow the goal or the tolerance, or give other initial states."
+            )
+        return initial
+
+    def _default_evaluation_states(self) -> FloatArray:
+        if isinstance(self._initial, np.ndarray) and len(self._initial) <= _EVALUATED:
+            return self._initial
+        rng = np.random.default_rng(0)
+        return np.ascontiguousarray(self.sample_states(rng, _EVALUATED).T)
+
+
+def _bounds(low: Any, high: Any) -> tuple[FloatArray, FloatArray]:
+    ends = []
+    for name, values in (("low", low), ("high", high)):
+        array = validation.real_array(name, values)
+        ends.append(array.reshape(-1) if array.ndim == 0 else array)
+    bottom, top = ends
+    if bottom.ndim != 1 or bottom.shape != top.shape or not (bottom < top).all():
+        raise ValueError(
+            "low and high must hold the ends of each state variable, low < high, got "
+            f"low={low!r} and high={high!r}."
+        )
+    return bottom, top
+
+
+def _inputs(values: Any) -> FloatArray:
+    array = validation.real_array("inputs", values)
+    if array.ndim == 1:
+        array = array[:, None]
+    if array.ndim != 2:
+        raise ValueError(
+            "inputs must hold the input of each action, shape (n_actions,), or "
+            f"(n_actions, n_inputs) for several inputs, got shape {array.shape}."
+        )
+    return np.ascontiguousarray(array)

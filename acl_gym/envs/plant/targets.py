@@ -1,0 +1,310 @@
+"""The goal and the cost of a plant, as functions or as numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from numbers import Integral
+from typing import Any
+
+import numpy as np
+
+from acl_gym.envs.control.parameters import is_weight
+from acl_gym.envs.control.system import SlotError
+from acl_gym.envs.plant import kernels
+from acl_gym.utils import validation
+from acl_gym.utils.typing import BoolArray, FloatArray, IntArray
+
+MOST_SUBSTEPS = 100_000
+
+_TOLERANCE = 1 / 40  # of the range of a variable, to either side: a decision
+
+
+class Goal:
+    """Where an episode ends in success.
+
+    Args:
+        goal: a state, a pair (low, high) of states, a function of x, or None.
+        tolerance: half-widths around a state, one for all variables or for each; None
+            takes a fortieth of the range of each.
+        low: lower ends of the variables.
+        high: upper ends.
+        period: of each variable, 0 where it is not circular.
+
+    Attributes:
+        centre: of the goal, `(state_size,)`; None if it has none.
+
+    Raises:
+        ValueError: the goal is none of these, or is empty.
+    """
+
+    def __init__(
+        self,
+        goal: Any,
+        tolerance: Any,
+        low: FloatArray,
+        high: FloatArray,
+        period: FloatArray,
+    ) -> None:
+        size = low.size
+        self.period = period
+        self.function = goal if callable(goal) else None
+        self.centre: FloatArray | None = None
+        self._half = np.full(size, -1.0)
+        if self.function is not None or goal is None:
+            if tolerance is not None:
+                raise ValueError(
+                    "tolerance belongs to a goal that is a state, got tolerance="
+                    f"{tolerance!r} with goal={goal!r}; leave it out."
+                )
+            return
+        array = validation.real_array("goal", goal, finite=False)
+        array = array.reshape(1) if array.ndim == 0 else array
+        if size == 1 and array.shape == (2,):
+            array = array[:, None]
+        if array.shape == (size,) and np.isfinite(array).all():
+            self.centre = array
+            self._half = _half_widths(tolerance, (high - low) * _TOLERANCE)
+        elif array.shape == (2, size) and not np.isnan(array).any():
+            if tolerance is not None:
+                raise ValueError(
+                    "tolerance belongs to a goal that is a state, not to a pair of "
+                    f"bounds, got tolerance={tolerance!r}; widen the bounds."
+                )
+            self._set_box(np.maximum(array[0], low), np.minimum(array[1], high), goal)
+        else:
+            raise ValueError(
+                f"goal must be a state of {size} variables, a pair of states (low, "
+                f"high), a function of x, or None, got {goal!r}."
+            )
+
+    def _set_box(self, bottom: FloatArray, top: FloatArray, goal: Any) -> None:
+        # An arc may lead over the end of a circle.
+        top = np.where((top < bottom) & (self.period > 0), top + self.period, top)
+        if (top < bottom).any():
+            raise ValueError(
+                f"goal must have low <= high in every variable, within the bounds of "
+                f"the plant, got {goal!r}."
+            )
+        self.centre = (bottom + top) / 2
+        self._half = np.maximum(top - self.centre, self.centre - bottom)
+
+    @property
+    def box(self) -> FloatArray | None:
+        """Lower and upper ends, `(2, state_size)`; None for a function or no goal."""
+        if self.centre is None:
+            return None
+        return np.stack([self.centre - self._half, self.centre + self._half])
+
+    def arguments(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Centre, half-widths and periods, for `kernels.judge`."""
+        centre = np.zeros(self._half.size) if self.centre is None else self.centre
+        return centre, self._half, self.period
+
+    def reached(self, states: FloatArray) -> BoolArray:
+        """Whether each of the states `(state_size, n)` lies in the goal, `(n,)`."""
+        count = states.shape[1]
+        reached = np.empty(count, dtype=np.bool_)
+        if self.function is None:
+            actions, none = np.zeros(count, dtype=np.int64), np.empty((0, 0))
+            rewards = np.empty(count)
+            costs = np.zeros(1)
+            kernels.judge(
+                states, actions, *self.arguments(), none, costs, rewards, reached
+            )
+        else:
+            reached[:] = self.function(states)
+        return reached
+
+    def check(self, samples: FloatArray) -> None:
+        """Try a function on sample states, `(state_size, n)`.
+
+        Raises:
+            ValueError: it fails, or does not give a bool for each state.
+        """
+        if self.function is not None:
+            _check("goal(x)", self.function, (samples,), "biu", "booleans")
+
+
+class Cost:
+    """What a step costs.
+
+    Args:
+        cost: "time", (Q, R), or a function of x and u.
+        goal: from whose centre errors count.
+        inputs: of each action, `(n_actions, n_inputs)`.
+        sampling_time: s.
+
+    Raises:
+        ValueError: the cost is none of these, or the goal has no centre for (Q, R).
+    """
+
+    def __init__(
+        self, cost: Any, goal: Goal, inputs: FloatArray, sampling_time: float
+    ) -> None:
+        self.function = cost if callable(cost) else None
+        self._goal, self._inputs = goal, inputs
+        self._weight = np.empty((0, 0))
+        self._action_costs = np.zeros(len(inputs))
+        if self.function is not None:
+            return
+        if isinstance(cost, str):
+            validation.one_of("cost", cost, ("time",))
+            self._action_costs[:] = sampling_time
+        elif isinstance(cost, Sequence) and len(cost) == 2:
+            if goal.centre is None:
+                raise ValueError(
+                    "cost=(Q, R) weighs the error from the goal, which must be a state "
+                    "or a pair of bounds then; give a function cost(x, u) instead."
+                )
+            self._weight = _matrix("Q", cost[0], goal.centre.size)
+            on_inputs = _matrix("R", cost[1], inputs.shape[1])
+            self._action_costs = np.einsum("ai,ij,aj->a", inputs, on_inputs, inputs)
+        else:
+            raise ValueError(
+                'cost must be "time", a pair (Q, R) of weights on error and input, or a '
+                f"function of x and u, got {cost!r}."
+            )
+
+    def judge(
+        self,
+        states: FloatArray,
+        actions: IntArray,
+        goal: Goal,
+        rewards: FloatArray,
+        reached: BoolArray,
+    ) -> None:
+        """Write reward and goal test of the next states.
+
+        Raises:
+            SlotError: a cost is not finite.
+        """
+        kernels.judge(
+            states,
+            actions,
+            *goal.arguments(),
+            self._weight,
+            self._action_costs,
+            rewards,
+            reached,
+        )
+        if goal.function is not None:
+            reached[:] = goal.function(states)
+        if self.function is not None:
+            rewards[:] = self.function(states, self._inputs.T[:, actions])
+            np.negative(rewards, out=rewards)
+        finite = np.isfinite(rewards)
+        if not finite.all():
+            slot = int(np.argmin(finite))
+            raise SlotError(
+                f"the cost must be finite, got {-rewards[slot]} in slot <slot>, for the "
+                f"state {states[:, slot].tolist()} with the input "
+                f"{self._inputs[actions[slot]].tolist()}.",
+                slot,
+            )
+
+    def check(self, samples: FloatArray) -> None:
+        """Try a function on sample states, `(state_size, n)`.
+
+        Raises:
+            ValueError: it fails, or does not give a finite number for each state.
+        """
+        if self.function is not None:
+            actions = np.arange(samples.shape[1]) % len(self._inputs)
+            u = self._inputs.T[:, actions]
+            _check("cost(x, u)", self.function, (samples, u), "iuf", "finite numbers")
+
+    def largest(self, states: FloatArray) -> float:
+        """The largest cost of any action in these states."""
+        largest = 0.0
+        rewards = np.empty(states.shape[1])
+        reached = np.empty(states.shape[1], dtype=np.bool_)
+        for action in range(len(self._inputs)):
+            actions = np.full(states.shape[1], action)
+            self.judge(states, actions, self._goal, rewards, reached)
+            largest = max(largest, float(-rewards.min()))
+        return largest
+
+
+def checked_axes(circular: Iterable[int], size: int) -> tuple[int, ...]:
+    """Return numbers of variables, each once, in order.
+
+    Raises:
+        ValueError: one is not among 0..size - 1.
+    """
+    axes = list(circular) if isinstance(circular, Iterable) else [None]
+    for axis in axes:
+        whole = isinstance(axis, Integral) and not isinstance(axis, bool)
+        if not whole or not 0 <= axis < size:
+            raise ValueError(
+                f"circular must hold variables of 0..{size - 1}, got {circular!r}."
+            )
+    return tuple(sorted({int(axis) for axis in axes}))
+
+
+def checked_names(
+    name: str, names: Sequence[str] | None, letter: str, size: int
+) -> tuple[str, ...]:
+    """Return a name for each of `size` signals; None numbers them.
+
+    Raises:
+        ValueError: they are not that many strings.
+    """
+    if names is None:
+        return tuple(f"{letter}[{i}]" for i in range(size))
+    good = isinstance(names, Sequence) and not isinstance(names, str)
+    if not good or len(names) != size or not all(isinstance(n, str) for n in names):
+        raise ValueError(f"{name} must be {size} strings, got {names!r}.")
+    return tuple(names)
+
+
+def _half_widths(tolerance: Any, default: FloatArray) -> FloatArray:
+    if tolerance is None:
+        return default
+    array = validation.real_array("tolerance", tolerance, finite=False)
+    if array.shape not in ((), (1,), default.shape) or not (array >= 0).all():
+        raise ValueError(
+            f"tolerance must be a number >= 0 or {default.size} of them, got "
+            f"{tolerance!r}."
+        )
+    return np.broadcast_to(array, default.shape).copy()
+
+
+def _matrix(name: str, values: Any, size: int) -> FloatArray:
+    """A symmetric weight from a number, a diagonal or a matrix."""
+    array = validation.real_array(name, values)
+    if array.ndim == 0 or array.shape == (1,):
+        array = np.full(size, array.item())
+    if array.shape == (size,):
+        array = np.diag(array)
+    if not is_weight(array, size):
+        raise ValueError(
+            f"{name} of cost=(Q, R) must be a number, {size} of them, or a symmetric "
+            f"positive semi-definite ({size}, {size}) matrix, got {values!r}."
+        )
+    return array
+
+
+def _check(
+    name: str, function: Any, arguments: tuple[FloatArray, ...], kinds: str, what: str
+) -> None:
+    """Try a function of many states."""
+    size, count = arguments[0].shape
+    expects = (
+        f"{name} must return {what} of shape (n,) for states x of shape ({size}, n)"
+    )
+    try:
+        with np.errstate(all="ignore"):
+            given = function(*(argument.copy() for argument in arguments))
+    except Exception as error:  # whatever the user's code raises
+        raise ValueError(f"{expects}, but it raised {error!r}.") from error
+    array = np.asarray(given)
+    if array.shape != (count,) or array.dtype.kind not in kinds:
+        raise ValueError(
+            f"{expects}, got {array.dtype} of shape {array.shape} for n = {count}; "
+            "combine conditions with & instead of `and`, sum over axis 0."
+        )
+    if not np.isfinite(array).all():
+        j = int(np.argmin(np.isfinite(array)))
+        raise ValueError(
+            f"{expects}, got {array[j]} for x = {arguments[0][:, j].tolist()}."
+        )

@@ -1,0 +1,145 @@
+"""What every export needs to know of a greedy policy, checked once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Self
+
+import numpy as np
+
+from acl_gym.colony.greedy import greedy_actions
+from acl_gym.envs.control.signals import Signals
+from acl_gym.partitions import Discrete, Grid, Partition
+from acl_gym.utils.typing import FloatArray, IntArray, RankArray
+
+
+@dataclass(frozen=True, eq=False)
+class Source:
+    """A greedy policy (4.16) that is to be exported; see `of`.
+
+    Attributes:
+        kind: "fuzzy", "crisp" or "discrete".
+        lines: the centres of each variable; a circular one ends where it began, one
+            period on. The possible values, where the kind is discrete.
+        periods: of each variable, 0 where it is not circular.
+        cells: the number of cells along each variable; the last one varies fastest.
+        table: `(n_cells, n_actions)`, values or levels.
+        ranks: `(n_cells, n_actions)`, the order in which tied actions are preferred.
+        first_action: the action that column 0 stands for.
+        signals: what observations and actions mean; None if unknown.
+    """
+
+    kind: str
+    lines: tuple[FloatArray, ...]
+    periods: tuple[float, ...]
+    cells: tuple[int, ...]
+    table: FloatArray
+    ranks: RankArray
+    first_action: int
+    signals: Signals | None
+
+    @classmethod
+    def of(
+        cls,
+        partition: Partition,
+        table: FloatArray,
+        ranks: RankArray,
+        first_action: int = 0,
+        signals: Signals | None = None,
+    ) -> Self:
+        """Describe a policy.
+
+        Args:
+            partition: `Crisp`, `Fuzzy` or `Discrete`.
+            table: `(n_cells, n_actions)`.
+            ranks: `(n_cells, n_actions)`.
+            first_action: the action that column 0 stands for.
+            signals: what observations and actions mean; names that fit another number
+                of variables are left out.
+
+        Raises:
+            TypeError: the partition locates states by a method of its own.
+            ValueError: the table holds NaN, or infinity in a fuzzy policy, or
+                `signals` fit another number of actions.
+        """
+        kind, centres, given = _axes(partition)
+        # A lone centre takes every value, so it needs no period.
+        periods = [
+            0.0 if period is None or line.size == 1 else float(period)
+            for line, period in zip(centres, given, strict=True)
+        ]
+        lines = [
+            np.append(line, line[0] + period) if period else line
+            for line, period in zip(centres, periods, strict=True)
+        ]
+        bad = ~np.isfinite(table) if kind == "fuzzy" else np.isnan(table)
+        if bad.any():
+            cell = int(np.flatnonzero(bad.any(axis=1))[0])
+            raise ValueError(
+                "the table of a policy must hold finite numbers to be exported, got "
+                f"{table[cell].tolist()} for cell {cell}."
+            )
+        if signals is not None and len(signals.values) != table.shape[1]:
+            raise ValueError(
+                "inputs must hold a number or a row of numbers for each of the "
+                f"{table.shape[1]} actions, got {len(signals.values)}."
+            )
+        if signals is not None and len(signals.observations) != len(lines):
+            signals = replace(signals, observations=())
+        cells = tuple(line.size for line in centres)
+        return cls(
+            kind,
+            tuple(lines),
+            tuple(periods),
+            cells,
+            table,
+            ranks,
+            first_action,
+            signals,
+        )
+
+    @property
+    def n_actions(self) -> int:
+        """The number of actions."""
+        return int(self.table.shape[1])
+
+    @cached_property
+    def best_columns(self) -> IntArray:
+        """The best column of each cell, ties broken as in `predict`, `(n_cells,)`."""
+        index = np.arange(len(self.table), dtype=np.int32)[:, None]
+        return greedy_actions(self.table, self.ranks, index, np.ones(index.shape))
+
+    @cached_property
+    def orders(self) -> tuple[IntArray, IntArray]:
+        """The distinct rows of `ranks`, made 0, 1, ..., and which of them a cell has.
+
+        There are at most n_actions! of them, so that a number for each cell takes less
+        memory than a row does.
+        """
+        ranks = np.argsort(self.ranks, axis=1, kind="stable")
+        ranks = np.argsort(ranks, axis=1, kind="stable")
+        rows, which = np.unique(ranks, axis=0, return_inverse=True)
+        return rows, which.ravel()
+
+
+def _axes(
+    partition: Partition,
+) -> tuple[str, tuple[FloatArray, ...], tuple[float | None, ...]]:
+    """The kind of a partition; centres and period of each variable."""
+    locate = type(partition).locate
+    if isinstance(partition, Grid) and locate is Grid.locate:
+        kind = "fuzzy" if partition.fuzzy else "crisp"
+        return kind, partition.centres, partition.periods
+    if isinstance(partition, Discrete) and locate is Discrete.locate:
+        sizes, starts = partition.sizes.ravel(), partition.starts.ravel()
+        lines = tuple(
+            np.arange(start, start + size, dtype=np.float64)
+            for start, size in zip(starts, sizes, strict=True)
+        )
+        return "discrete", lines, (None,) * len(lines)
+    raise TypeError(
+        "only policies over Crisp, Fuzzy and Discrete partitions can be exported, got "
+        f"{type(partition).__name__}, which locates states by a method of its own; "
+        "learn on one of these partitions."
+    )

@@ -1,0 +1,97 @@
+"""What a `VecEnv` of Stable-Baselines3 requires of a vector environment."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from gymnasium import spaces
+from gymnasium.vector import AsyncVectorEnv, AutoresetMode, SyncVectorEnv, VectorEnv
+
+from acl_gym.envs import received
+from acl_gym.envs.control.environments import ControlVectorEnv
+
+_SUPPORTED_MODES = (AutoresetMode.DISABLED, AutoresetMode.SAME_STEP)
+_ARRAY_SPACES = (
+    spaces.Box,
+    spaces.Discrete,
+    spaces.MultiDiscrete,
+    spaces.MultiBinary,
+)
+
+
+def settle_mode(env: VectorEnv[Any, Any, Any]) -> AutoresetMode:
+    """The autoreset mode of `env`; an environment of this package is given one that fits.
+
+    Raises:
+        ValueError: a `VecEnv` does not support the mode, and it cannot be changed.
+    """
+    mode = received.autoreset_mode_of(env)
+    if mode in _SUPPORTED_MODES:
+        return mode
+    # Not below wrappers, which may have read the mode already.
+    if isinstance(env, ControlVectorEnv):
+        env.set_autoreset_mode(AutoresetMode.DISABLED)
+        return AutoresetMode.DISABLED
+    raise ValueError(
+        f"env must have autoreset mode DISABLED or SAME_STEP, got {mode.name}, which "
+        "inserts a meaningless step between two episodes; make it with "
+        f"{_with_autoreset_disabled(env)}{'' if env.unwrapped is env else ', then wrap'}."
+    )
+
+
+def _with_autoreset_disabled(env: VectorEnv[Any, Any, Any]) -> str:
+    """The line of code that makes what `env` wraps, with autoreset disabled."""
+    base = env.unwrapped
+    mode, count = '"Disabled"', env.num_envs
+    env_id = "id" if base.spec is None else f'"{base.spec.id}"'
+    if isinstance(base, ControlVectorEnv):
+        return f"gym.make_vec({env_id}, num_envs={count}, autoreset_mode={mode})"
+    if isinstance(base, (SyncVectorEnv, AsyncVectorEnv)) and base.spec is None:
+        return f"{type(base).__name__}(env_fns, autoreset_mode={mode})"
+    how = "async" if isinstance(base, AsyncVectorEnv) else "sync"
+    return (
+        f'gym.make_vec({env_id}, num_envs={count}, vectorization_mode="{how}", '
+        f'vector_kwargs={{"autoreset_mode": {mode}}})'
+    )
+
+
+def check_action_space(space: spaces.Space[Any]) -> None:
+    """Refuse what cannot be an array with one row for each slot.
+
+    Raises:
+        ValueError: it is refused.
+    """
+    if not isinstance(space, _ARRAY_SPACES):
+        raise ValueError(
+            "actions must be a Box, Discrete, MultiDiscrete or MultiBinary, since a "
+            f"VecEnv takes them as one array with a row for each slot, got {space}; "
+            "rearrange them in each single environment with gymnasium's "
+            "TransformAction."
+        )
+    _check_start("actions", space)
+
+
+def check_observation_space(space: spaces.Space[Any]) -> None:
+    """Refuse what a `VecEnv` cannot hand out.
+
+    Raises:
+        ValueError: it is refused.
+    """
+    parts = space.spaces.values() if isinstance(space, spaces.Dict) else [space]
+    for part in parts:
+        if not isinstance(part, _ARRAY_SPACES):
+            raise ValueError(
+                "observations must be a Box, Discrete, MultiDiscrete, MultiBinary or "
+                f"a Dict of those, got {part}; use gymnasium's FlattenObservation."
+            )
+        _check_start("observations", part)
+
+
+def _check_start(what: str, space: spaces.Space[Any]) -> None:
+    """Stable-Baselines3 assumes that discrete values start from 0."""
+    if np.any(getattr(space, "start", 0)):
+        raise ValueError(
+            f"{what} must start from 0, got {space}; shift them with gymnasium's "
+            f"{'TransformAction' if what == 'actions' else 'TransformObservation'}."
+        )

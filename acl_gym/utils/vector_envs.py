@@ -1,0 +1,81 @@
+"""Recognising a vector environment, and saying how to make one of what was given."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import gymnasium as gym
+from gymnasium.envs.registration import EnvSpec
+from gymnasium.vector import VectorEnv
+
+_MANY = 100
+"""Slots proposed in place of a single environment."""
+
+
+def require_vector_env(env: Any) -> None:
+    """Check that `env` is a vector environment.
+
+    Raises:
+        TypeError: it is not; the message has the line of code that makes one of the
+            same kind, for a single environment, an id, a function that makes one, or a
+            `VecEnv` of Stable-Baselines3.
+    """
+    if isinstance(env, VectorEnv):
+        return
+    if _is_vec_env(env):
+        kind, remedy = (f"{type(env).__name__} of Stable-Baselines3", _of_vec_env(env))
+    elif isinstance(env, gym.Env):
+        kind = f"the single environment {type(env.unwrapped).__name__}"
+        remedy = f"use {_line(env.spec, type(env.unwrapped).__name__, _MANY)}"
+    elif isinstance(env, str):
+        spec = gym.registry.get(env.rpartition(":")[2])
+        kind = f"the id {env!r}"
+        remedy = f"use {_line(spec, None, _MANY)}"
+    elif callable(env):
+        name = getattr(env, "__name__", "make_env")
+        kind = f"{name}, a class or function"
+        remedy = f"use {_line(None, name, _MANY)}"
+    else:
+        kind, remedy = type(env).__name__, f"use {_line(None, None, _MANY)}"
+    raise TypeError(f"env must be a gymnasium.vector.VectorEnv, got {kind}; {remedy}.")
+
+
+def _line(spec: EnvSpec | None, maker: str | None, count: int) -> str:
+    """The expression that makes a vector environment of `count` slots.
+
+    Args:
+        spec: of one slot, None if it is not registered.
+        maker: the name of what makes one slot if it is not registered.
+        count: the number of slots.
+    """
+    if spec is not None:
+        extra = "".join(
+            f", {name}={value!r}"
+            for name, value in spec.kwargs.items()
+            if name != "render_mode" and isinstance(value, (bool, int, float, str))
+        )
+        if spec.vector_entry_point is not None:
+            return f'gym.make_vec("{spec.id}", num_envs={count}{extra})'
+        return f'acl_gym.WaitingVectorEnv.make("{spec.id}", {count}{extra})'
+    if maker is not None:
+        maker = "make_env" if maker == "<lambda>" else maker
+        return f"acl_gym.WaitingVectorEnv([{maker}] * {count})"
+    return f"gym.make_vec(id, num_envs={count})"
+
+
+def _is_vec_env(env: Any) -> bool:
+    """Whether it is a `VecEnv`, found without importing Stable-Baselines3."""
+    package = "stable_baselines3.common.vec_env"
+    return any(base.__module__.startswith(package) for base in type(env).__mro__)
+
+
+def _of_vec_env(env: Any) -> str:
+    base = env.unwrapped
+    if isinstance(getattr(base, "env", None), VectorEnv):
+        inside = "env.env" if base is env else "env.unwrapped.env"
+        return f"pass what it adapts, {inside}"
+    singles = getattr(base, "envs", [])  # those of a SubprocVecEnv are in processes
+    if not singles:
+        return f"use {_line(None, None, env.num_envs)}"
+    first = singles[0]
+    return f"use {_line(first.spec, type(first.unwrapped).__name__, env.num_envs)}"

@@ -1,0 +1,1 @@
+"""Random calls with hostile values: nothing crashes, hangs, or is silently wrong."""

@@ -1,0 +1,118 @@
+"""Only DQN and the adapter need Stable-Baselines3 and torch."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.test_readme import BLOCKS
+
+ABSENT = """
+import sys
+
+class Absent:
+    def find_spec(self, name, path=None, target=None):
+        if name.partition(".")[0] in ("torch", "stable_baselines3"):
+            raise ModuleNotFoundError(f"No module named {name!r}", name=name)
+
+sys.meta_path.insert(0, Absent())
+"""
+LOADED = """
+import sys
+heavy = {"torch", "stable_baselines3"} & {name.partition(".")[0] for name in sys.modules}
+assert not heavy, heavy
+"""
+
+
+def run(code: str, folder: Path) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-W", "error", "-c", code],
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=300,
+    )
+
+
+def test_the_ten_lines_run_without_both(tmp_path: Path) -> None:
+    done = run(ABSENT + BLOCKS[0], tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert float(done.stdout.split()[0]) < 1.25 * 38.4
+    assert (tmp_path / "swing_up.npz").exists()
+
+
+EVERYTHING = """
+import gymnasium as gym
+from acl_gym import ACL, CSVLog, Checkpoint, EarlyStop, PolicyEvaluation, QLearning
+from acl_gym import TensorBoardLog, evaluate_policy_cost, value_iteration
+
+env = gym.make_vec("acl_gym/GridSearch1D-v0", num_envs=10)
+callbacks = [
+    PolicyEvaluation(env, save_best="best"),
+    Checkpoint("checkpoints"),
+    CSVLog("log.csv"),
+    TensorBoardLog("board"),
+    EarlyStop(patience=100),
+]
+for kind in (ACL, QLearning):
+    agent = kind(env, seed=0).learn(trials=3, callback=callbacks, progress_bar=True)
+    evaluate_policy_cost(agent, env)
+    agent.save("agent")
+    kind.load("agent", env).learn(trials=1).predict(3)
+value_iteration(env)
+"""
+
+
+def test_learning_saving_and_logging_load_neither(tmp_path: Path) -> None:
+    done = run(EVERYTHING + LOADED, tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert list((tmp_path / "board").iterdir())
+
+
+TRAIN = """
+from acl_gym.cli import main
+for command in (
+    ["train", "acl_gym/GridSearch1D-v0", "--trials", "3", "--seed", "0"],
+    ["evaluate", "GridSearch1D-v0.npz"],
+    ["envs"],
+):
+    sys.argv = ["acl-gym", *command]
+    try:
+        main()
+    except SystemExit as end:
+        assert not end.code, end.code
+"""
+
+
+@pytest.mark.parametrize("setting", [ABSENT, "import sys\n"], ids=["absent", "present"])
+def test_the_shell_trains_and_evaluates_with_neither(
+    setting: str, tmp_path: Path
+) -> None:
+    done = run(setting + TRAIN + LOADED, tmp_path)
+    assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "from acl_gym import VectorEnvAdapter",
+        "import acl_gym; acl_gym.VectorEnvAdapter",
+        "from acl_gym.sb3.dqn import make_dqn",
+        "from acl_gym.sb3.callback import PolicyCostCallback",
+    ],
+)
+def test_what_needs_them_says_what_to_install(line: str, tmp_path: Path) -> None:
+    done = run(ABSENT + line, tmp_path)
+    assert done.returncode == 1
+    assert re.search(
+        r"^ModuleNotFoundError: VectorEnvAdapter and DQN need Stable-Baselines3 and "
+        r"torch, .*No module named 'stable_baselines3'.*"
+        r"pip install stable-baselines3 torch",
+        done.stderr,
+        re.MULTILINE,
+    )

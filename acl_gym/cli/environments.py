@@ -159,7 +159,7 @@ class Environment:
     def _check_switches(self) -> None:
         """Refuse a text where the environment has True or False: it would be true."""
         with bad_arguments():
-            entry_point = gym.registry[self.name].entry_point
+            entry_point: Any = gym.registry[self.name].entry_point
             if self.arguments and isinstance(entry_point, str):
                 entry_point = load_env_creator(entry_point)
         if not self.arguments or not callable(entry_point):

@@ -33,9 +33,9 @@ Examples:
   acl-gym train acl_gym/Pendulum-v0
   acl-gym train acl_gym/Pendulum-v0 --ants 2000 --trials 50 --seed 3
   acl-gym train --resume Pendulum-v0.npz --trials 50            50 more trials
-  acl-gym train acl_gym/GridSearch2D-v0 --ants 86 --param tabu=true --out grid.npz
+  acl-gym train acl_gym/GridSearch2D-v0 --ants 86 --param tabu=true --out g.npz
   acl-gym train acl_gym/Pendulum-v0 --agent q-learning --param trace_decay=0.5
-  acl-gym train acl_gym/Pendulum-v0 --partition crisp --param global_decay=0.001
+  acl-gym train acl_gym/Pendulum-v0 --partition crisp --param tau0=0.001
   acl-gym train acl_gym/Pendulum-v0 --param epsilon=linear:0.3:0.01:50
   acl-gym train acl_gym/Pendulum-v0 --env-arg torques=[-1,0,1] --cells 64,65
   acl-gym train CartPole-v1 --param deposit=rank:5
@@ -384,9 +384,10 @@ def _target(path: Path) -> Path:
     """A file that can be written when learning is over, checked before it begins."""
     from acl_gym.utils import files
 
+    folder = path.name in ("", "..")
     with bad_arguments():
-        target = files.checked_target(files.with_suffix(path))
-    if target.is_dir():
+        target = path if folder else files.checked_target(files.with_suffix(path))
+    if folder or target.is_dir():
         raise BadArgumentError(f"{target} is a folder; give the name of a file.")
     return target
 

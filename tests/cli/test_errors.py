@@ -107,7 +107,8 @@ def test_a_run_that_fails_is_one_line_and_1(tmp_path: Path) -> None:
     (tmp_path / "my_treat.py").write_text(
         MODULE.replace("-1.0, self.x", "1.0, self.x").replace("Corridor-v0", "Treat-v0")
     )
-    arguments = ["train", "my_treat:Treat-v0", "--ants", "3", "--param", "tau0=0.001"]
+    arguments = ["train", "my_treat:Treat-v0", "--ants", "3", "--trials", "3"]
+    arguments += ["--param", "tau0=0.001", "--param", "deposit=inverse_cost"]
     done = run(*arguments, "--json", cwd=tmp_path)
     assert (done.returncode, done.stdout) == (1, "")
     (line,) = done.stderr.splitlines()

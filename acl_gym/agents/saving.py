@@ -155,9 +155,11 @@ class SavedAgent(PartitionPolicy):
 
         Raises:
             FileNotFoundError: the folder of the file does not exist.
-            TypeError: `metadata` or `history` hold what a file cannot hold.
+            TypeError: `metadata` or `history` hold what a file cannot hold, or the
+                constructor of a subclass does not take what `load` would pass.
         """
         parameters = self.parameters()
+        _check_constructor(type(self), parameters)
         header = {
             "agent": type(self).__name__,
             "parameters": {n: _parameter(v) for n, v in parameters.items()},
@@ -339,6 +341,24 @@ def _keywords(kind: type) -> set[str]:
         if parameter.kind not in (parameter.VAR_POSITIONAL, parameter.VAR_KEYWORD)
         and name not in _NOT_GIVEN
     } - {"partition"}
+
+
+def _check_constructor(kind: type, parameters: dict[str, Any]) -> None:
+    """Refuse to write what `load` could not make again.
+
+    Raises:
+        TypeError: the constructor does not take what `load` passes to it.
+    """
+    passed = dict.fromkeys({"n_actions", *_keywords(kind), *parameters})
+    try:
+        inspect.signature(kind).bind(None, None, **passed)
+    except TypeError as error:
+        raise TypeError(
+            f"{kind.__name__} must be made by {kind.__name__}(env, partition, "
+            "n_actions=..., and what `parameters` returns) to be saved, because load "
+            f"makes it so, but {error}; let its constructor take these, for instance "
+            "by **keywords that it passes on."
+        ) from error
 
 
 def _parameter(value: Any) -> Any:

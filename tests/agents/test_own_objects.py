@@ -247,6 +247,20 @@ def test_a_subclass_gets_the_arguments_that_its_file_lacks(tmp_path: Path) -> No
         ACL.load(path)
 
 
+class Closed(ACL):
+    """A subclass that `load` could not make: it takes neither partition nor number."""
+
+    def __init__(self, env: Any) -> None:
+        super().__init__(env, ROW, seed=0, max_steps=9)
+
+
+def test_a_subclass_that_cannot_be_made_again_is_not_written(tmp_path: Path) -> None:
+    agent = Closed(chains(4)).learn(trials=1)
+    with pytest.raises(TypeError, match=r"Closed must be made by .*\*\*keywords"):
+        agent.save(tmp_path / "agent")
+    assert not list(tmp_path.iterdir())
+
+
 @pytest.mark.parametrize("bonus", [7, 1.5, (1, "a"), np.arange(3.0), None])
 def test_a_subclass_may_have_its_arguments_in_the_file(
     bonus: Any, tmp_path: Path

@@ -44,6 +44,8 @@ class PolicyCost:
 
     def __repr__(self) -> str:
         """Cost, rate of success, and how many episodes of which lengths."""
+        if not self.lengths.size:
+            return "PolicyCost(no episodes)"
         facts = ", ".join(f"{name}={value}" for name, value in self._facts())
         return f"PolicyCost({facts}, {self._episodes()})"
 

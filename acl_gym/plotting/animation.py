@@ -156,6 +156,9 @@ class _Film:
             with style.in_style():
                 self._moving = draw_stage(self._panels, self._stages[number])
                 style.keep_style(self.figure)
+            if self._now < 0:  # the panels stay where they are, and frames are quick
+                self.figure.draw_without_rendering()
+                self.figure.set_layout_engine("none")
             self._now = number
         artists: list[Any] = self._moving(frame)
         return artists

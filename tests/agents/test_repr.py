@@ -79,7 +79,7 @@ def test_policies() -> None:
 def test_a_notebook_shows_parameters_and_a_picture() -> None:
     page = pendulum(epsilon=Linear(0.3, 0.1, trials=5))._repr_html_()
     parser = parsed(page)
-    for text in ("tau0", "τ", "local_decay", "γ", "Pendulum-v0, 5 ants", "+0.8 N m"):
+    for text in ("tau0", "τ", "local_decay", "γ", "Pendulum-v0, 5 ants", " +0.8 N m"):
         assert text in parser.text
     assert "Linear(start=0.3, end=0.1, trials=5)" in parser.text
     assert parser.tags.count("img") == 1

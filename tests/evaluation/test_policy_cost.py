@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import gymnasium as gym
@@ -305,7 +306,10 @@ def test_policy_variation_and_sensitivity_of_every_trial(kind: type) -> None:
 
 
 def test_a_cost_says_what_it_is() -> None:
-    result = PolicyCost(
+    env = gym.make_vec("acl_gym/Pendulum-v0", num_envs=1)
+    agent = ACL(env, seed=0)
+    result = replace(
+        evaluate_policy_cost(agent, env, np.zeros((1, 2)), max_steps=1),
         costs=np.array([1.0, 3.0]),
         success=np.array([True, False]),
         lengths=np.array([4, 20]),
@@ -315,3 +319,8 @@ def test_a_cost_says_what_it_is() -> None:
     page = result._repr_html_()
     assert "lowest 1, median 2, highest 3" in page
     assert ">50%<" in page
+    none = replace(
+        result, **dict.fromkeys(("costs", "success", "lengths"), np.empty(0))
+    )
+    assert repr(none) == "PolicyCost(no episodes)"
+    assert "no episodes" in none._repr_html_()

@@ -25,7 +25,7 @@ def test_a_grid_search_has_walls_and_arrows() -> None:
     dark = [p for p in ax.patches if p.get_facecolor()[:3] == (0.25, 0.25, 0.25)]
     assert len(dark) == walls
     arrows = system.n_states - 1
-    assert arrows == quiver(ax).N
+    assert quiver(ax).U.size == arrows
     levels = plot_pheromone(agent).images[0].get_array()
     assert np.isfinite(levels.filled(np.nan)).sum() == arrows
 
@@ -34,7 +34,7 @@ def test_a_policy_of_its_own_is_drawn_with_the_map_of_an_env() -> None:
     agent = colony("acl_gym/GridSearch2D-v0")
     single = gym.make("acl_gym/GridSearch2D-v0")
     arrows = agent.partition.n_cells - 1  # none at the goal
-    assert arrows == quiver(plot_policy(agent.policy, env=single)).N
+    assert quiver(plot_policy(agent.policy, env=single)).U.size == arrows
     bare = plot_policy(agent.policy)
     assert bare.images[0].get_array().shape == (4, 25)  # 87 states in rows of 25
 
@@ -43,7 +43,7 @@ def test_the_lake_has_its_holes() -> None:
     agent = colony("FrozenLake-v1", deposit="return")
     ax = plot_policy(agent)
     assert sorted(text.get_text() for text in ax.texts) == ["goal", *["hole"] * 4]
-    assert quiver(ax).N == 16 - 5
+    assert quiver(ax).U.size == 16 - 5
     best = agent.policy.best_actions()
     left = (quiver(ax).U == -1) & (quiver(ax).V == 0)
     desc = np.asarray(gym.make("FrozenLake-v1").unwrapped.desc).ravel()

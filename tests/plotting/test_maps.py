@@ -56,7 +56,7 @@ def test_crisp_cells_are_drawn_as_they_are() -> None:
     x, y = np.moveaxis(mesh(plot_policy(agent)).get_coordinates(), -1, 0)
     # The cell of theta = 0 lies at both ends of the axis: 8 cells give 9 pieces.
     borders = (np.arange(8) + 0.5) * 2 * math.pi / 8
-    assert x[0] == pytest.approx([0.0, *borders, 2 * math.pi])
+    assert np.allclose(x[0], [0.0, *borders, 2 * math.pi])
     assert y[:, 0].min() == -9.0
     assert y[:, 0].max() == 9.0
 

@@ -33,7 +33,7 @@ Examples:
   acl-gym train acl_gym/Pendulum-v0
   acl-gym train acl_gym/Pendulum-v0 --ants 2000 --trials 50 --seed 3
   acl-gym train --resume Pendulum-v0.npz --trials 50            50 more trials
-  acl-gym train acl_gym/GridSearch2D-v0 --ants 86 --param tabu=true --out g.npz
+  acl-gym train acl_gym/GridSearch2D-v0 --ants 86 --param tabu=true
   acl-gym train acl_gym/Pendulum-v0 --agent q-learning --param trace_decay=0.5
   acl-gym train acl_gym/Pendulum-v0 --partition crisp --param tau0=0.001
   acl-gym train acl_gym/Pendulum-v0 --param epsilon=linear:0.3:0.01:50

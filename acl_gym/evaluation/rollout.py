@@ -101,10 +101,13 @@ class Rollout:
         require_vector_env(env)
         space = env.single_action_space
         if not isinstance(space, spaces.Discrete):
-            raise ValueError(
-                f"env must have Discrete actions, got {space}; discretise them, for "
-                "instance with gymnasium.wrappers.TransformAction."
-            )
+            remedy = "number its actions with gymnasium.wrappers.TransformAction"
+            if isinstance(space, spaces.Box):
+                remedy = (
+                    "wrap each single environment in "
+                    "gymnasium.wrappers.DiscretizeAction(env, bins=5)"
+                )
+            raise ValueError(f"env must have Discrete actions, got {space}; {remedy}.")
         self.env = env
         self.max_steps = validation.integer("max_steps", max_steps, at_least=1)
         self.n_actions = int(space.n)

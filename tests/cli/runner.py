@@ -39,7 +39,7 @@ def run(*arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]:
         capture_output=True,
         text=True,
         check=False,
-        timeout=120,
+        timeout=300,
     )
     lines = done.stderr.splitlines(keepends=True)
     done.stderr = "".join(line for line in lines if "compiling its kernels" not in line)

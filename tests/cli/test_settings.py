@@ -12,14 +12,11 @@ from acl_gym.cli.agents import CHOICES, parameters
 from acl_gym.cli.errors import BadArgumentError
 from acl_gym.cli.settings import parse_parameters, parse_settings, parse_value
 from acl_gym.colony.costs import (
-    Constant,
     Cost,
     Overshoot,
     Quadratic,
     SettlingTime,
     Steps,
-    Sum,
-    Weighted,
 )
 from acl_gym.colony.deposits import InverseCost, Rank, Return
 from acl_gym.colony.schedules import Exponential, Harmonic, Linear
@@ -99,17 +96,7 @@ def test_values_that_no_file_could_hold(text: str) -> None:
         ("cost=quadratic:[0,0]:[1,1e+2]", Quadratic((0, 0), (1, 100.0))),
         (
             "cost=settling_time:0:3.14+2*overshoot:0:3.14:period=6.28+0.1",
-            Sum(
-                (
-                    Sum(
-                        (
-                            SettlingTime(0, 3.14),
-                            Weighted(2.0, Overshoot(0, 3.14, 6.28)),
-                        )
-                    ),
-                    Constant(0.1),
-                )
-            ),
+            SettlingTime(0, 3.14) + 2.0 * Overshoot(0, 3.14, 6.28) + 0.1,
         ),
     ],
 )

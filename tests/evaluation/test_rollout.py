@@ -14,9 +14,11 @@ from gymnasium.vector import (
     VectorEnv,
     VectorWrapper,
 )
+from gymnasium.wrappers import DiscretizeAction
 from gymnasium.wrappers.vector import RecordEpisodeStatistics
 
 import acl_gym  # noqa: F401
+from acl_gym import WaitingVectorEnv
 from acl_gym.evaluation.rollout import Rollout, _account
 from tests.agents.reference_colony import Chain, chains
 
@@ -295,7 +297,7 @@ def test_what_is_no_vector_environment_is_refused_with_the_remedy() -> None:
 
 def test_continuous_actions_are_refused() -> None:
     env = gym.make_vec("Pendulum-v1", num_envs=2)
-    with pytest.raises(ValueError, match=r"Discrete actions, got Box\(.*discretise"):
+    with pytest.raises(ValueError, match=r"Discrete actions, got Box\(.*DiscretizeAction"):
         Rollout(env, 5)
     env.close()
 
@@ -307,3 +309,15 @@ def test_continuous_actions_are_refused() -> None:
 def test_bad_max_steps(max_steps: Any, error: type[Exception]) -> None:
     with pytest.raises(error, match="max_steps"):
         Rollout(chains(2), max_steps)
+
+
+def test_continuous_actions_lead_to_the_wrapper_that_makes_them_discrete() -> None:
+    env = WaitingVectorEnv.make("Pendulum-v1", 2)
+    with pytest.raises(
+        ValueError, match=r"Discrete actions.*DiscretizeAction\(env, bins"
+    ):
+        Rollout(env, 10)
+    wrapped = WaitingVectorEnv(
+        [lambda: DiscretizeAction(gym.make("Pendulum-v1"), 5)] * 2
+    )
+    assert Rollout(wrapped, 10).n_actions == 5

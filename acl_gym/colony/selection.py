@@ -59,8 +59,8 @@ def choose_actions(
     Returns:
         Indices of actions, `(m,)`.
     """
-    if rule not in RULES:
-        validation.one_of("rule", rule, RULES)
+    if type(rule) is not str or rule not in RULES:
+        rule = validation.one_of("rule", rule, RULES)
     if not (isinstance(pheromone, Pheromone) and hasattr(rng, "random")):
         raise TypeError(
             "choose_actions needs a Pheromone and a numpy.random.Generator, got "

@@ -66,6 +66,8 @@ def choose_actions(
             "choose_actions needs a Pheromone and a numpy.random.Generator, got "
             f"{type(pheromone).__name__} and {type(rng).__name__}."
         )
+    if type(epsilon) is not float:
+        epsilon = validation.number("epsilon", epsilon, at_least=0, at_most=1)
     if rule == "epsilon_greedy":
         return epsilon_greedy_actions(
             pheromone.levels,

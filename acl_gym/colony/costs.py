@@ -93,7 +93,8 @@ class Quadratic(Cost):
             _weight("input_weight", self.input_weight, inputs.shape[1])
         if self.periods is not None:
             periods: Any = self.periods
-            if np.ndim(periods) != 1 or len(self.periods) != size:
+            listed = isinstance(periods, (tuple, list)) or np.shape(periods) == (size,)
+            if not listed or len(periods) != size:
                 raise ValueError(
                     f"periods must hold one entry for each of the {size} variables, got "
                     f"{validation.shown(self.periods)}."

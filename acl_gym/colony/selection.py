@@ -60,13 +60,15 @@ def choose_actions(
     Returns:
         Indices of actions, `(m,)`.
     """
-    if rule not in RULES:
-        validation.one_of("rule", rule, RULES)
+    if type(rule) is not str or rule not in RULES:
+        rule = validation.one_of("rule", rule, RULES)
     if not (isinstance(pheromone, Pheromone) and hasattr(rng, "random")):
         raise TypeError(
             "choose_actions needs a Pheromone and a numpy.random.Generator, got "
             f"{type(pheromone).__name__} and {type(rng).__name__}."
         )
+    if type(epsilon) is not float:
+        epsilon = validation.number("epsilon", epsilon, at_least=0, at_most=1)
     if rule == "epsilon_greedy":
         return epsilon_greedy_actions(
             pheromone.levels,

@@ -247,7 +247,12 @@ def _stacked(mask: Any, shape: tuple[int, int]) -> Any:
         every = np.ones(shape[1], dtype=np.bool_)
         mask = [every if row is None else row for row in mask]
     array = validation.as_array(mask)
-    return mask if array is None else array
+    if array is None:
+        raise ValueError(
+            f"infos['action_mask'] must have shape {shape}, one row per slot, got "
+            f"{validation.shown(mask)}; check the environment's infos."
+        )
+    return array
 
 
 def _checked_mask(mask: Any, shape: tuple[int, int]) -> BoolArray:

@@ -141,6 +141,10 @@ def evaluate_policy_cost(
     base = env.unwrapped
     if states is not None:
         states = validation.real_array("states", states)
+        if states.ndim == 0:
+            raise ValueError(
+                f"states must hold one row for each episode, got {states}; pass [state]."
+            )
     if isinstance(base, ControlVectorEnv):
         if states is None:
             states = base.system.evaluation_states()

@@ -138,7 +138,9 @@ class Grid(FixedPartition):
         counts: list[Any] = []
         if isinstance(cells, Integral):
             counts = [cells] * low.size
-        elif isinstance(cells, Iterable):
+        elif isinstance(cells, Iterable) and not (
+            isinstance(cells, np.ndarray) and cells.ndim == 0
+        ):
             counts = list(cells)
         if len(counts) != low.size:
             raise ValueError(
@@ -173,7 +175,7 @@ class Grid(FixedPartition):
         if not isinstance(space, spaces.Box) or space.shape != (dimensions,):
             raise ValueError(
                 f"{self!r} takes observations from a Box of shape ({dimensions},), "
-                f"got {space}; build the partition from env.single_observation_space, "
+                f"got {validation.shown(space)}; build the partition from env.single_observation_space, "
                 "or let automatic_partition(env) do it."
             )
 

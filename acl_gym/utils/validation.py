@@ -157,6 +157,9 @@ def real_array(
         ValueError: `values` are not such an array.
     """
     array = as_array(values)
+    if array is not None:
+        # For the copy and for looking at each entry; a view may stand for far more.
+        check_memory(f"the numbers of {name}", 9 * array.size, "pass fewer")
     valid = (
         array is not None
         and array.dtype.kind in ("iufb" if boolean else "iuf")

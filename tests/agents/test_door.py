@@ -243,6 +243,12 @@ def test_an_environment_that_loses_slots_is_refused() -> None:
         env.unwrapped.num_envs = 2
 
 
+@pytest.mark.parametrize("value", [None, 1, "yes", np.ones(2)])
+def test_the_progress_bar_is_a_switch(value: Any) -> None:
+    with pytest.raises(TypeError, match=r"progress_bar must be True or False"):
+        colony().learn(trials=1, progress_bar=value)
+
+
 class _Lost(GridSearch1D):
     """A system of a user's own that starts where there is no state."""
 

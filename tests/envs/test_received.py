@@ -87,6 +87,10 @@ def test_masks_hold_0_and_1(mask: Any) -> None:
         (np.array([[0.0, -np.inf], [0.0, 0.0]]), r"got \[0.0, -inf\] in slot 0"),
         (np.ones((2, 3)), r"must have shape \(2, 2\)"),
         (np.ones(2), r"must have shape \(2, 2\)"),
+        (
+            np.ma.masked_array(np.eye(2, dtype=bool), np.eye(2, dtype=bool)),
+            r"must have shape \(2, 2\).* got masked_array",
+        ),
         ("text", r"must have shape \(2, 2\)"),
         (np.ones((2, 2)) * 1j, r"bools or 0 and 1, got complex128"),
     ],

@@ -111,6 +111,11 @@ def test_more_memory_than_there_is_is_refused() -> None:
         validation.check_memory("all", 10**19, "use fewer")
 
 
+def test_a_view_that_stands_for_too_many_numbers_is_refused() -> None:
+    with pytest.raises(ValueError, match=r"^the numbers of x must fit into"):
+        validation.real_array("x", np.broadcast_to(1.0, (10**6, 10**6)))
+
+
 @pytest.mark.parametrize(
     "values", [np.ma.masked_array([1.0, 2.0], [True, False]), [[1], [1, 2]], object()]
 )

@@ -1,4 +1,10 @@
-"""Drawing policies, what they do on the systems of this package, and how they were learned."""
+"""Pictures of policies, of what they do, and of how they were learned.
+
+`plot_policy`, `plot_pheromone`, `plot_learning_curve`, `plot_trajectory` and `animate`
+take any agent of this package. They draw on axes of the caller or make a figure of their
+own, leave pyplot and the global settings of Matplotlib alone, and never open a window.
+The functions named `draw_...` make the figures of the experiments.
+"""
 
 from __future__ import annotations
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from acl_gym.export.c_text import Number, integer_type, sanitised, table
 from acl_gym.export.source import Source
-from acl_gym.utils import files
+from acl_gym.utils import files, validation
 
 MOST_NUMBERS = 4_000_000
 """The most numbers in the tables of a header; compilers take minutes for more."""
@@ -45,7 +45,7 @@ def write_c_header(
     path: str | Path, source: Source, name: str = "policy", precision: str = "float"
 ) -> Path:
     """Write a header; see `PartitionPolicy.to_c`."""
-    target = Path(path)
+    target = validation.path("path", path)
     if not target.suffix:
         target = target.with_name(f"{target.name}.h")
     files.checked_target(target)

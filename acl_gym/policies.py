@@ -217,7 +217,9 @@ class PartitionPolicy(Fixed, ABC):
         nothing, needs no library but <math.h> (only for circular variables), and keeps
         its tables in read-only memory: a byte for each cell of a crisp or discrete
         policy, n_actions numbers and a byte or two for each cell of a fuzzy one. The
-        comment at the head of the file states the units, the memory and how to call it.
+        comment at the head of the file states the units, the memory, the work of a call
+        and how to call it. On a desktop processor a call takes about 0.1 us, less than a
+        hundredth of `predict` for one observation (`benchmarks/policy_export.py`).
         Where it is known, the table `name_inputs` holds the input values that each
         action stands for.
 

@@ -16,6 +16,7 @@ from acl_gym.callbacks.base import Callbacks
 from acl_gym.colony.greedy import greedy_actions
 from acl_gym.envs.control.environments import ControlVectorEnv
 from acl_gym.envs.control.lookup import signals_of
+from acl_gym.envs.control.signals import Signals
 from acl_gym.evaluation.rollout import Rollout
 from acl_gym.export import Source
 from acl_gym.partitions import Partition, checked_partition, locate_checked
@@ -98,6 +99,7 @@ class TabularAgent(SavedAgent):
             max_steps = time_limit(env) or DEFAULT_MAX_STEPS
         self._max_steps = validation.integer("max_steps", max_steps, at_least=1)
         self.env: VectorEnv[Any, Any, Any] | None = None
+        self._signals: Signals | None = None
         self._rollout: Rollout | None = None
         self.first_action = 0
         if n_actions is not None:
@@ -262,6 +264,7 @@ class TabularAgent(SavedAgent):
         self._n_actions = rollout.n_actions
         self.first_action = rollout.first_action
         self.env = rollout.env
+        self._signals = signals_of(rollout.env)
         self._rollout = rollout
         slots, k = rollout.num_envs, self.partition.cells_per_state
         validation.check_memory(
@@ -302,7 +305,7 @@ class TabularAgent(SavedAgent):
             self._table,
             self._ranks,
             self.first_action,
-            None if self.env is None else signals_of(self.env),
+            self._signals,
         )
 
     def _source(self, inputs: ArrayLike | None = None) -> Source:

@@ -14,7 +14,7 @@ import numpy as np
 
 from acl_gym.export.c_text import Number, integer_type, sanitised, table
 from acl_gym.export.source import Source
-from acl_gym.utils import files
+from acl_gym.utils import files, validation
 
 MOST_NUMBERS = 4_000_000
 """The most numbers in the tables of a header; compilers take minutes for more."""
@@ -45,7 +45,7 @@ def write_c_header(
     path: str | Path, source: Source, name: str = "policy", precision: str = "float"
 ) -> Path:
     """Write a header; see `PartitionPolicy.to_c`."""
-    target = Path(path)
+    target = validation.path("path", path)
     if not target.suffix:
         target = target.with_name(f"{target.name}.h")
     files.checked_target(target)
@@ -107,6 +107,7 @@ def c_header(source: Source, name: str, precision: str, file_name: str) -> str:
         tables=tables.texts,
         bytes=f"{tables.bytes:,}",
         stack=_stack(source, number),
+        work=_work(source),
         file_name=sanitised(file_name),
         version=version("acl-gym"),
         **_words(source, number),
@@ -259,6 +260,22 @@ def _stack(source: Source, number: Number) -> int:
     if source.kind == "crisp":
         return locate + number.bytes + 16
     return locate + d * (8 + number.bytes) + (n_actions + 2) * number.bytes + 32
+
+
+def _work(source: Source) -> str:
+    """How many operations of real numbers a call takes at most."""
+    d = len(source.cells)
+    if source.kind == "discrete":
+        return f"{2 * d} comparisons of integers"
+    searches = sum((line.size - 1).bit_length() + 4 for line in source.lines)
+    divisions = d + sum(period > 0 for period in source.periods)
+    multiplications = sum(period > 0 for period in source.periods)
+    if source.kind == "fuzzy":
+        multiplications += 2**d * (d + source.n_actions)
+    return (
+        f"at most {searches} comparisons of real numbers to locate x, {divisions} "
+        f"divisions,\n * {multiplications:,} multiplications"
+    )
 
 
 def _words(source: Source, number: Number) -> dict[str, Any]:

@@ -238,6 +238,10 @@ def test_an_agent_without_an_environment_names_no_inputs(
 def test_the_stated_memory_is_that_of_the_tables(tmp_path: Path) -> None:
     policy = random_policy(Fuzzy, (5, 6), (True, False), 3, 0)
     text = policy.to_c(tmp_path / "p.h").read_text()
+    # A circle of 5 arcs, a line of 5 intervals: 3 halvings each, and 4 tests of bounds;
+    # 4 corners with 2 shares and 3 actions each, and a period.
+    assert "at most 14 comparisons of real numbers to locate x, 3 divisions" in text
+    assert " 21 multiplications" in text
     stated = re.search(r"([\d,]+) bytes of constant tables", text)
     assert stated is not None
     sizes = {"float": 4, "uint8_t": 1, "int32_t": 4}

@@ -60,22 +60,23 @@ def plant(
     evaluation from fixed states, perturbations, fuzzy Q-iteration.
 
     >>> import numpy as np, acl_gym
-    >>> def pendulum(x, u):  # angle from upright, rad; angular velocity, rad/s
-    ...     return [x[1], 9.81 * np.sin(x[0]) - 0.1 * x[1] + u[0]]
+    >>> def rod(x, u):  # angle from upright, rad; angular velocity, rad/s
+    ...     return [x[1], 9.81 * np.sin(x[0]) - 0.5 * x[1] + u[0]]
     >>> env = acl_gym.plant(
-    ...     pendulum,
+    ...     rod,
     ...     low=[-np.pi, -8],
     ...     high=[np.pi, 8],
     ...     circular=[0],
-    ...     inputs=[-5, 0, 5],
-    ...     sampling_time=0.05,
+    ...     inputs=[-6, 0, 6],
+    ...     sampling_time=0.1,
     ...     goal=[0, 0],
+    ...     tolerance=[0.1, 0.3],
     ...     cost=([1, 0.1], 0.01),
-    ...     max_episode_steps=200,
-    ...     num_envs=100,
+    ...     max_episode_steps=100,
+    ...     num_envs=200,
     ... )
     >>> env.reset(seed=0)[0].shape
-    (100, 2)
+    (200, 2)
 
     Args:
         dynamics: x' = f(x, u), one of

@@ -1,0 +1,39 @@
+"""The short benchmarks run, and their JSON holds what their tables show."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+FOLDER = Path(__file__).resolve().parent.parent / "benchmarks"
+
+pytestmark = pytest.mark.slow
+
+
+def output_of(script: str, *arguments: str) -> Any:
+    command = [sys.executable, str(FOLDER / script), "--json", "--repetitions", "1"]
+    done = subprocess.run(
+        [*command, *arguments], capture_output=True, text=True, check=True
+    )
+    return json.loads(done.stdout)
+
+
+def test_plant() -> None:
+    cases = output_of("plant.py", "--slots", "3")["cases"]
+    assert [case["slots"] for case in cases] == [1, 3, 3, 3]
+    assert cases[0]["ratio_to_reference"] == 1.0
+    assert all(case["steps_per_second"] > 0 for case in cases)
+
+
+@pytest.mark.skipif(shutil.which("gcc") is None, reason="needs gcc")
+def test_policy_export() -> None:
+    rows = output_of("policy_export.py")["rows"]
+    assert len(rows) == 4 * 4
+    # A call of C takes a hundredth of `predict`, which enters NumPy and Numba.
+    assert all(row["ratio_to_predict"] < 0.5 for row in rows if "table_bytes" in row)

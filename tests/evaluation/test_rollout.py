@@ -297,7 +297,9 @@ def test_what_is_no_vector_environment_is_refused_with_the_remedy() -> None:
 
 def test_continuous_actions_are_refused() -> None:
     env = gym.make_vec("Pendulum-v1", num_envs=2)
-    with pytest.raises(ValueError, match=r"Discrete actions, got Box\(.*DiscretizeAction"):
+    with pytest.raises(
+        ValueError, match=r"Discrete actions, got Box\(.*DiscretizeAction"
+    ):
         Rollout(env, 5)
     env.close()
 

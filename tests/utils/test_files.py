@@ -162,6 +162,8 @@ def test_files_of_dead_processes_go(dead: int, tmp_path: Path) -> None:
         ".mine.123.tmp",
         "acl-00000000-1-0123456789ab.tmp",
     ],
+    # Workers that share tests have numbers of their own.
+    ids=["own", "parent", "elsewhere", "notes", "hidden", "visible"],
 )
 def test_other_files_stay(name: str, tmp_path: Path) -> None:
     (tmp_path / name).write_text("kept")

@@ -68,7 +68,8 @@ def play(
     Args:
         agent: whose greedy policy is followed.
         environment: where.
-        episodes: how many, from random initial states.
+        episodes: how many; the first starts from a telling state in our systems, such
+            as a pendulum at rest, the others from random ones.
         max_steps: the most steps of an episode.
         seed: of the first episode; the others follow it.
         video: the file; None shows a window.
@@ -108,7 +109,8 @@ def _frames(
 ) -> Iterator[Any]:
     """What the environment draws, step by step; None in a window."""
     for episode in range(episodes):
-        observation, info = env.reset(seed=seed + episode)
+        options = _telling_start(env) if episode == 0 else None
+        observation, info = env.reset(seed=seed + episode, options=options)
         yield env.render() if env.render_mode != "human" else None
         for _ in range(max_steps):
             mask = info.get("action_mask")
@@ -120,6 +122,17 @@ def _frames(
             yield env.render() if env.render_mode != "human" else None
             if terminated or truncated:
                 break
+
+
+def _telling_start(env: Any) -> dict[str, Any] | None:
+    """Where the first episode begins in our systems: a pendulum hangs at rest."""
+    from acl_gym.envs.control.single import ControlEnv
+
+    if not isinstance(env.unwrapped, ControlEnv):
+        return None
+    from acl_gym.plotting.trajectories import start_of
+
+    return {"state": start_of(env.unwrapped.system)}
 
 
 def _write(path: Path, frames: Iterator[Any], fps: float) -> None:

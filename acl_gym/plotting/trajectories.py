@@ -10,7 +10,7 @@ import numpy as np
 from gymnasium.vector import VectorEnv
 from matplotlib.axes import Axes
 
-from acl_gym.envs.control.environments import ControlVectorEnv
+from acl_gym.envs.control.system import ControlSystem
 from acl_gym.envs.navigation.system import Navigation
 from acl_gym.envs.pendulum.system import Pendulum
 from acl_gym.evaluation import Trajectory, record_trajectory
@@ -119,7 +119,11 @@ def run(subject: Subject, start: Any, max_steps: int | None, seed: Any) -> Traje
         )
     base = subject.vector_env()
     if base is not None:
-        begin = start_of(base) if start is None else np.asarray(start, dtype=np.float64)
+        begin = (
+            start_of(base.system)
+            if start is None
+            else np.asarray(start, dtype=np.float64)
+        )
         return record_trajectory(
             subject.policy,
             base.with_slots(1),
@@ -175,9 +179,8 @@ def _run_single(
     return Trajectory(flat, np.array(taken), np.array(costs), bool(terminated))
 
 
-def start_of(env: ControlVectorEnv) -> FloatArray:
+def start_of(system: ControlSystem) -> FloatArray:
     """A telling initial state: hanging at rest, or in a corner at rest."""
-    system = env.system
     if isinstance(system, Pendulum):
         return np.zeros(2)
     if isinstance(system, Navigation):

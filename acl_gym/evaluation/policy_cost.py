@@ -124,7 +124,7 @@ def evaluate_policy_cost(
             too if it is less, one that was only registered with its id does not.
         seed: of the environment's random numbers, >= 0; None continues its stream (a
             copy of it, where a copy is run).
-        cost: the cost of an episode, see `acl_gym.colony.costs`; None takes the sum
+        cost: the cost of an episode, see `acl_gym.costs`; None takes the sum
             of its stage costs.
 
     Returns:

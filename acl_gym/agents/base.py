@@ -274,6 +274,8 @@ class TabularAgent(SavedAgent):
         )
         self._index: CellArray = np.zeros((slots, k), dtype=np.int32)
         self._degree: FloatArray = np.zeros((slots, k))
+        # The rows of the walking ants, made anew only when their number changes.
+        self._located, self._rows = slots, (self._index, self._degree)
 
     def set_random_seed(self, seed: int | None) -> None:
         """Restart the agent's random numbers.
@@ -326,10 +328,12 @@ class TabularAgent(SavedAgent):
         self, observation: NDArray[Any], ants: IntArray
     ) -> tuple[CellArray, FloatArray]:
         """`(index, degree)` of the walking ants, valid until the next call."""
-        index, degree = self._index[: ants.size], self._degree[: ants.size]
-        rows = len(self._table)
-        locate_checked(self.partition, observation, ants, index, degree, rows)
-        return index, degree
+        if ants.size != self._located:
+            self._located = ants.size
+            self._rows = self._index[: ants.size], self._degree[: ants.size]
+        rows = self._rows
+        locate_checked(self.partition, observation, ants, *rows, self._n_cells)
+        return rows
 
     def _next_seed(self) -> int:
         """The seed of the next trial: environments follow the agent's own stream."""

@@ -85,7 +85,9 @@ def check_choice(
     Raises:
         ValueError: a shape or type is wrong, or a cell is not one of the table.
     """
-    if not (isinstance(index, np.ndarray) and isinstance(degree, np.ndarray)):
+    if (type(index) is not np.ndarray or type(degree) is not np.ndarray) and not (
+        isinstance(index, np.ndarray) and isinstance(degree, np.ndarray)
+    ):
         raise TypeError(
             "index and degree must be arrays, got "
             f"{type(index).__name__} and {type(degree).__name__}."

@@ -163,7 +163,7 @@ class Pheromone(Fixed):
         Raises:
             ValueError: a cell is not one of the table.
         """
-        good = _repair(
+        good = repair(
             self.levels,
             self._alpha,
             self.weights,
@@ -185,7 +185,7 @@ def cells_out_of_range(index: CellArray, n_cells: int) -> ValueError:
 
 
 @njit(error_model="numpy")
-def _repair(
+def repair(
     levels: FloatArray,
     alpha: float,
     weights: FloatArray | None,

@@ -17,13 +17,15 @@ from numpy.typing import NDArray
 
 from acl_gym.colony.episodes import Episodes
 from acl_gym.envs import received
-from acl_gym.envs.control.environments import ControlVectorEnv
+from acl_gym.envs.control.environments import ControlVectorEnv, is_native
 from acl_gym.envs.wrappers.partial_reset import reset_slots
 from acl_gym.envs.wrappers.waiting import WaitingVectorEnv
 from acl_gym.utils import validation
 from acl_gym.utils.compiling import njit
 from acl_gym.utils.typing import BoolArray, FloatArray, IntArray
 from acl_gym.utils.vector_envs import require_vector_env
+
+_INT = np.dtype(np.int64)
 
 
 class Step(NamedTuple):
@@ -125,6 +127,8 @@ class Rollout:
         self._ants = self._all
         self._reported_success: BoolArray | None = None
         self._stepping = False
+        # The environment, in trials in which what it returns need not be checked.
+        self._native: ControlVectorEnv | None = None
 
     @property
     def num_envs(self) -> int:
@@ -165,6 +169,7 @@ class Rollout:
                 should.
         """
         self._check_idle("start")
+        self._native = self.env if is_native(self.env) else None
         seed, n = validation.seed(seed), self.num_envs
         options: dict[str, Any] = {}
         if self._asks_to_wait:
@@ -203,9 +208,10 @@ class Rollout:
             ValueError: the actions are not one for each of `ants`; a reward is NaN or
                 infinite; or the environment does not return what it should.
         """
-        self._check_idle("step")
-        ants = self.ants
-        m, n = ants.size, self.num_envs
+        if self._stepping:
+            self._check_idle("step")
+        ants, native = self._ants, self._native
+        m = ants.size
         if type(actions) is not np.ndarray:
             actions = np.asarray(actions)
         if actions.shape != ants.shape or actions.dtype.kind not in "iu":
@@ -213,8 +219,8 @@ class Rollout:
                 f"actions must be integers of shape ({m},), one for each ant that "
                 f"walks, got {actions.dtype} in shape {actions.shape}."
             )
-        if actions.dtype != np.int64:
-            actions = actions.astype(np.int64)
+        if actions.dtype is not _INT:
+            actions = actions.astype(np.int64, copy=False)
         if self._stale is not None:
             reset_slots(self.env, self._stale)
             self._stale = None
@@ -227,18 +233,18 @@ class Rollout:
         # A copy, because an environment or a wrapper may keep its actions.
         self._stepping = True
         try:
-            given = self.env.step(self._actions.copy())
+            if native is None:
+                given = self.env.step(self._actions.copy())
+            else:
+                given = native._step(self._actions.copy())
         finally:
             self._stepping = False
-        observation, reward, terminated, truncated, infos = received.parts(
-            "step", given, 5
-        )
-        observation = received.observations(observation, n)
-        reward = received.rewards(reward, n)
-        terminated = received.flags("terminated", terminated, n)
-        truncated = received.flags("truncated", truncated, n)
-        infos = received.infos(infos, n)
-        self._read_mask(infos)
+        if native is None:
+            given = self._checked(given)
+            self._read_mask(given[4])
+        else:
+            self._mask = given[4].get("action_mask")
+        observation, reward, terminated, truncated, infos = given
         self.steps += 1
 
         cost, left = np.empty(m), np.empty(m, np.int64)
@@ -360,6 +366,20 @@ class Rollout:
                 "env.step return first."
             )
 
+    def _checked(self, given: Any) -> tuple[Any, ...]:
+        """What `env.step` of an environment of others returned, part by part."""
+        n = self._n_slots
+        observation, reward, terminated, truncated, infos = received.parts(
+            "step", given, 5
+        )
+        return (
+            received.observations(observation, n),
+            received.rewards(reward, n),
+            received.flags("terminated", terminated, n),
+            received.flags("truncated", truncated, n),
+            received.infos(infos, n),
+        )
+
     def _read_mask(self, infos: Any) -> None:
         """Take the action masks from checked infos."""
         self._mask = received.action_mask(infos, self.num_envs, self.n_actions)
@@ -437,7 +457,7 @@ def _require_array(observation: Any) -> None:
 
 def _fixed(array: NDArray[Any]) -> NDArray[Any]:
     """The same new array, which from now on cannot be written to."""
-    array.flags.writeable = False
+    array.setflags(write=False)
     return array
 
 

@@ -221,7 +221,7 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
         truncated = np.zeros(n_slots, np.bool_)
         n_finished = 0
         slots = self._all_slots if walking is None else walking
-        uniforms = draw_uniforms(system, self.np_random, slots.size)
+        uniforms = draw_uniforms(system, self, slots.size)
         if walking is None:
             system.advance(state, actions, uniforms, rewards, terminated)
             n_finished = count_step(self._limit, self._steps, terminated, truncated)
@@ -350,8 +350,8 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
         """Hold what a system of a user's own has given to what kernels rely on."""
         good = (
             isinstance(states, np.ndarray)
-            and states.ndim == 2
             and states.dtype == np.float64
+            and states.ndim == 2
             and states.shape[1] == count
             and (self._state is None or len(states) == len(self._state))
         )
@@ -361,10 +361,9 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
                 f"give float64 states of a fixed size for {count} slots, got "
                 f"{validation.shown(states)}."
             )
-        if not type(self.system).__module__.startswith(_PACKAGE):
-            self.system.checked_states(
-                states.T
-            )  # kernels of this package address by it
+        if not type(self._system).__module__.startswith(_PACKAGE):
+            # Kernels of this package address by them.
+            self._system.checked_states(states.T)
 
     def _infos(self) -> dict[str, Any]:
         mask = self.system.action_mask(self._states)

@@ -33,11 +33,21 @@ def epsilon_greedy_actions(
 
     See `choose_actions`.
     """
-    check_choice(index, degree, table, allowed)
+    check_choice(index, degree, table, allowed, cells=False)
     draws = drawn_numbers(rng, len(index))
-    actions = np.empty(index.shape[0], dtype=np.int64)
-    any_action = ALL if allowed is None else allowed
-    _epsilon_greedy(table, weights, index, degree, draws, epsilon, any_action, actions)
+    actions = np.empty(len(index), np.int64)
+    good = _epsilon_greedy(
+        table,
+        weights,
+        index,
+        degree,
+        draws,
+        epsilon,
+        ALL if allowed is None else allowed,
+        actions,
+    )
+    if not good:
+        raise cells_out_of_range(index, len(table))
     return actions
 
 
@@ -111,12 +121,15 @@ def check_choice(
                 f"allowed must be a bool array of shape {shape}, got "
                 f"{validation.shown(allowed)}."
             )
-        cells = True
     if cells and not _all_below(index, len(table)):
-        raise ValueError(
-            f"index must hold cells in 0..{len(table) - 1}, got {index.min()} to "
-            f"{index.max()}."
-        )
+        raise cells_out_of_range(index, len(table))
+
+
+def cells_out_of_range(index: CellArray, n_cells: int) -> ValueError:
+    """The error for cells that are not rows of the table."""
+    return ValueError(
+        f"index must hold cells in 0..{n_cells - 1}, got {index.min()} to {index.max()}."
+    )
 
 
 @njit
@@ -307,7 +320,10 @@ def _epsilon_greedy(
     epsilon: float,
     allowed: BoolArray,
     actions: IntArray,
-) -> None:
+) -> bool:
+    """Choose all actions; return False where a cell is not one of the table."""
+    if not _all_below(index, levels.shape[0]):
+        return False
     for j in range(actions.size):
         if draws[0, j] < epsilon:
             actions[j] = any_action(draws[1, j], j, levels.shape[1], allowed)
@@ -315,6 +331,7 @@ def _epsilon_greedy(
             actions[j] = best_action(
                 levels, weights, index, degree, draws[1, j], allowed, j
             )
+    return True
 
 
 @njit

@@ -13,11 +13,12 @@ from acl_gym.colony.greedy import (
     ALL,
     any_action,
     best_action,
+    cells_out_of_range,
     check_choice,
     drawn_numbers,
     epsilon_greedy_actions,
 )
-from acl_gym.colony.pheromone import Pheromone, cells_out_of_range, repair
+from acl_gym.colony.pheromone import Pheromone, repair
 from acl_gym.partitions.kernels import written_out
 from acl_gym.utils import threads, validation
 from acl_gym.utils.compiling import njit
@@ -80,8 +81,8 @@ def choose_actions(
             pheromone.greedy_weights,
         )
     levels = pheromone.levels
-    # `repair` looks at the cells.
-    check_choice(index, degree, levels, allowed, cells=False)
+    # Where every action is allowed, `repair` looks at the cells.
+    check_choice(index, degree, levels, allowed, cells=allowed is not None)
     count, k = index.shape
     draws = drawn_numbers(rng, count)
     actions = np.empty(count, np.int64)

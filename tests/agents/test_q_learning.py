@@ -211,7 +211,7 @@ def test_bad_parameters(name: str, value: Any, error: type[Exception]) -> None:
 
 
 def test_bad_environments() -> None:
-    with pytest.raises(TypeError, match="SyncVectorEnv"):
+    with pytest.raises(TypeError, match="WaitingVectorEnv"):
         QLearning(Chain(), ROW)  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="Discrete"):
         QLearning(gym.make_vec("Pendulum-v1", num_envs=2), ROW)

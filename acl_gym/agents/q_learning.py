@@ -154,12 +154,12 @@ class QLearning(TabularAgent):
                 observation = rollout.start(seed=self._next_seed())
                 index, degree = locate_all(self.partition, observation, self._n_cells)
                 allowed = rollout.allowed()
-                while (ants := rollout._ants).size:
+                while rollout._ants.size:
                     actions = epsilon_greedy_actions(
                         self._table, index, degree, self.epsilon, self.rng, allowed
                     )
-                    step = rollout.step(actions)
-                    next_index, next_degree = self._locate(step.observation, ants)
+                    step = rollout._step(actions)
+                    next_index, next_degree = self._locate(step.observation, step.ants)
                     next_allowed = rollout.allowed()
                     transition = (
                         self._table,
@@ -190,7 +190,7 @@ class QLearning(TabularAgent):
                             self.discount * self.trace_decay,
                             self._kind == "accumulating",
                             TRACE_CUTOFF,
-                            ants,
+                            step.ants,
                             *traces.with_room(index.shape[1]),
                         )
                     allowed, stays = next_allowed, ~step.finished

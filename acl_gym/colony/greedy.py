@@ -5,6 +5,8 @@ For tables of any kind: levels of pheromone, action values, costs to go.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from acl_gym.utils import validation
@@ -134,11 +136,12 @@ def cells_out_of_range(index: CellArray, n_cells: int) -> ValueError:
 
 @njit
 def _all_below(index: CellArray, n_cells: int) -> bool:
-    """Whether all cells are in 0..n_cells - 1; vectorised."""
-    good = True
+    """Whether all cells are in 0..n_cells - 1."""
+    good: Any = True
     for j in range(index.shape[0]):
         for c in range(index.shape[1]):
-            good &= (index[j, c] >= 0) & (index[j, c] < n_cells)
+            # Unsigned, so that negative ones become huge.
+            good &= np.uint32(index[j, c]) < np.uint32(n_cells)
     return good
 
 

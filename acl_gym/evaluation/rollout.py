@@ -214,10 +214,19 @@ class Rollout:
                 infinite; or the environment does not return what it should.
         """
         ants = self.ants
+        return self._step(actions)._replace(ants=ants)
+
+    def _step(self, actions: IntArray) -> Step:
+        """`step` for kernels: with `_ants`, which are not to be changed."""
+        ants = self._ants
         m = ants.size
-        cost, ended = np.empty(m), (np.empty(m, np.bool_), np.empty(m, np.bool_))
-        observation = self._take(actions, cost, *ended)
-        return Step(ants, observation, cost, *ended)
+        cost, reached, stopped = (
+            np.empty(m),
+            np.empty(m, np.bool_),
+            np.empty(m, np.bool_),
+        )
+        observation = self._take(actions, cost, reached, stopped)
+        return Step(ants, observation, cost, reached, stopped)
 
     def move(self, actions: IntArray) -> Any:
         """Do what `step` does, but return only the observations, which is faster."""

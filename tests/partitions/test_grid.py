@@ -219,7 +219,10 @@ def test_other_slots_need_not_be_finite() -> None:
     partition = Fuzzy(CENTRES, PERIODS)
     states = some_states(3, 2)
     states[1] = np.nan
-    index, degree = np.zeros((2, partition.cells_per_state), dtype=np.int32), np.zeros((2, partition.cells_per_state))
+    index, degree = (
+        np.zeros((2, partition.cells_per_state), dtype=np.int32),
+        np.zeros((2, partition.cells_per_state)),
+    )
     partition.locate(states, np.array([0, 2]), index, degree)
     assert np.all(degree.sum(axis=1) > 1.0 - 1e-12)
     with pytest.raises(ValueError, match=r"row 1\b"):

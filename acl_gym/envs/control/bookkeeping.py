@@ -15,6 +15,7 @@ from acl_gym.utils import validation
 from acl_gym.utils.compiling import njit
 from acl_gym.utils.typing import BoolArray, FloatArray, IntArray
 
+
 class Seeded(Protocol):
     """What has random numbers of its own, as environments have."""
 
@@ -91,9 +92,7 @@ def copy_if_below(actions: IntArray, n_actions: int, copied: IntArray) -> bool:
     return good
 
 
-def draw_uniforms(
-    system: ControlSystem, env: Seeded, count: int
-) -> FloatArray | None:
+def draw_uniforms(system: ControlSystem, env: Seeded, count: int) -> FloatArray | None:
     """Draw the random numbers of one step of `count` slots; None if it needs none."""
     draws = system.draws_per_step
     return env.np_random.random((draws, count)) if draws else None

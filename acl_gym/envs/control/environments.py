@@ -366,7 +366,7 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
             self._system.checked_states(states.T)
 
     def _infos(self) -> dict[str, Any]:
-        mask = self.system.action_mask(self._states)
+        mask = self._system.action_mask(self._states)
         if mask is None:
             return {}
         present = np.ones(self.num_envs, dtype=np.bool_)
@@ -402,7 +402,7 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
         )
 
     def _observe(self) -> Observation:
-        return self.system.observe(self._states)
+        return self._system.observe(self._states)
 
     def _checked_states(self, given: Any, slots: IntArray) -> FloatArray:
         current = None if self._state is None else self._state.T

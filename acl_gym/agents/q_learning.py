@@ -15,6 +15,7 @@ from acl_gym.colony.greedy import (
     ALL,
     best_value,
     epsilon_greedy_actions,
+    epsilon_greedy_unchecked,
     mark_greedy,
 )
 from acl_gym.evaluation.rollout import Rollout, Step
@@ -155,7 +156,7 @@ class QLearning(TabularAgent):
                 index, degree = locate_all(self.partition, observation, self._n_cells)
                 allowed = rollout.allowed()
                 while rollout._ants.size:
-                    actions = epsilon_greedy_actions(
+                    actions = epsilon_greedy_unchecked(
                         self._table, index, degree, self.epsilon, self.rng, allowed
                     )
                     step = rollout._step(actions)

@@ -35,21 +35,26 @@ def epsilon_greedy_actions(
 
     See `choose_actions`.
     """
-    check_choice(index, degree, table, allowed, cells=False)
+    check_choice(index, degree, table, allowed)
+    return epsilon_greedy_unchecked(
+        table, index, degree, epsilon, rng, allowed, weights
+    )
+
+
+def epsilon_greedy_unchecked(
+    table: FloatArray,
+    index: CellArray,
+    degree: FloatArray,
+    epsilon: float,
+    rng: np.random.Generator,
+    allowed: BoolArray | None = None,
+    weights: FloatArray | None = None,
+) -> IntArray:
+    """`epsilon_greedy_actions` for cells that `locate_checked` has found for the table."""
     draws = drawn_numbers(rng, len(index))
     actions = np.empty(len(index), np.int64)
-    good = _epsilon_greedy(
-        table,
-        weights,
-        index,
-        degree,
-        draws,
-        epsilon,
-        ALL if allowed is None else allowed,
-        actions,
-    )
-    if not good:
-        raise cells_out_of_range(index, len(table))
+    any_action = ALL if allowed is None else allowed
+    _epsilon_greedy(table, weights, index, degree, draws, epsilon, any_action, actions)
     return actions
 
 
@@ -323,10 +328,7 @@ def _epsilon_greedy(
     epsilon: float,
     allowed: BoolArray,
     actions: IntArray,
-) -> bool:
-    """Choose all actions; return False where a cell is not one of the table."""
-    if not _all_below(index, levels.shape[0]):
-        return False
+) -> None:
     for j in range(actions.size):
         if draws[0, j] < epsilon:
             actions[j] = any_action(draws[1, j], j, levels.shape[1], allowed)
@@ -334,7 +336,6 @@ def _epsilon_greedy(
             actions[j] = best_action(
                 levels, weights, index, degree, draws[1, j], allowed, j
             )
-    return True
 
 
 @njit

@@ -228,8 +228,8 @@ class ACL(TabularAgent):
                 epsilon = self._set_exponents()
                 observation = rollout.start(seed=self._next_seed(), record=record)
                 rule.start_trial(pheromone, self.trials)
-                while rollout.ants.size:  # 7, 17: repeat until t = T or C is empty
-                    ants = rollout.ants
+                while rollout._ants.size:  # 7, 17: repeat until t = T or C is empty
+                    ants = rollout._ants
                     # 8: fuzzify the states
                     index, degree = self._locate(observation, ants)
                     # 9: select actions, by default all on the same pheromone
@@ -238,7 +238,7 @@ class ACL(TabularAgent):
                     # 10: add the pairs to the partial solutions
                     solutions.append(ants, observation, index, actions)
                     # 11, 13-16: apply the actions; who is at the goal leaves C
-                    observation = rollout.step(actions).observation
+                    observation = rollout.move(actions)
                     # 12: local pheromone update, by default (4.12)
                     rule.local_update(
                         pheromone, index, degree, actions, self.local_decay

@@ -272,8 +272,7 @@ class TabularAgent(SavedAgent):
             12 * slots * k,
             "use fewer slots or variables",
         )
-        self._index: CellArray = np.zeros((slots, k), dtype=np.int32)
-        self._degree: FloatArray = np.zeros((slots, k))
+        self._located = _Located(slots, k)
 
     def set_random_seed(self, seed: int | None) -> None:
         """Restart the agent's random numbers.
@@ -326,7 +325,7 @@ class TabularAgent(SavedAgent):
         self, observation: NDArray[Any], ants: IntArray
     ) -> tuple[CellArray, FloatArray]:
         """`(index, degree)` of the walking ants, valid until the next call."""
-        index, degree = self._index[: ants.size], self._degree[: ants.size]
+        index, degree = self._located.rows(ants.size)
         rows = len(self._table)
         locate_checked(self.partition, observation, ants, index, degree, rows)
         return index, degree
@@ -342,6 +341,26 @@ class TabularAgent(SavedAgent):
                 f"table must have shape {self._table.shape}, got {values.shape}."
             )
         return values
+
+
+class _Located:
+    """Memory for the cells and degrees of the walking slots.
+
+    Args:
+        slots: how many slots there are.
+        cells_per_state: k.
+    """
+
+    def __init__(self, slots: int, cells_per_state: int) -> None:
+        self._index: CellArray = np.zeros((slots, cells_per_state), dtype=np.int32)
+        self._degree: FloatArray = np.zeros((slots, cells_per_state))
+        self._rows = self._index, self._degree
+
+    def rows(self, count: int) -> tuple[CellArray, FloatArray]:
+        """The first rows of both; the same views until the count changes."""
+        if len(self._rows[0]) != count:
+            self._rows = self._index[:count], self._degree[:count]
+        return self._rows
 
 
 def time_limit(env: Any) -> int | None:

@@ -15,6 +15,7 @@ from acl_gym.colony.greedy import (
     ALL,
     best_value,
     epsilon_greedy_actions,
+    epsilon_greedy_unchecked,
     mark_greedy,
 )
 from acl_gym.evaluation.rollout import Rollout, Step
@@ -154,11 +155,11 @@ class QLearning(TabularAgent):
                 observation = rollout.start(seed=self._next_seed())
                 index, degree = locate_all(self.partition, observation, self._n_cells)
                 allowed = rollout.allowed()
-                while rollout.ants.size:
-                    actions = epsilon_greedy_actions(
+                while rollout._ants.size:
+                    actions = epsilon_greedy_unchecked(
                         self._table, index, degree, self.epsilon, self.rng, allowed
                     )
-                    step = rollout.step(actions)
+                    step = rollout._step(actions)
                     next_index, next_degree = self._locate(step.observation, step.ants)
                     next_allowed = rollout.allowed()
                     transition = (

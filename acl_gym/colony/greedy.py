@@ -5,6 +5,8 @@ For tables of any kind: levels of pheromone, action values, costs to go.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from acl_gym.utils import validation
@@ -34,8 +36,23 @@ def epsilon_greedy_actions(
     See `choose_actions`.
     """
     check_choice(index, degree, table, allowed)
+    return epsilon_greedy_unchecked(
+        table, index, degree, epsilon, rng, allowed, weights
+    )
+
+
+def epsilon_greedy_unchecked(
+    table: FloatArray,
+    index: CellArray,
+    degree: FloatArray,
+    epsilon: float,
+    rng: np.random.Generator,
+    allowed: BoolArray | None = None,
+    weights: FloatArray | None = None,
+) -> IntArray:
+    """`epsilon_greedy_actions` for cells that `locate_checked` has found for the table."""
     draws = drawn_numbers(rng, len(index))
-    actions = np.empty(index.shape[0], dtype=np.int64)
+    actions = np.empty(len(index), np.int64)
     any_action = ALL if allowed is None else allowed
     _epsilon_greedy(table, weights, index, degree, draws, epsilon, any_action, actions)
     return actions
@@ -85,7 +102,9 @@ def check_choice(
     Raises:
         ValueError: a shape or type is wrong, or a cell is not one of the table.
     """
-    if not (isinstance(index, np.ndarray) and isinstance(degree, np.ndarray)):
+    if (type(index) is not np.ndarray or type(degree) is not np.ndarray) and not (
+        isinstance(index, np.ndarray) and isinstance(degree, np.ndarray)
+    ):
         raise TypeError(
             "index and degree must be arrays, got "
             f"{type(index).__name__} and {type(degree).__name__}."
@@ -109,21 +128,25 @@ def check_choice(
                 f"allowed must be a bool array of shape {shape}, got "
                 f"{validation.shown(allowed)}."
             )
-        cells = True
     if cells and not _all_below(index, len(table)):
-        raise ValueError(
-            f"index must hold cells in 0..{len(table) - 1}, got {index.min()} to "
-            f"{index.max()}."
-        )
+        raise cells_out_of_range(index, len(table))
+
+
+def cells_out_of_range(index: CellArray, n_cells: int) -> ValueError:
+    """The error for cells that are not rows of the table."""
+    return ValueError(
+        f"index must hold cells in 0..{n_cells - 1}, got {index.min()} to {index.max()}."
+    )
 
 
 @njit
 def _all_below(index: CellArray, n_cells: int) -> bool:
-    """Whether all cells are in 0..n_cells - 1; vectorised."""
-    good = True
+    """Whether all cells are in 0..n_cells - 1."""
+    good: Any = True
     for j in range(index.shape[0]):
         for c in range(index.shape[1]):
-            good &= (index[j, c] >= 0) & (index[j, c] < n_cells)
+            # Unsigned, so that negative ones become huge.
+            good &= np.uint32(index[j, c]) < np.uint32(n_cells)
     return good
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from acl_gym.colony.greedy import cells_out_of_range
 from acl_gym.colony.heuristic import checked_heuristic
 from acl_gym.partitions.kernels import written_out
 from acl_gym.utils import validation
@@ -163,7 +164,7 @@ class Pheromone(Fixed):
         Raises:
             ValueError: a cell is not one of the table.
         """
-        good = _repair(
+        good = repair(
             self.levels,
             self._alpha,
             self.weights,
@@ -177,15 +178,8 @@ class Pheromone(Fixed):
             raise cells_out_of_range(index, len(self.levels))
 
 
-def cells_out_of_range(index: CellArray, n_cells: int) -> ValueError:
-    """The error for cells that are not rows of the table."""
-    return ValueError(
-        f"index must hold cells in 0..{n_cells - 1}, got {index.min()} to {index.max()}."
-    )
-
-
 @njit(error_model="numpy")
-def _repair(
+def repair(
     levels: FloatArray,
     alpha: float,
     weights: FloatArray | None,

@@ -13,11 +13,12 @@ from acl_gym.colony.greedy import (
     ALL,
     any_action,
     best_action,
+    cells_out_of_range,
     check_choice,
     drawn_numbers,
     epsilon_greedy_actions,
 )
-from acl_gym.colony.pheromone import Pheromone
+from acl_gym.colony.pheromone import Pheromone, repair
 from acl_gym.partitions.kernels import written_out
 from acl_gym.utils import threads, validation
 from acl_gym.utils.compiling import njit
@@ -79,33 +80,36 @@ def choose_actions(
             allowed,
             pheromone.greedy_weights,
         )
-    # `repair` looks at the cells.
-    check_choice(index, degree, pheromone.levels, allowed, cells=False)
-    draws = drawn_numbers(rng, len(index))
-    actions = np.empty(index.shape[0], dtype=np.int64)
-    columns, corners = written_out(pheromone.n_actions), written_out(index.shape[1])
+    levels = pheromone.levels
+    # Where every action is allowed, `repair` looks at the cells.
+    check_choice(index, degree, levels, allowed, cells=allowed is not None)
+    count, k = index.shape
+    draws = drawn_numbers(rng, count)
+    actions = np.empty(count, np.int64)
     if rule != "max_boltzmann":
         epsilon = 0.0
-
-    if allowed is None:
-        pheromone.repair(index)
     draw = _boltzmann
-    if threads.worth_it(len(index)):
+    if threads.worth_it(count):
         draw = _boltzmann_in_parallel
-    draw(
-        pheromone.levels,
+        if allowed is None:
+            pheromone.repair(index)
+    good = draw(
+        levels,
         pheromone.alpha,
         pheromone.weights,
         pheromone.probabilities,
+        pheromone.stale,
         index,
         degree,
         draws,
         epsilon,
         ALL if allowed is None else allowed,
-        columns,
-        corners,
+        written_out(pheromone.n_actions),
+        written_out(k),
         actions,
     )
+    if not good:
+        raise cells_out_of_range(index, len(levels))
     return actions
 
 
@@ -204,6 +208,7 @@ def _boltzmann(
     alpha: float,
     weights: FloatArray | None,
     probabilities: FloatArray,
+    stale: BoolArray,
     index: CellArray,
     degree: FloatArray,
     draws: FloatArray,
@@ -212,7 +217,15 @@ def _boltzmann(
     columns: tuple[int, ...],
     corners: tuple[int, ...],
     actions: IntArray,
-) -> None:
+) -> bool:
+    """Renew the probabilities that are stale, if needed, and draw all actions.
+
+    Returns False where a cell is not one of the table.
+    """
+    if allowed.size == 0 and not repair(
+        levels, alpha, weights, index, columns, corners, probabilities, stale
+    ):
+        return False
     for j in range(actions.size):
         actions[j] = _draw_action(
             levels,
@@ -228,6 +241,7 @@ def _boltzmann(
             corners,
             j,
         )
+    return True
 
 
 @threads.shared_among_threads
@@ -237,6 +251,7 @@ def _boltzmann_in_parallel(
     alpha: float,
     weights: FloatArray | None,
     probabilities: FloatArray,
+    stale: BoolArray,
     index: CellArray,
     degree: FloatArray,
     draws: FloatArray,
@@ -245,8 +260,8 @@ def _boltzmann_in_parallel(
     columns: tuple[int, ...],
     corners: tuple[int, ...],
     actions: IntArray,
-) -> None:
-    """Do what `_boltzmann` does, its ants shared among threads."""
+) -> bool:
+    """Do what `_boltzmann` does, its ants shared among threads; renew nothing."""
     for j in prange(actions.size):
         actions[j] = _draw_action(
             levels,
@@ -262,6 +277,7 @@ def _boltzmann_in_parallel(
             corners,
             j,
         )
+    return True
 
 
 @njit

@@ -87,7 +87,6 @@ class Solutions(Fixed):
         self.n_ants, self.max_steps = n_ants, max_steps
         self.partition = partition
         self._room_for_steps = min(max_steps, FIRST_STEPS)
-        self._appended = 0  # no ant has made more steps than this
         self._action: ActionArray = np.empty(
             self._size, dtype=np.min_scalar_type(n_actions - 1)
         )
@@ -113,7 +112,6 @@ class Solutions(Fixed):
     def clear(self) -> None:
         """Forget all solutions."""
         self._length[:] = 0
-        self._appended = 0
 
     def append(
         self,
@@ -143,22 +141,26 @@ class Solutions(Fixed):
         if rows is None or rows.dtype != seen.dtype or rows.shape[1] != seen.shape[1]:
             rows = self._rows_for(seen)
             self._state_shape = observation.shape[1:]
-        if self._appended >= self._room_for_steps < self.max_steps:
-            rows = self._grow(rows)
-        self._appended += 1
         by_slot = not self._one_cell
-        good = _append(
-            ants,
-            seen,
-            by_slot,
-            actions,
-            self._n_actions,
-            self.max_steps,
-            rows,
-            self._action,
-            self._length,
-        )
-        if not good:
+        done = 0
+        while True:
+            done = _append(
+                done,
+                ants,
+                seen,
+                by_slot,
+                actions,
+                self._n_actions,
+                self._room_for_steps,
+                rows,
+                self._action,
+                self._length,
+            )
+            if done == ants.size:
+                return
+            if done >= 0 and self._room_for_steps < self.max_steps:
+                rows = self._grow(rows)
+                continue
             raise ValueError(
                 f"each of {ants.size} ants must exist, have made fewer than "
                 f"{self.max_steps} steps, and take an action in "
@@ -291,36 +293,38 @@ def _place(t: int, ant: int, n_ants: int) -> np.uint64:
 
 @njit
 def _append(
+    done: int,
     ants: IntArray,
     seen: NDArray[Any],
     by_slot: bool,
     actions: IntArray,
     n_actions: int,
-    max_steps: int,
+    room: int,
     all_seen: NDArray[Any],
     all_action: ActionArray,
     length: IntArray,
-) -> bool:
+) -> int:
     """Add a step; `seen` has a row for each slot if `by_slot`, else for each ant.
 
-    Returns False where something does not exist; the steps before it are added.
+    Ants before `done` have been added. Returns how many have been added now: fewer than
+    all where an ant has made `room` steps, -1 where something does not exist.
     """
     n_rows = length.size if by_slot else ants.size
     if actions.size != ants.size or seen.shape[0] < n_rows:
-        return False
-    for j in range(ants.size):
+        return -1
+    for j in range(done, ants.size):
         ant = np.uint64(ants[j])  # unsigned, as in `_place`; negative ones become huge
-        if ant >= np.uint64(length.size) or length[ant] >= max_steps:
-            return False
-        if not 0 <= actions[j] < n_actions:
-            return False
+        if ant >= np.uint64(length.size) or not 0 <= actions[j] < n_actions:
+            return -1
+        if length[ant] >= room:
+            return j
         place = _place(length[ant], ants[j], length.size)
         row = ant if by_slot else np.uint64(j)
         for i in range(seen.shape[1]):
             all_seen[place, i] = seen[row, i]
         all_action[place] = actions[j]
         length[ant] += 1
-    return True
+    return ants.size
 
 
 @njit

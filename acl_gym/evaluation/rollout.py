@@ -17,13 +17,15 @@ from numpy.typing import NDArray
 
 from acl_gym.colony.episodes import Episodes
 from acl_gym.envs import received
-from acl_gym.envs.control.environments import ControlVectorEnv
+from acl_gym.envs.control.environments import ControlVectorEnv, is_native
 from acl_gym.envs.wrappers.partial_reset import reset_slots
 from acl_gym.envs.wrappers.waiting import WaitingVectorEnv
 from acl_gym.utils import validation
 from acl_gym.utils.compiling import njit
 from acl_gym.utils.typing import BoolArray, FloatArray, IntArray
 from acl_gym.utils.vector_envs import require_vector_env
+
+_INT = np.dtype(np.int64)
 
 
 class Step(NamedTuple):
@@ -119,12 +121,16 @@ class Rollout:
         self._n_slots = validation.integer("env.num_envs", env.num_envs, at_least=1)
         self._actions = np.full(self._n_slots, space.start, dtype=np.int64)
         self.first_action = int(space.start)
-        self._all = _fixed(np.arange(self._n_slots))
+        self._all = np.arange(self._n_slots)
+        n = self._n_slots
+        self._scratch = np.empty(n), np.empty(n, np.bool_), np.empty(n, np.bool_)
         self._stale: BoolArray | None = None  # slots to reset before the next step
         self._mask: BoolArray | None = None
-        self._ants = self._all
+        self._ants, self._shown_ants = self._all, validation.read_only(self._all)
         self._reported_success: BoolArray | None = None
         self._stepping = False
+        # The environment, in trials in which what it returns need not be checked.
+        self._native: ControlVectorEnv | None = None
 
     @property
     def num_envs(self) -> int:
@@ -134,7 +140,10 @@ class Rollout:
     @property
     def ants(self) -> IntArray:
         """The slots that are still walking, `(m,)`, read-only."""
-        return self._ants
+        # Kernels take `_ants`: the call of one with a read-only array is slower.
+        if self._shown_ants.size != self._ants.size:
+            self._shown_ants = validation.read_only(self._ants)
+        return self._shown_ants
 
     @property
     def action_mask(self) -> BoolArray | None:
@@ -165,6 +174,7 @@ class Rollout:
                 should.
         """
         self._check_idle("start")
+        self._native = self.env if is_native(self.env) else None
         seed, n = validation.seed(seed), self.num_envs
         options: dict[str, Any] = {}
         if self._asks_to_wait:
@@ -176,7 +186,7 @@ class Rollout:
         )
         observation = received.observations(observation, n)
         self._read_mask(received.infos(infos, n))
-        self._ants = self._all
+        self._ants, self._shown_ants = self._all, validation.read_only(self._all)
         self.cost = np.zeros(n)
         self.length = np.zeros(n, dtype=np.int64)
         self.terminated = np.zeros(n, dtype=np.bool_)
@@ -203,9 +213,44 @@ class Rollout:
             ValueError: the actions are not one for each of `ants`; a reward is NaN or
                 infinite; or the environment does not return what it should.
         """
-        self._check_idle("step")
         ants = self.ants
-        m, n = ants.size, self.num_envs
+        return self._step(actions)._replace(ants=ants)
+
+    def _step(self, actions: IntArray) -> Step:
+        """`step` for kernels: with `_ants`, which are not to be changed."""
+        ants = self._ants
+        m = ants.size
+        cost, reached, stopped = (
+            np.empty(m),
+            np.empty(m, np.bool_),
+            np.empty(m, np.bool_),
+        )
+        observation = self._take(actions, cost, reached, stopped)
+        return Step(ants, observation, cost, reached, stopped)
+
+    def move(self, actions: IntArray) -> Any:
+        """Do what `step` does, but return only the observations, which is faster."""
+        return self._take(actions, *self._scratch)
+
+    def _take(
+        self,
+        actions: IntArray,
+        cost: FloatArray,
+        reached: BoolArray,
+        stopped: BoolArray,
+    ) -> Any:
+        """Take the actions of a step; return the observations of all slots.
+
+        Args:
+            actions: see `step`.
+            cost: `(>= m,)`, receives the stage costs of the ants that took the step.
+            reached: `(>= m,)`, receives whether they are in a terminal state.
+            stopped: `(>= m,)`, receives whether their episodes are over.
+        """
+        if self._stepping:
+            self._check_idle("step")
+        ants, native = self._ants, self._native
+        m = ants.size
         if type(actions) is not np.ndarray:
             actions = np.asarray(actions)
         if actions.shape != ants.shape or actions.dtype.kind not in "iu":
@@ -213,8 +258,8 @@ class Rollout:
                 f"actions must be integers of shape ({m},), one for each ant that "
                 f"walks, got {actions.dtype} in shape {actions.shape}."
             )
-        if actions.dtype != np.int64:
-            actions = actions.astype(np.int64)
+        if actions.dtype is not _INT:
+            actions = actions.astype(np.int64, copy=False)
         if self._stale is not None:
             reset_slots(self.env, self._stale)
             self._stale = None
@@ -227,22 +272,21 @@ class Rollout:
         # A copy, because an environment or a wrapper may keep its actions.
         self._stepping = True
         try:
-            given = self.env.step(self._actions.copy())
+            if native is None:
+                given = self.env.step(self._actions.copy())
+            else:
+                given = native._step(self._actions.copy())
         finally:
             self._stepping = False
-        observation, reward, terminated, truncated, infos = received.parts(
-            "step", given, 5
-        )
-        observation = received.observations(observation, n)
-        reward = received.rewards(reward, n)
-        terminated = received.flags("terminated", terminated, n)
-        truncated = received.flags("truncated", truncated, n)
-        infos = received.infos(infos, n)
-        self._read_mask(infos)
+        if native is None:
+            given = self._checked(given)
+            self._read_mask(given[4])
+        else:
+            self._mask = given[4].get("action_mask")
+        observation, reward, terminated, truncated, infos = given
         self.steps += 1
 
-        cost, left = np.empty(m), np.empty(m, np.int64)
-        reached, stopped = np.empty(m, np.bool_), np.empty(m, np.bool_)
+        left = np.empty(m, np.int64)
         n_left, bad = _account(
             ants,
             reward,
@@ -266,15 +310,15 @@ class Rollout:
             done = np.logical_or(terminated, truncated)
             self._stale = done if done.any() else None
         if n_left < m:
-            self._ants = _fixed(left[:n_left])
+            self._ants = left[:n_left]
             if self._mode is AutoresetMode.SAME_STEP and not self._waits:
-                observation = self._last_seen(ants[stopped], observation, infos)
+                observation = self._last_seen(ants[stopped[:m]], observation, infos)
         if self.steps >= self.max_steps:
             self._ants = ants[:0]
-            stopped = np.ones_like(stopped)
+            stopped.fill(True)
         if self._record is not None:
             self._record.append(observation, self._actions - self.first_action, reward)
-        return Step(ants, observation, cost, reached, stopped)
+        return observation
 
     def episodes(self) -> Episodes:
         """The steps of every slot since `start(record=True)`.
@@ -327,11 +371,11 @@ class Rollout:
         Raises:
             ValueError: an ant may take no action at all.
         """
-        if self.action_mask is None:
+        if self._mask is None:
             return None
-        allowed = self.action_mask[self.ants]
+        allowed = self._mask[self._ants]
         if not allowed.any(axis=1).all():
-            slot = self.ants[int(np.argmin(allowed.any(axis=1)))]
+            slot = self._ants[int(np.argmin(allowed.any(axis=1)))]
             raise ValueError(
                 f"every slot must have an allowed action, got none in slot {slot}; "
                 "check the environment's action_mask."
@@ -359,6 +403,20 @@ class Rollout:
                 f"{what} must not be called while the environment makes a step; let "
                 "env.step return first."
             )
+
+    def _checked(self, given: Any) -> tuple[Any, ...]:
+        """What `env.step` of an environment of others returned, part by part."""
+        n = self._n_slots
+        observation, reward, terminated, truncated, infos = received.parts(
+            "step", given, 5
+        )
+        return (
+            received.observations(observation, n),
+            received.rewards(reward, n),
+            received.flags("terminated", terminated, n),
+            received.flags("truncated", truncated, n),
+            received.infos(infos, n),
+        )
 
     def _read_mask(self, infos: Any) -> None:
         """Take the action masks from checked infos."""
@@ -437,7 +495,7 @@ def _require_array(observation: Any) -> None:
 
 def _fixed(array: NDArray[Any]) -> NDArray[Any]:
     """The same new array, which from now on cannot be written to."""
-    array.flags.writeable = False
+    array.setflags(write=False)
     return array
 
 

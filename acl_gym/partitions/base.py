@@ -135,17 +135,17 @@ def locate_checked(
     Args:
         partition: whose `locate` to call.
         states: see `Partition.locate`.
-        slots: see `Partition.locate`.
-        index: `(m, k)`, receives the cells.
-        degree: `(m, k)`, receives the degrees.
+        slots: int64 `(m,)`, an array of this package.
+        index: int32 `(m, k)`, an array of this package, receives the cells.
+        degree: float64 `(m, k)`, an array of this package, receives the degrees.
         n_cells: rows of the table.
 
     Raises:
         ValueError: a cell is not a row of the table, degrees are negative or do not sum
             to 1, or `locate` refuses a state.
     """
-    if type(partition) in _TRUSTED:
-        partition.locate(states, slots, index, degree)
+    if isinstance(partition, FixedPartition) and type(partition) in _TRUSTED:
+        partition._fill(states, slots, index, degree)
         return
     found, shares = np.zeros_like(index), np.zeros_like(degree)
     partition.locate(states, validation.read_only(slots), found, shares)
@@ -273,6 +273,27 @@ def check_memory_of_states(n_cells: int, size: int) -> None:
 
 class FixedPartition(Fixed, Partition):
     """A partition of this package, whose kernels rely on what it was made of."""
+
+    def locate(
+        self,
+        states: NDArray[Any],
+        slots: IntArray,
+        index: CellArray,
+        degree: FloatArray,
+    ) -> None:
+        """See `Partition.locate`."""
+        check_targets(slots, index, degree, self.cells_per_state)
+        self._fill(states, slots, index, degree)
+
+    @abstractmethod
+    def _fill(
+        self,
+        states: NDArray[Any],
+        slots: IntArray,
+        index: CellArray,
+        degree: FloatArray,
+    ) -> None:
+        """`locate` into arrays that are known to be good; the states are checked."""
 
     def __setattr__(self, name: str, value: Any) -> None:
         if name == "locate":

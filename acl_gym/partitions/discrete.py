@@ -14,7 +14,6 @@ from acl_gym.partitions.base import (
     FixedPartition,
     check_memory_of_states,
     check_states,
-    check_targets,
     trusted,
 )
 from acl_gym.partitions.kernels import OUTSIDE, locate_discrete
@@ -116,20 +115,19 @@ class Discrete(FixedPartition):
             f"starts, got {space}{remedy}"
         )
 
-    def locate(
+    def _fill(
         self,
         states: NDArray[Any],
         slots: IntArray,
         index: CellArray,
         degree: FloatArray,
     ) -> None:
-        """See `Partition.locate`; int64 and float64 states are not copied."""
+        """See `FixedPartition`; int64 and float64 states are not copied."""
         shape = self.sizes.shape
         check_states(states)
         if states.ndim == 0 or states.shape[1:] != shape:
             wanted = ", ".join(["n", *map(str, shape)]) + ("" if shape else ",")
             raise ValueError(f"states must have shape ({wanted}), got {states.shape}.")
-        check_targets(slots, index, degree, 1)
         if states.dtype != np.int64 and states.dtype != np.float64:
             states = _as_numbers(states)
         flat = states.reshape(len(states), self._flat_sizes.size)

@@ -16,13 +16,14 @@ from acl_gym.partitions.base import (
     FixedPartition,
     check_memory_of_states,
     check_states,
-    check_targets,
     trusted,
 )
 from acl_gym.partitions.kernels import OUTSIDE, Axes, locate, locate_in_parallel
 from acl_gym.utils import threads, validation
 from acl_gym.utils.boxes import declared_bounds
 from acl_gym.utils.typing import CellArray, FloatArray, IntArray
+
+_FLOAT = np.dtype(np.float64)
 
 
 class Grid(FixedPartition):
@@ -205,22 +206,21 @@ class Grid(FixedPartition):
         axes[axis] = np.union1d(there, new)
         return type(self)(axes, self.periods)
 
-    def locate(
+    def _fill(
         self,
         states: NDArray[Any],
         slots: IntArray,
         index: CellArray,
         degree: FloatArray,
     ) -> None:
-        """See `Partition.locate`."""
         dimensions = len(self.centres)
-        check_states(states)
+        if type(states) is not np.ndarray:
+            check_states(states)
         if states.ndim != 2 or states.shape[1] != dimensions:
             raise ValueError(
                 f"states must have shape (n, {dimensions}), got {states.shape}."
             )
-        check_targets(slots, index, degree, self.cells_per_state)
-        if states.dtype != np.float64:
+        if states.dtype is not _FLOAT:
             states = _as_float64(states)
         seen, bad = states, -1
         if len(self._varied) < dimensions:
@@ -327,6 +327,8 @@ def checked_kind(kind: Any) -> type[Grid]:
 
 
 def _as_float64(states: NDArray[Any]) -> FloatArray:
+    if states.dtype == _FLOAT:
+        return states
     if states.dtype.kind not in "fiu":
         raise ValueError(f"states must be real numbers, got dtype {states.dtype}.")
     return states.astype(np.float64)

@@ -206,7 +206,7 @@ def path(name: str, value: Any) -> Path:
 def read_only(array: NDArray[Any]) -> NDArray[Any]:
     """Return a view of `array` that cannot be written to."""
     view = array.view()
-    view.flags.writeable = False
+    view.setflags(write=False)  # half as slow as through `flags`
     return view
 
 

@@ -146,6 +146,7 @@ def test_the_ends_of_the_unit_interval_choose_the_first_and_last(
             3.0,
             None,
             np.full(levels.shape, 1 / n_actions),
+            np.zeros(len(levels), dtype=np.bool_),
             index,
             degree,
             draws,
@@ -333,7 +334,7 @@ def test_kernels_agree_with_themselves_as_plain_python(
         actions = np.full((3, ants), -1, dtype=np.int64)
         states = index, degree
         columns, corners = written_out(n_actions), written_out(index.shape[1])
-        version(pheromone_module._repair)(
+        version(pheromone_module.repair)(
             levels, alpha, None, index, columns, corners, probabilities, stale
         )
         version(selection._boltzmann)(
@@ -341,6 +342,7 @@ def test_kernels_agree_with_themselves_as_plain_python(
             alpha,
             None,
             probabilities,
+            stale,
             *states,
             draws,
             0.2,

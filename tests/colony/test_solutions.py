@@ -148,8 +148,8 @@ def test_kernels_agree_with_themselves_as_plain_python() -> None:
         for t in range(3):
             ants = np.flatnonzero(length > t)
             index = ants[:, None].astype(np.int32)
-            append(ants, seen[t], True, actions[t, ants], 5, 3, rows, action, walked)
-            append(ants, index, False, actions[t, ants], 5, 3, cells, own, again)
+            append(0, ants, seen[t], True, actions[t, ants], 5, 3, rows, action, walked)
+            append(0, ants, index, False, actions[t, ants], 5, 3, cells, own, again)
         np.testing.assert_array_equal(walked, length)
         places, out = np.zeros(5, np.int64), np.zeros(5, np.uint8)
         getattr(module._collect, name)(0, 3, walked, action, places, out)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Protocol
 
 import gymnasium as gym
 import numpy as np
@@ -14,6 +14,17 @@ from acl_gym.envs.control.system import ControlSystem
 from acl_gym.utils import validation
 from acl_gym.utils.compiling import njit
 from acl_gym.utils.typing import BoolArray, FloatArray, IntArray
+
+
+class Seeded(Protocol):
+    """What has random numbers of its own, as environments have."""
+
+    @property
+    def np_random(self) -> np.random.Generator:
+        """The generator."""
+
+
+_INT = np.dtype(np.int64)
 
 
 def checked_options(
@@ -81,20 +92,17 @@ def copy_if_below(actions: IntArray, n_actions: int, copied: IntArray) -> bool:
     return good
 
 
-def draw_uniforms(
-    system: ControlSystem, rng: np.random.Generator, count: int
-) -> FloatArray | None:
+def draw_uniforms(system: ControlSystem, env: Seeded, count: int) -> FloatArray | None:
     """Draw the random numbers of one step of `count` slots; None if it needs none."""
-    if system.draws_per_step == 0:
-        return None
-    return rng.random((system.draws_per_step, count))
+    draws = system.draws_per_step
+    return env.np_random.random((draws, count)) if draws else None
 
 
 def checked_actions(actions: ArrayLike, count: int, n_actions: int) -> IntArray:
     """Return actions as a new int64 array `(count,)` within 0..n_actions - 1."""
-    array = np.asarray(actions)
-    checked = np.empty(count, dtype=np.int64)
-    ready = array.dtype == np.int64 and array.shape == checked.shape
+    checked = np.empty(count, np.int64)
+    array = actions if type(actions) is np.ndarray else np.asarray(actions)
+    ready = array.dtype == _INT and array.shape == (count,)
     if ready and copy_if_below(array, n_actions, checked):
         return checked
     if array.dtype.kind not in "iu":

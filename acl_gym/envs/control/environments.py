@@ -9,7 +9,7 @@ environment over the same systems is in `single`.
 from __future__ import annotations
 
 import copy
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar, Self, TypeGuard
 
 import numpy as np
 from gymnasium.error import ResetNeeded
@@ -204,26 +204,35 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
         """
         if self._state is None:
             raise ResetNeeded("step() needs states; call reset() first.")
-        checked = checked_actions(actions, self.num_envs, self._n_actions)
-        self._actions = checked
-        restarting = self._slots_to_restart()
-        rewards = np.zeros(self.num_envs)
-        terminated = np.zeros(self.num_envs, dtype=np.bool_)
-        truncated = np.zeros(self.num_envs, dtype=np.bool_)
+        return self._step(checked_actions(actions, self._num_envs, self._n_actions))
+
+    def _step(self, actions: IntArray) -> StepResult:
+        """`step` after a reset, with actions that are known to be valid.
+
+        Args:
+            actions: a new int64 array `(num_envs,)`, which the environment keeps.
+        """
+        self._actions = actions
+        system, n_slots, state = self._system, self._num_envs, self._states
+        walking = self._walking
+        restarting = None if walking is None else self._slots_to_restart()
+        rewards = np.zeros(n_slots)
+        terminated = np.zeros(n_slots, np.bool_)
+        truncated = np.zeros(n_slots, np.bool_)
         n_finished = 0
-        slots = self._all_slots if self._walking is None else self._walking
-        uniforms = draw_uniforms(self.system, self.np_random, slots.size)
-        if slots is self._all_slots:
-            self.system.advance(self._state, checked, uniforms, rewards, terminated)
+        slots = self._all_slots if walking is None else walking
+        uniforms = draw_uniforms(system, self, slots.size)
+        if walking is None:
+            system.advance(state, actions, uniforms, rewards, terminated)
             n_finished = count_step(self._limit, self._steps, terminated, truncated)
         elif slots.size:
             n_finished = self._step_some(
                 self._limit,
                 slots,
                 self._finished,
-                self._state,
+                state,
                 self._steps,
-                checked,
+                actions,
                 uniforms,
                 rewards,
                 terminated,
@@ -234,9 +243,9 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
 
         last: dict[str, Any] = {}
         if n_finished:
-            walking = np.empty(self.num_envs, dtype=np.int64)
-            ended = np.empty(self.num_envs, dtype=np.bool_)
-            success = np.empty(self.num_envs, dtype=np.bool_)
+            walking = np.empty(n_slots, np.int64)
+            ended = np.empty(n_slots, np.bool_)
+            success = np.empty(n_slots, np.bool_)
             n_left = finish(
                 terminated, truncated, self._finished, walking, ended, success
             )
@@ -249,7 +258,9 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
                 last = {**self._infos(), **last}
                 last = final_infos(self._observe(), ended, last)
                 self._start(np.flatnonzero(ended), None)
-        infos = {**last, **self._infos()}
+        infos = self._infos()
+        if last:
+            infos = {**last, **infos}
         return self._observe(), rewards, terminated, truncated, infos
 
     def render(self) -> tuple[Frame, ...] | None:
@@ -339,8 +350,8 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
         """Hold what a system of a user's own has given to what kernels rely on."""
         good = (
             isinstance(states, np.ndarray)
-            and states.ndim == 2
             and states.dtype == np.float64
+            and states.ndim == 2
             and states.shape[1] == count
             and (self._state is None or len(states) == len(self._state))
         )
@@ -350,13 +361,12 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
                 f"give float64 states of a fixed size for {count} slots, got "
                 f"{validation.shown(states)}."
             )
-        if not type(self.system).__module__.startswith("acl_gym."):
-            self.system.checked_states(
-                states.T
-            )  # kernels of this package address by it
+        if not type(self._system).__module__.startswith(_PACKAGE):
+            # Kernels of this package address by them.
+            self._system.checked_states(states.T)
 
     def _infos(self) -> dict[str, Any]:
-        mask = self.system.action_mask(self._states)
+        mask = self._system.action_mask(self._states)
         if mask is None:
             return {}
         present = np.ones(self.num_envs, dtype=np.bool_)
@@ -392,9 +402,33 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
         )
 
     def _observe(self) -> Observation:
-        return self.system.observe(self._states)
+        return self._system.observe(self._states)
 
     def _checked_states(self, given: Any, slots: IntArray) -> FloatArray:
         current = None if self._state is None else self._state.T
         rows = states_of_slots(given, slots, self.num_envs, current)
         return self.system.checked_states(rows)[slots].T.copy()
+
+
+_PACKAGE = "acl_gym."
+_OF_A_STEP = {
+    name: getattr(ControlVectorEnv, name)
+    for name in ("step", "_step", "_observe", "_infos")
+}
+
+
+def is_native(env: Any) -> TypeGuard[ControlVectorEnv]:
+    """Whether what `env` returns is sure to fit: it and its system are of this package.
+
+    Of a subclass of a user's own, and of methods that were replaced, nothing is sure.
+    """
+    kind = type(env)
+    if not (isinstance(env, ControlVectorEnv) and kind.__module__.startswith(_PACKAGE)):
+        return False
+    system = env.system
+    return (
+        type(system).__module__.startswith(_PACKAGE)
+        and all(getattr(kind, name) is own for name, own in _OF_A_STEP.items())
+        and vars(env).keys().isdisjoint(_OF_A_STEP)
+        and vars(system).keys().isdisjoint(("advance", "observe", "action_mask"))
+    )

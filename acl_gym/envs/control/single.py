@@ -112,7 +112,7 @@ class ControlEnv(gym.Env[NDArray[Any], np.int64]):
             )
         actions = checked_actions(np.asarray([action]), 1, self._n_actions)
         rewards, reached = np.empty(1), np.empty(1, dtype=np.bool_)
-        uniforms = draw_uniforms(self.system, self.np_random, 1)
+        uniforms = draw_uniforms(self.system, self, 1)
         self.system.advance(self._state, actions, uniforms, rewards, reached)
         self._finished = bool(reached[0])
         self._action = int(actions[0])

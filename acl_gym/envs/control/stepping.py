@@ -73,54 +73,19 @@ class PartialStep:
                 np.copyto(states, self._before)
                 rewards.fill(0.0)
                 terminated.fill(False)
-                return self._step_part(
-                    limit,
-                    slots,
-                    states,
-                    steps,
-                    actions,
-                    None,
-                    rewards,
-                    terminated,
-                    truncated,
+            else:
+                return int(
+                    put_idle_back(
+                        idle,
+                        self._before,
+                        limit,
+                        states,
+                        steps,
+                        rewards,
+                        terminated,
+                        truncated,
+                    )
                 )
-            return int(
-                put_idle_back(
-                    idle,
-                    self._before,
-                    limit,
-                    states,
-                    steps,
-                    rewards,
-                    terminated,
-                    truncated,
-                )
-            )
-        return self._step_part(
-            limit,
-            slots,
-            states,
-            steps,
-            actions,
-            uniforms,
-            rewards,
-            terminated,
-            truncated,
-        )
-
-    def _step_part(
-        self,
-        limit: int,
-        slots: IntArray,
-        states: FloatArray,
-        steps: IntArray,
-        actions: IntArray,
-        uniforms: FloatArray | None,
-        rewards: FloatArray,
-        terminated: BoolArray,
-        truncated: BoolArray,
-    ) -> int:
-        """Gather the slots that step, advance them, and put them back."""
         part, part_actions, part_rewards, part_reached = self._scratch_for(
             slots, states
         )

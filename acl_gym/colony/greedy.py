@@ -5,8 +5,6 @@ For tables of any kind: levels of pheromone, action values, costs to go.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from acl_gym.utils import validation
@@ -142,11 +140,11 @@ def cells_out_of_range(index: CellArray, n_cells: int) -> ValueError:
 @njit
 def _all_below(index: CellArray, n_cells: int) -> bool:
     """Whether all cells are in 0..n_cells - 1."""
-    good: Any = True
+    good = True
     for j in range(index.shape[0]):
         for c in range(index.shape[1]):
             # Unsigned, so that negative ones become huge.
-            good &= np.uint32(index[j, c]) < np.uint32(n_cells)
+            good &= bool(np.uint32(index[j, c]) < np.uint32(n_cells))
     return good
 
 

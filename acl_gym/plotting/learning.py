@@ -31,6 +31,7 @@ def draw_learning_curves(
     *,
     best_so_far: bool = False,
     spans: Sequence[tuple[float, float]] = ((0.0, 1.0),),
+    yscale: str = "log",
 ) -> None:
     """Draw the median policy cost of the runs of some methods, with bands.
 
@@ -44,11 +45,12 @@ def draw_learning_curves(
         x: a key of `AXES`.
         best_so_far: whether the best policy counts instead of the last one.
         spans: see `style.draw_band`.
+        yscale: "linear" where values may be 0 or less, as returns may.
     """
     for rows, line in zip(logs.values(), lines, strict=True):
         at, values = steps_of(rows, x, best_so_far=best_so_far)
         style.draw_band(ax, at, values, line, step=True, spans=spans)
-    ax.set(xscale="log", yscale="log", xlabel=AXES[x])
+    ax.set(xscale="log", yscale=yscale, xlabel=AXES[x])
     if x == "seconds":
         style.plain_numbers(ax.xaxis)
     figure: Any = ax.figure

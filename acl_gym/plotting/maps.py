@@ -44,7 +44,7 @@ def plot_policy(
     `shape`; with arrows where it is known where the actions lead.
 
     New axes belong to a figure that pyplot does not know, so nothing needs to be
-    closed: `plot_policy(agent).figure.savefig("policy.png")`. A notebook shows the axes
+    closed: `plot_policy(agent).figure`. A notebook shows the axes
     as a picture. For a window, pass axes of `plt.subplots()`.
 
     Args:

@@ -30,6 +30,9 @@ _DTYPES = {
 _PLAIN = (float, int, str, bool, type(None))
 
 _MOST_BITS = 10_000  # Python reads and writes integers of up to 4,300 digits
+_MOST_NUMBERS = 1_000_000
+"""Of an array among the settings, which a file holds as text."""
+
 _DEEPEST = 100
 """How many lists and dicts may lie in each other."""
 
@@ -51,6 +54,11 @@ def make_plain(settings: Savable) -> None:
 
 def _plain(value: Any) -> Any:
     if isinstance(value, np.ndarray):
+        if value.size > _MOST_NUMBERS:
+            raise TypeError(
+                f"a setting must hold at most {_MOST_NUMBERS:,} numbers, got an array of "
+                f"shape {value.shape}; give a function instead."
+            )
         value = value.tolist()
     if isinstance(value, np.generic):
         return value.item()

@@ -130,7 +130,7 @@ def seed(value: Any, name: str = "seed") -> int | None:
         TypeError: it is not an integer.
         ValueError: it is negative.
     """
-    return None if value is None else integer(name, value, at_least=0)
+    return None if value is None else integer(name, value, at_least=0, at_most=None)
 
 
 def real_array(

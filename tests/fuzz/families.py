@@ -409,7 +409,7 @@ def _run(env: Any, kind: str, boxes: bool) -> Any:
     if kind == "model":
         cost = costs.Steps() if boxes else None
         found = evaluate_policy_cost(liars.Model(), env, max_steps=9, seed=1, cost=cost)
-        return found.costs.tolist(), found.success.tolist(), found.lengths.tolist()
+        return found.costs.tolist(), found.returns.tolist(), found.lengths.tolist()
     agent: Any = (QLearning if kind == "q" else ACL)(
         env, partition, seed=0, max_steps=9
     )
@@ -491,7 +491,7 @@ def models(rng: Rng) -> Call:
         found = evaluate_policy_cost(
             model, env, max_steps=9, seed=1, cost=costs.Steps()
         )
-        return found.costs.tolist(), found.success.tolist(), found.lengths.tolist()
+        return found.costs.tolist(), found.returns.tolist(), found.lengths.tolist()
 
     return Call(f"model: actions {form}", evaluate, outcome)
 

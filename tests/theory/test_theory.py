@@ -316,7 +316,7 @@ def test_ants_choose_no_less_often_than_that() -> None:
     rng, count, epsilon = np.random.default_rng(6), 40_000, 0.2
     pheromone = Pheromone(1, 4, 0.1, 2.0)
     pheromone.set_levels(np.array([[0.1, 0.7, 0.7, 0.7]]))  # the worst case
-    index, degree = np.zeros((count, 1), dtype=np.int64), np.ones((count, 1))
+    index, degree = np.zeros((count, 1), dtype=np.int32), np.ones((count, 1))
     for rule, bound in (
         ("epsilon_greedy", theory.action_probability_bound(epsilon, 4)),
         ("boltzmann", theory.least_probability(0.1, 0.7, 4, 2.0)),

@@ -35,7 +35,7 @@ class Pendulum(BlockSystem):
         gravity: g, m / s^2, >= 0.
         torques: U, N m, the torque u of each action, one or more.
         sampling_time: T_s, s, > 0; the torque is constant over it.
-        substeps: Runge-Kutta steps in one sampling time, >= 1. Measured against
+        substeps: Runge-Kutta steps in one sampling time, 1 to 10,000. Measured against
             DOP853 over the whole state space, one step of the default 0.1 s is off
             by at most 5e-4 rad and 6e-3 rad/s with 1 substep, 3e-5 and 4e-4 with
             2, 2e-6 and 2e-5 with 4.
@@ -73,7 +73,9 @@ class Pendulum(BlockSystem):
         for name in ("damping", "gravity", "torque_weight"):
             validation.number(name, getattr(self, name), at_least=0)
         validation.number("omega_max", self.omega_max, above=0)
-        validation.integer("substeps", self.substeps, at_least=1)
+        validation.integer(
+            "substeps", self.substeps, at_least=1, at_most=parameters.MOST_SUBSTEPS
+        )
         torques = validation.real_array("torques", self.torques, ndim=1)
         bounds = self._checked_bounds()
         weight = _weight_matrix(self.state_weight)

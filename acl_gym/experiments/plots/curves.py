@@ -184,8 +184,7 @@ def returns(experiment: Experiment, results: Results) -> Figure:
     }
     lines = [look_of(study).line for study in studies.values()]
     for x, ax in zip(AXES, axes, strict=True):
-        draw_learning_curves(ax, logs, lines, x)
-        ax.set_yscale("linear")
+        draw_learning_curves(ax, logs, lines, x, yscale="linear")
     axes[0].set_ylabel("return of the policy")
     return figure
 

@@ -75,6 +75,7 @@ def _pairs() -> dict[str, Any]:
 _ROWS, _PAIRS = _rows_of_tasks(), _pairs()
 CASES: dict[str, tuple[dict[str, Study], str, dict[str, Any]]] = {
     "bands": (TABLES, "bands", {}),
+    "returns": (rows(), "returns", {}),
     "sensitivity": (rows(), "bands", {"measure": "sensitivity", "columns": 1}),
     "measures": (grids(), "measures", {}),
     "pendulum": (TABLES, "policies", {}),

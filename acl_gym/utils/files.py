@@ -83,11 +83,21 @@ def write_atomically(path: str | os.PathLike[str], content: bytes) -> None:
     """
     try:
         _write(path, content)
+        _Written.any = True
     except OSError as error:
         if error.errno is None:
             raise
         # Not the name of the temporary file, which says nothing to the user.
         raise OSError(error.errno, error.strerror, os.fspath(path)) from error
+
+
+def has_written() -> bool:
+    """Whether `write_atomically` has written anything in this process."""
+    return _Written.any
+
+
+class _Written:
+    any = False
 
 
 def _write(path: str | os.PathLike[str], content: bytes) -> None:

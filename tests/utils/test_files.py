@@ -289,7 +289,9 @@ def test_a_folder_that_cannot_be_written_is_found_before_the_work(
     folder = Path("/proc/self")
     if not folder.is_dir():
         pytest.skip("there is no /proc here")
-    with pytest.raises(OSError, match=r"a\.npz cannot be written in .*/proc.*; do it\."):
+    with pytest.raises(
+        OSError, match=r"a\.npz cannot be written in .*/proc.*; do it\."
+    ):
         files.checked_target(folder / "a.npz", "do it")
     assert files.checked_target(tmp_path / "a.npz") == tmp_path / "a.npz"
     assert files.checked_target(Path("/dev/null")) == Path("/dev/null")

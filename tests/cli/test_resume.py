@@ -95,8 +95,8 @@ def test_a_best_policy_that_is_resumed_is_not_replaced() -> None:
 
 
 def test_the_best_policy_goes_with_the_run_to_another_name() -> None:
-    """With seed 1 the best of 12 trials is not the last; see the test before."""
-    first = figures(*RUN, "--trials", "12", "--seed", "1", "--out", "a")["best"]
+    """With seed 2 trials 12 and 13 are both worse than an earlier one."""
+    first = figures(*RUN, "--trials", "12", "--seed", "2", "--out", "a")["best"]
     found = figures("train", "--resume", "a.npz", "--trials", "1", "--out", "c")
     last = found["policy_cost"]
     assert last > first["policy_cost"]
@@ -110,9 +110,9 @@ def test_the_best_policy_goes_with_the_run_to_another_name() -> None:
 
 
 def test_a_best_policy_of_another_run_is_not_trusted() -> None:
-    figures(*RUN, "--trials", "12", "--seed", "1", "--out", "a")
+    figures(*RUN, "--trials", "12", "--seed", "2", "--out", "a")
     # Of the same environment and trials, but of other ants.
-    figures(*RUN, "--trials", "12", "--seed", "2", "--out", "c")
+    figures(*RUN, "--trials", "12", "--seed", "3", "--out", "c")
     shown = invoke("train", "--resume", "a.npz", "--trials", "1", "--out", "c")
     assert "c-best.npz was of another run" in shown.stderr
     assert Path("c-best.npz").read_bytes() == Path("a-best.npz").read_bytes()

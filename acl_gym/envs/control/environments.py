@@ -422,7 +422,7 @@ def _least_bytes_a_slot(space: Any) -> int:
     # Bounds, whether they are finite, and the observation; and the state.
     of_variables = numbers * (3 * space.dtype.itemsize + 2 + 8)
     # Action, its space (two numbers), steps, index and reward; three flags.
-    return of_variables + 6 * 8 + 3
+    return int(of_variables + 6 * 8 + 3)
 
 
 _PACKAGE = "acl_gym."

@@ -109,6 +109,7 @@ def test_the_best_policy_goes_with_the_run_to_another_name() -> None:
     assert load_agent("d-best.npz").trials == 13
 
 
+@pytest.mark.filterwarnings("default:.*is not the best policy of this run")
 def test_a_best_policy_of_another_run_is_not_trusted() -> None:
     figures(*RUN, "--trials", "12", "--seed", "2", "--out", "a")
     # Of the same environment and trials, but of other ants.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,7 @@ from gymnasium.vector import VectorEnv
 from numpy.typing import NDArray
 
 from acl_gym.callbacks.base import Agent, Callback
+from acl_gym.callbacks.best import row_of_saved_best
 from acl_gym.evaluation import (
     PolicyCost,
     evaluate_policy_cost,
@@ -46,13 +48,16 @@ class PolicyEvaluation(Callback):
             agent's greedy policy.
         save_best: write the agent to this file whenever its policy is the best so
             far; None writes nothing. If the file exists, an agent that continues
-            learning replaces it only by a policy better than all in its `history`.
+            learning replaces it only by a better policy; but a file that is not of
+            this run and environment is replaced in any case, with a warning.
 
     Attributes:
         best: the evaluation with the lowest cost so far; without `agent.cost` it is also
             the one with the highest return.
         best_policy: the policy of that evaluation; further learning does not change
             it.
+        saved: the row of the trial after which the agent in the file `save_best` was
+            written, with its `policy_cost`; None if none was.
 
     Raises:
         TypeError: `env` is not a vector environment, or `policy` not a function.
@@ -80,7 +85,7 @@ class PolicyEvaluation(Callback):
         self.save_best = None
         if save_best is not None:
             self.save_best = files.checked_target(files.with_suffix(save_best))
-        self._saved_cost = math.inf
+        self.saved: Row | None = None
         self.seed = seed
         self.policy = policy
         self.env = env
@@ -94,11 +99,17 @@ class PolicyEvaluation(Callback):
         self.best_policy: Predictor | None = None
 
     def on_training_start(self, agent: Agent) -> None:
-        """Look up the cost of the agent in the file."""
-        self._saved_cost = math.inf
-        if self.save_best is not None and self.save_best.exists():
-            costs = (row.get("policy_cost", math.inf) for row in agent.history)
-            self._saved_cost = min(costs, default=math.inf)
+        """Look up what is in the file, if the agent was there when it was written."""
+        self.saved = None
+        if self.save_best is None or not (self.save_best.exists() and agent.history):
+            return
+        self.saved = row_of_saved_best(self.save_best, agent)
+        if self.saved is None:
+            warnings.warn(
+                f"{self.save_best} is not the best policy of this run so far, and is "
+                "replaced at the next evaluation.",
+                stacklevel=2,
+            )
 
     def on_trial_end(self, agent: Agent, row: Row) -> bool | None:
         """Evaluate if an evaluation is due."""
@@ -133,9 +144,10 @@ class PolicyEvaluation(Callback):
             self.best_policy = (
                 policy.copy() if isinstance(policy, TablePolicy) else policy
             )
-        if self.save_best is not None and result.cost < self._saved_cost:
+        lowest = math.inf if self.saved is None else self.saved["policy_cost"]
+        if self.save_best is not None and result.cost < lowest:
             agent.save(self.save_best)
-            self._saved_cost = result.cost
+            self.saved = dict(row)
 
 
 _HIGHER_IS_BETTER = ("_return", "success_rate")

@@ -8,7 +8,7 @@ import sys
 import traceback
 import warnings
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import Any
 
 import typer
@@ -18,6 +18,9 @@ from acl_gym.utils.text import replace_unprintable_letters
 
 INTERRUPTED = 130
 """The exit code of a program ended by Ctrl-C, by convention of the shells."""
+
+READER_GONE = 141
+"""The exit code where nobody reads what is printed: 128 + the number of SIGPIPE."""
 
 _PLAIN = (ValueError, TypeError, OSError, RuntimeError, ImportError, AttributeError)
 """Errors whose messages are sentences, so that the name of the class adds nothing."""
@@ -89,8 +92,14 @@ def _run(
         try:
             code = main(args, prog_name, standalone_mode=False)
             if code == INTERRUPTED:  # what Typer returns after Ctrl-C
-                report(name, "interrupted; files written so far are kept.")
+                report(name, _interrupted())
             sys.stdout.flush()
+        except SystemExit as leaving:
+            # Typer and Rich turn a broken pipe into an exit of their own.
+            cause = leaving.__context__
+            if not (isinstance(cause, OSError) and cause.errno == errno.EPIPE):
+                raise
+            code = _leave_pipe()
         except OSError as error:
             code = (
                 _leave_pipe() if error.errno == errno.EPIPE else _explain(name, error)
@@ -107,7 +116,18 @@ def _leave_pipe() -> int:
     """
     nowhere = os.open(os.devnull, os.O_WRONLY)
     os.dup2(nowhere, sys.stdout.fileno())
-    return 1  # as Typer and Rich do
+    return READER_GONE
+
+
+def _interrupted() -> str:
+    """What Ctrl-C has left behind."""
+    # Not imported here: Ctrl-C may have come in the middle of an import of NumPy, which
+    # cannot be begun again. What was not imported has written nothing.
+    files = sys.modules.get("acl_gym.utils.files")
+    has_written = getattr(files, "has_written", None)
+    if has_written is not None and has_written():
+        return "interrupted; files written so far are kept."
+    return "interrupted; nothing was written."
 
 
 def _explain(name: str, error: Exception) -> int:
@@ -140,8 +160,9 @@ def in_words(error: BaseException) -> str:
 
 
 def report(name: str, message: str) -> None:
-    """Write one line to stderr."""
-    typer.echo(f"{name}: {' '.join(message.split())}", err=True)
+    """Write one line to stderr; nobody need read it."""
+    with suppress(BrokenPipeError):
+        typer.echo(f"{name}: {' '.join(message.split())}", err=True)
 
 
 @contextmanager

@@ -1,4 +1,4 @@
-"""What `acl-gym train` does between trials: checkpoints, plain progress, a hint."""
+"""What `acl-gym train` does around trials: files it keeps, plain progress, a hint."""
 
 from __future__ import annotations
 
@@ -9,9 +9,11 @@ from typing import Any
 import numpy as np
 
 from acl_gym.callbacks import Agent, Callback, Row
+from acl_gym.callbacks.best import row_of_saved_best
 from acl_gym.cli.errors import report
 from acl_gym.cli.interrupts import Interruption
 from acl_gym.evaluation import reports_returns
+from acl_gym.utils import files
 
 CHECKPOINT_SECONDS = 60.0
 """Between checkpoints, where no number of trials is given."""
@@ -64,6 +66,32 @@ class Keeper(Callback):
         if self._every is not None:
             return trial % self._every == 0
         return time.monotonic() - self._written >= CHECKPOINT_SECONDS
+
+
+def take_over_best(learner: Any, resumed: Path, best: Path) -> None:
+    """Go on with the best policy of the resumed run where the run gets another name.
+
+    Args:
+        learner: as it was loaded.
+        resumed: from where.
+        best: the file of the best policy from now on. What is there stays if it is of
+            this run and better.
+    """
+    resumed = files.with_suffix(resumed)
+    if not resumed.stem.endswith("-best"):
+        resumed = resumed.with_name(f"{resumed.stem}-best.npz")
+    if resumed.resolve() == best.resolve():
+        return
+    found, there = (row_of_saved_best(path, learner) for path in (resumed, best))
+    if found is None or (there and there["policy_cost"] <= found["policy_cost"]):
+        return
+    if best.exists() and there is None:
+        report(
+            "acl-gym",
+            f"note: {best} was of another run; the best policy so far, {resumed}, "
+            "replaces it.",
+        )
+    files.write_atomically(best, resumed.read_bytes())
 
 
 class PlainProgress(Callback):

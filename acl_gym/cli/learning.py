@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from acl_gym import Crisp, CSVLog, Fuzzy, PolicyEvaluation, TensorBoardLog
 from acl_gym.agents.suitable import BY_RANK, PROBES, suitable_deposit
 from acl_gym.callbacks import Callback
@@ -296,7 +298,7 @@ def run(
     if shown.as_json:
         print_json(_summary(plan, target, best))
     elif not shown.quiet:
-        _print_rows(learner, target, best)
+        _print_rows(plan, target, best)
 
 
 def _how_to_go_on(learner: Any, begun: int, last: int, target: Path) -> str:
@@ -314,8 +316,9 @@ def _failed(error: Exception, learner: Any, begun: int, target: Path) -> Excepti
     deposit = getattr(learner, "deposit", None)
     if isinstance(deposit, InverseCost) and getattr(learner, "cost", None) is None:
         rollout = learner.rollout
-        costs = rollout.cost + deposit.offset
-        if not rollout.ants.size and (costs <= 0.0).any():  # all walks are complete
+        costs = getattr(rollout, "cost", None)  # there is none before the first walk
+        costs = np.ones(1) if costs is None else costs + deposit.offset
+        if (costs <= 0.0).any() and not rollout.ants.size:  # all walks are complete
             words = (
                 "ants deposit 1 / cost, and costs must be > 0, but an ant has cost "
                 f"{costs.min():g}: the rewards are not negative costs. Add --param "
@@ -328,12 +331,6 @@ def _failed(error: Exception, learner: Any, begun: int, target: Path) -> Excepti
     return RuntimeError(words)
 
 
-def best_row(learner: Any) -> dict[str, Any] | None:
-    """The row of the history with the cheapest policy; None if none was evaluated."""
-    rows = [row for row in learner.history if "policy_cost" in row]
-    return min(rows, key=lambda row: row["policy_cost"], default=None)
-
-
 def _measures(row: dict[str, Any]) -> dict[str, Any]:
     """What an evaluation has found; None where it is not known."""
     names = ("policy_cost", "policy_return", "success_rate")
@@ -342,7 +339,7 @@ def _measures(row: dict[str, Any]) -> dict[str, Any]:
 
 def _summary(plan: Plan, target: Path, best: Path | None) -> dict[str, Any]:
     learner = plan.learner
-    last, cheapest = learner.history[-1], best_row(learner)
+    last, cheapest = learner.history[-1], plan.evaluation.saved
     found = None
     if best is not None and cheapest is not None:
         found = {
@@ -365,9 +362,10 @@ def _summary(plan: Plan, target: Path, best: Path | None) -> dict[str, Any]:
     }
 
 
-def _print_rows(learner: Any, target: Path, best: Path | None) -> None:
+def _print_rows(plan: Plan, target: Path, best: Path | None) -> None:
     from rich.table import Table
 
+    learner, cheapest = plan.learner, plan.evaluation.saved
     cost = getattr(learner, "cost", None)
     what = "return" if reports_returns(learner.rollout.env, cost) else "cost"
     rows = [row for row in learner.history if "policy_cost" in row]
@@ -388,7 +386,6 @@ def _print_rows(learner: Any, target: Path, best: Path | None) -> None:
         table.add_row(*cells[: 5 + known])
     screen = console()
     screen.print(table)
-    cheapest = best_row(learner)
     lines = [f"Saved {target}. To evaluate it again: acl-gym evaluate {target}"]
     if best is not None and cheapest is not None:
         lines.append(

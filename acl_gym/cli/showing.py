@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import os
 import sys
+import tempfile
 from collections.abc import Iterator
 from importlib import import_module
 from importlib.util import find_spec
@@ -17,6 +18,7 @@ import numpy as np
 from acl_gym.cli.common import check_name
 from acl_gym.cli.environments import Environment
 from acl_gym.cli.errors import BadArgumentError, bad_arguments
+from acl_gym.utils.files import checked_target, write_atomically
 
 FORMATS = (".gif", ".mp4")
 
@@ -33,11 +35,8 @@ def check(render: bool, video: Path | None) -> None:
     """
     if video is not None:
         check_name("the ending of --video", video.suffix.lower(), FORMATS)
-        if not video.parent.is_dir():
-            raise BadArgumentError(
-                f"there is no folder {video.parent} to write {video.name} in; make it "
-                "first."
-            )
+        with bad_arguments():
+            checked_target(video, "name a file elsewhere with --video FILE")
         if video.suffix.lower() == ".mp4" and find_spec("moviepy") is None:
             raise BadArgumentError(
                 "--video FILE.mp4 needs moviepy, which is not installed; run `pip install "
@@ -138,12 +137,14 @@ def _telling_start(env: Any) -> dict[str, Any] | None:
 def _write(path: Path, frames: Iterator[Any], fps: float) -> None:
     """Write a film; Pillow, which Matplotlib needs, makes .gif files."""
     if path.suffix.lower() == ".mp4":
-        clip = import_module("moviepy").ImageSequenceClip
-        clip(list(frames), fps=fps).write_videofile(str(path), logger=None)
+        clip = import_module("moviepy").ImageSequenceClip(list(frames), fps=fps)
+        # MoviePy writes into the file as it goes, and by the ending it knows the format.
+        with tempfile.TemporaryDirectory() as folder:
+            film = Path(folder) / "film.mp4"
+            clip.write_videofile(str(film), logger=None)
+            write_atomically(path, film.read_bytes())
         return
     from PIL import Image
-
-    from acl_gym.utils.files import write_atomically
 
     images = (Image.fromarray(frame) for frame in frames)
     first, buffer = next(images), io.BytesIO()

@@ -312,7 +312,11 @@ def train(
         plan = learning.go_on(
             environment, learner, changes, ants, evaluate_every, trials
         )
-    best = target.with_name(f"{target.stem}-best.npz") if keep_best else None
+    best = _target(target.with_name(f"{target.stem}-best.npz")) if keep_best else None
+    if resume is not None and best is not None:
+        from acl_gym.cli.keeping import take_over_best
+
+        take_over_best(plan.learner, resume, best)
     learning.run(
         plan,
         target,
@@ -386,7 +390,13 @@ def _target(path: Path) -> Path:
 
     folder = path.name in ("", "..")
     with bad_arguments():
-        target = path if folder else files.checked_target(files.with_suffix(path))
+        target = (
+            path
+            if folder
+            else files.checked_target(
+                files.with_suffix(path), "name a file elsewhere with --out FILE.npz"
+            )
+        )
     if folder or target.is_dir():
         raise BadArgumentError(f"{target} is a folder; give the name of a file.")
     return target

@@ -11,6 +11,7 @@ import io
 import json
 import math
 import os
+import struct
 import zipfile
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -35,6 +36,12 @@ _BYTES_A_VALUE = 64
 _PART = 2**20
 _SUFFIX = ".npy"
 _MOST_ARRAYS = 1_000
+
+_MOST_HEADER = 10_000
+"""Bytes of the description of an array; of one of numbers it has about a hundred."""
+
+_LENGTHS = {(1, 0): "<H", (2, 0): "<I"}
+"""Version of the format of arrays -> how it writes the length of the description."""
 
 Target = str | os.PathLike[str] | BinaryIO
 """A path, or a file open in binary mode."""
@@ -209,12 +216,18 @@ def _read_kind(member: IO[bytes]) -> tuple[tuple[int, ...], bool, np.dtype[Any]]
         ValueError: it is no array of numbers.
     """
     version = npy.read_magic(member)
-    if version == (1, 0):
-        kind = npy.read_array_header_1_0(member)
-    elif version == (2, 0):
-        kind = npy.read_array_header_2_0(member)
-    else:
+    if version not in _LENGTHS:
         raise ValueError(f"an array is of the unknown version {version}")
+    # NumPy would read as much as the field says before it looks at the limit.
+    field = member.read(struct.calcsize(_LENGTHS[version]))
+    (length,) = struct.unpack(_LENGTHS[version], field)
+    if length > _MOST_HEADER:
+        raise ValueError(f"the description of an array has {length} bytes")
+    text = io.BytesIO(field + member.read(length))
+    if version == (1, 0):
+        kind = npy.read_array_header_1_0(text)
+    else:
+        kind = npy.read_array_header_2_0(text)
     shape, by_column, dtype = kind
     if dtype.kind not in "biuf" or any(size < 0 for size in shape):
         raise ValueError(f"an array must hold numbers, got {dtype} of shape {shape}")
@@ -242,12 +255,14 @@ def _content(source: Target, most: int) -> tuple[str, bytes]:
     if _is_file("load from", source, "read"):
         name = str(getattr(source, "name", "the file"))
         return name, _read(source, name, most)  # type: ignore[arg-type]
-    path = with_suffix(source)  # type: ignore[arg-type]
+    named = with_suffix(source)  # type: ignore[arg-type]
+    typed = Path(source)  # type: ignore[arg-type]
+    path = named if named.is_file() else typed
     if not path.is_file():
-        path = Path(source)  # type: ignore[arg-type]
-    if not path.is_file():
+        or_typed = "" if typed == named else f", and none at {typed}"
         raise FileNotFoundError(
-            f"no agent file at {with_suffix(source)}."  # type: ignore[arg-type]
+            f"no agent file at {named}{or_typed}; give the name of a file that "
+            "was written by save() or by `acl-gym train`."
         )
     with path.open("rb") as file:
         return str(path), _read(file, str(path), most)

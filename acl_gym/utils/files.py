@@ -11,8 +11,10 @@ import re
 import secrets
 import stat
 import time
+from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
+from typing import BinaryIO
 
 from acl_gym.utils import validation
 
@@ -29,12 +31,21 @@ def with_suffix(path: str | os.PathLike[str]) -> Path:
     return path if path.suffix == ".npz" else path.with_name(path.name + ".npz")
 
 
-def checked_target(path: Path) -> Path:
-    """Return the path of a file to be written if its folder exists.
+def checked_target(
+    path: Path, remedy: str = "give the name of a file in another folder"
+) -> Path:
+    """Return the path of a file to be written if `write_atomically` can write it now.
+
+    That is tried: permissions alone do not tell of file systems that cannot be written.
+
+    Args:
+        path: the file.
+        remedy: what to do where the folder cannot be written, an imperative.
 
     Raises:
         FileNotFoundError: the folder of the file does not exist.
         IsADirectoryError: the path is a folder.
+        OSError: the folder, or the file that is there, cannot be written.
     """
     if not path.parent.is_dir():
         raise FileNotFoundError(
@@ -42,6 +53,16 @@ def checked_target(path: Path) -> Path:
         )
     if path.is_dir():
         raise IsADirectoryError(f"{path} is a folder; give the name of a file.")
+    try:
+        target, before = _resolved(path)
+        if before is None or stat.S_ISREG(before.st_mode):
+            with _temporary_beside(target) as file:
+                file.close()
+    except OSError as error:
+        raise type(error)(
+            f"{path.name} cannot be written in the folder {path.parent.absolute()} "
+            f"({error.strerror}); {remedy}."
+        ) from error
     return path
 
 
@@ -57,19 +78,67 @@ def write_atomically(path: str | os.PathLike[str], content: bytes) -> None:
     same folder are removed.
 
     Raises:
-        OSError: it cannot be written; what was there before is still there.
+        OSError: it cannot be written, with `path` as its `filename`; what was there
+            before is still there.
     """
-    target = Path(os.path.realpath(path))
-    if target.is_symlink():  # a circle of links
-        raise OSError(errno.ELOOP, os.strerror(errno.ELOOP), str(path))
-    before = target.stat() if target.exists() else None
+    try:
+        _write(path, content)
+        _Written.any = True
+    except OSError as error:
+        if error.errno is None:
+            raise
+        # Not the name of the temporary file, which says nothing to the user.
+        raise OSError(error.errno, error.strerror, os.fspath(path)) from error
+
+
+def has_written() -> bool:
+    """Whether `write_atomically` has written anything in this process."""
+    return _Written.any
+
+
+class _Written:
+    any = False
+
+
+def _write(path: str | os.PathLike[str], content: bytes) -> None:
+    target, before = _resolved(path)
     if before is not None and not stat.S_ISREG(before.st_mode):
         with target.open("wb") as file:
             file.write(content)
         return
-    if before is not None and not os.access(target, os.W_OK):
-        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(target))
     remove_stale(target.parent)
+    with _temporary_beside(target) as file:
+        if before is not None:
+            with contextlib.suppress(PermissionError):
+                os.chmod(file.name, stat.S_IMODE(before.st_mode))
+        file.write(content)
+        file.flush()
+        os.fsync(file.fileno())
+        file.close()  # Windows replaces no open file
+        os.replace(file.name, target)
+
+
+def _resolved(path: str | os.PathLike[str]) -> tuple[Path, os.stat_result | None]:
+    """Where a path leads, and what is there; None if nothing is.
+
+    Raises:
+        OSError: the path leads nowhere, or to a file that cannot be written.
+    """
+    target = Path(os.path.realpath(path))
+    if target.is_symlink():  # a circle of links
+        raise OSError(errno.ELOOP, os.strerror(errno.ELOOP), str(path))
+    try:
+        before = target.stat()
+    except FileNotFoundError:
+        return target, None
+    if not os.access(target, os.W_OK):
+        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(target))
+    return target, before
+
+
+@contextlib.contextmanager
+def _temporary_beside(target: Path) -> Iterator[BinaryIO]:
+    """A new file in the same folder, which is removed unless it was renamed."""
     temporary = target.with_name(
         f".acl-{_machine()}-{os.getpid()}-{secrets.token_hex(6)}.tmp"
     )
@@ -77,13 +146,7 @@ def write_atomically(path: str | os.PathLike[str], content: bytes) -> None:
         # Unlike tempfile.mkstemp, "x" gives the permissions that open() gives; like it,
         # it follows no link and takes no file that is there already.
         with temporary.open("xb") as file:
-            if before is not None:
-                with contextlib.suppress(PermissionError):
-                    temporary.chmod(stat.S_IMODE(before.st_mode))
-            file.write(content)
-            file.flush()
-            os.fsync(file.fileno())
-        os.replace(temporary, target)
+            yield file
     finally:
         temporary.unlink(missing_ok=True)
 

@@ -409,3 +409,20 @@ def test_without_tensorboard_it_says_what_to_install(
     )
     with pytest.raises(ModuleNotFoundError, match=r"pip install \"acl-gym\[tensorb"):
         TensorBoardLog(tmp_path)
+
+
+def test_a_file_of_another_run_is_replaced_with_a_warning(tmp_path: Path) -> None:
+    path = tmp_path / "best.npz"
+    agent = make().learn(trials=2, callback=evaluation())
+    make(QLearning).learn(trials=1, callback=evaluation(save_best=path))
+    watcher = evaluation(save_best=path)
+    with pytest.warns(UserWarning, match="is not the best policy of this run"):
+        agent.learn(trials=1, callback=watcher)
+    assert ACL.load(path).trials == 3
+    assert watcher.saved == agent.history[-1]
+    again = evaluation(save_best=path)
+    agent.learn(trials=1, callback=again)  # without a warning
+    assert again.saved is not None
+    assert again.saved["policy_cost"] == min(
+        row["policy_cost"] for row in agent.history[2:]
+    )

@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 
+from acl_gym.utils import files
 from tests.cli.runner import (
     MODULE,
     PENDULUM,
@@ -20,16 +21,53 @@ from tests.cli.runner import (
 )
 
 
-@pytest.mark.parametrize("argument", ["compare", "envs"])
+@pytest.mark.parametrize(
+    ("argument", "written", "said"),
+    [
+        ("compare", False, "interrupted; finished runs are kept"),
+        ("envs", False, "interrupted; nothing was written."),
+        ("envs", True, "interrupted; files written so far are kept."),
+    ],
+)
 def test_an_interrupted_command_says_what_is_kept(
-    argument: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+    argument: str, written: bool, said: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def interrupt(*_: Any, **__: Any) -> None:
+        if written:
+            files.write_atomically("a", b"1")
         raise KeyboardInterrupt
 
+    monkeypatch.setattr("acl_gym.utils.files._Written.any", False)
     monkeypatch.setattr("acl_gym.experiments.comparison.compare.compare", interrupt)
     monkeypatch.setattr("acl_gym.cli.envs.describe", interrupt)
-    assert "interrupted; " in refused(130, argument)
+    assert said in refused(130, argument)
+
+
+@pytest.mark.parametrize("best", [False, True])
+def test_a_place_that_cannot_be_written_is_refused_before_learning(best: bool) -> None:
+    if best:
+        Path("a-best.npz").mkdir()
+        assert "a-best.npz is a folder" in refused(2, *SMALL, "--out", "a")
+        return
+    line = refused(2, *SMALL, "--out", "/proc/self/a.npz")
+    assert "a.npz cannot be written in the folder /proc/self" in line
+    assert "--out FILE.npz" in line
+
+
+def test_too_many_ants() -> None:
+    line = refused(2, "train", PENDULUM, "--ants", str(10**12))
+    assert "1,000,000,000,000 slots must fit into" in line
+    assert line.endswith("use fewer ants or slots.")
+
+
+def test_memory_that_ends_before_the_first_walk_is_named(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def full(*_: Any, **__: Any) -> None:
+        raise MemoryError("1 TiB")
+
+    monkeypatch.setattr("acl_gym.evaluation.rollout.Rollout.start", full)
+    assert "not enough memory; take fewer ants" in refused(1, *SMALL)
 
 
 @pytest.mark.parametrize(

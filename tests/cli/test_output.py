@@ -127,10 +127,19 @@ def test_the_names_are_those_that_there_are() -> None:
     assert tuple(each.name for each in EXPERIMENTS) == names.EXPERIMENTS
 
 
-def test_a_reader_that_goes_away(tmp_path: Path) -> None:
-    """As in `| head`: no traceback."""
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["reproduce", "--list"],
+        ["envs", "--json"],
+        [*SMALL, "--out", "a"],
+        [*SMALL, "--out", "a", "--json"],
+    ],
+)
+def test_a_reader_that_goes_away(arguments: list[str], tmp_path: Path) -> None:
+    """As in `| head`: no traceback, and not the code of a run that failed."""
     with subprocess.Popen(
-        [sys.executable, "-m", "acl_gym", "reproduce", "--list"],
+        [sys.executable, "-m", "acl_gym", *arguments],
         env={**os.environ, "PYTHONPATH": str(ROOT)},
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
@@ -139,7 +148,10 @@ def test_a_reader_that_goes_away(tmp_path: Path) -> None:
         process.stdout.close()
         assert process.stderr is not None
         said = process.stderr.read()
-    assert said == b""
+    assert b"Error" not in said
+    assert b"Traceback" not in said
+    assert process.returncode == 141
+    assert Path("a.npz").exists() == ("--out" in arguments)
 
 
 def test_progress_without_a_terminal_is_plain_lines(

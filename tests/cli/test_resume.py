@@ -94,6 +94,35 @@ def test_a_best_policy_that_is_resumed_is_not_replaced() -> None:
     assert found["file"] == "Pendulum-v0.npz"
 
 
+def test_the_best_policy_goes_with_the_run_to_another_name() -> None:
+    """With seed 2 trials 12 and 13 are both worse than an earlier one."""
+    first = figures(*RUN, "--trials", "12", "--seed", "2", "--out", "a")["best"]
+    found = figures("train", "--resume", "a.npz", "--trials", "1", "--out", "c")
+    last = found["policy_cost"]
+    assert last > first["policy_cost"]
+    assert found["best"] == {**first, "file": "c-best.npz"}
+    assert figures("evaluate", "c-best.npz")["policy_cost"] == first["policy_cost"]
+    # Where the best was not kept, what is told is what is in the file.
+    Path("a-best.npz").unlink()
+    found = figures("train", "--resume", "a.npz", "--trials", "1", "--out", "d")
+    assert (found["best"]["trial"], found["best"]["policy_cost"]) == (13, last)
+    assert load_agent("d-best.npz").trials == 13
+
+
+@pytest.mark.filterwarnings("default:.*is not the best policy of this run")
+def test_a_best_policy_of_another_run_is_not_trusted() -> None:
+    figures(*RUN, "--trials", "12", "--seed", "2", "--out", "a")
+    # Of the same environment and trials, but of other ants.
+    figures(*RUN, "--trials", "12", "--seed", "3", "--out", "c")
+    shown = invoke("train", "--resume", "a.npz", "--trials", "1", "--out", "c")
+    assert "c-best.npz was of another run" in shown.stderr
+    assert Path("c-best.npz").read_bytes() == Path("a-best.npz").read_bytes()
+    Path("a-best.npz").write_bytes(b"of something else")
+    shown = invoke("train", "--resume", "a.npz", "--trials", "1")
+    assert "a-best.npz is not the best policy of this run" in shown.stderr
+    assert load_agent("a-best.npz").trials == 13
+
+
 def test_what_is_resumed_says_so_and_refuses_what_cannot_change() -> None:
     figures(*RUN, "--trials", "3", "--out", "a")
     shown = invoke("train", PENDULUM, "--resume", "a.npz", "--trials", "2")

@@ -7,6 +7,7 @@ import json
 import math
 import os
 import pickle
+import struct
 import time
 import tracemalloc
 import warnings
@@ -636,3 +637,28 @@ def test_hostile_files_are_refused_or_harmless(saved: bytes, tmp_path: Path) -> 
             outcomes["loaded"] += 1
         assert time.monotonic() - began < 20, f"file {number}"
     assert outcomes["refused"] > HOSTILE_FILES / 4
+
+
+@pytest.mark.parametrize("name", ["header", "more"])
+def test_a_long_description_of_an_array_is_not_read(
+    name: str, saved: bytes, tmp_path: Path
+) -> None:
+    """A few kilobytes that unpack to 64 MB of spaces."""
+    length = 2**26
+    bomb = b"\x93NUMPY\x02\x00" + struct.pack("<I", length) + b" " * length
+    members = {**members_of(saved), f"{name}.npy": bomb}
+    path = tmp_path / "a.npz"
+    path.write_bytes(archive(*members.items()))
+    tracemalloc.start()
+    try:
+        with pytest.raises(ValueError, match=r"is not an agent .* damaged"):
+            ACL.load(path)
+        most = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert most < length / 16
+
+
+def test_a_missing_file_is_named_as_it_was_typed(tmp_path: Path) -> None:
+    with pytest.raises(FileNotFoundError, match=r"a\.npz, and none at .*a; give"):
+        ACL.load(tmp_path / "a")

@@ -277,3 +277,34 @@ def test_a_failure_leaves_what_was_there(
             write_atomically(tmp_path / name, b"after")
     assert os.listdir(tmp_path) == ["a"]
     assert (tmp_path / "a").read_bytes() == b"before"
+
+
+# --- the look before the work ------------------------------------------------------
+
+
+def test_a_folder_that_cannot_be_written_is_found_before_the_work(
+    tmp_path: Path,
+) -> None:
+    """Not even root makes files in /proc/self, whatever the permissions say."""
+    folder = Path("/proc/self")
+    if not folder.is_dir():
+        pytest.skip("there is no /proc here")
+    with pytest.raises(
+        OSError, match=r"a\.npz cannot be written in .*/proc.*; do it\."
+    ):
+        files.checked_target(folder / "a.npz", "do it")
+    assert files.checked_target(tmp_path / "a.npz") == tmp_path / "a.npz"
+    assert files.checked_target(Path("/dev/null")) == Path("/dev/null")
+    assert os.listdir(tmp_path) == []
+
+
+def test_an_error_names_the_file_and_not_the_temporary_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(*_: Any) -> None:
+        raise OSError(28, "No space left on device", "temporary")
+
+    monkeypatch.setattr("os.fsync", full)
+    with pytest.raises(OSError, match="No space left") as found:
+        write_atomically(tmp_path / "a", b"1")
+    assert found.value.filename == str(tmp_path / "a")

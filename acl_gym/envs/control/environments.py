@@ -9,6 +9,7 @@ environment over the same systems is in `single`.
 from __future__ import annotations
 
 import copy
+import math
 from typing import Any, ClassVar, Self, TypeGuard
 
 import numpy as np
@@ -89,6 +90,11 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
         self._system = self.system_type(**parameters)
         self.single_observation_space = self.system.observation_space
         self.single_action_space = self.system.action_space
+        validation.check_memory(
+            f"{self.num_envs:,} slots",
+            self.num_envs * _least_bytes_a_slot(self.single_observation_space),
+            "use fewer ants or slots",
+        )
         self.observation_space = batch_space(
             self.single_observation_space, self.num_envs
         )
@@ -408,6 +414,15 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
         current = None if self._state is None else self._state.T
         rows = states_of_slots(given, slots, self.num_envs, current)
         return self.system.checked_states(rows)[slots].T.copy()
+
+
+def _least_bytes_a_slot(space: Any) -> int:
+    """What a slot takes at least: its part of the batched spaces, state and results."""
+    numbers = math.prod(space.shape)
+    # Bounds, whether they are finite, and the observation; and the state.
+    of_variables = numbers * (3 * space.dtype.itemsize + 2 + 8)
+    # Action, its space (two numbers), steps, index and reward; three flags.
+    return int(of_variables + 6 * 8 + 3)
 
 
 _PACKAGE = "acl_gym."

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from numbers import Integral
 from typing import Any
 
 import numpy as np
+from numba.core.dispatcher import Dispatcher
+from numpy.typing import NDArray
 
 from acl_gym.envs.control.parameters import is_weight
 from acl_gym.envs.control.system import SlotError
@@ -112,8 +114,16 @@ class Goal:
                 states, actions, *self.arguments(), none, costs, rewards, reached
             )
         else:
-            reached[:] = self.function(states)
+            reached[:] = self.judged(states)
         return reached
+
+    def judged(self, states: FloatArray) -> NDArray[Any]:
+        """What the function says of each of the states `(state_size, n)`, `(n,)`.
+
+        Raises:
+            ValueError: it writes to the states, or does not give n booleans.
+        """
+        return _evaluated("goal(x)", self.function, (states,), "biu", "booleans")
 
     def check(self, samples: FloatArray) -> None:
         """Try a function on sample states, `(state_size, n)`.
@@ -122,7 +132,7 @@ class Goal:
             ValueError: it fails, or does not give a bool for each state.
         """
         if self.function is not None:
-            _check("goal(x)", self.function, (samples,), "biu", "booleans")
+            _check(self.judged, "goal(x) must return booleans", samples)
 
 
 class Cost:
@@ -177,6 +187,8 @@ class Cost:
 
         Raises:
             SlotError: a cost is not finite.
+            ValueError: a function of goal or cost writes to what it is given, or does
+                not give a number for each state.
         """
         kernels.judge(
             states,
@@ -188,10 +200,9 @@ class Cost:
             reached,
         )
         if goal.function is not None:
-            reached[:] = goal.function(states)
+            reached[:] = goal.judged(states)
         if self.function is not None:
-            rewards[:] = self.function(states, self._inputs.T[:, actions])
-            np.negative(rewards, out=rewards)
+            np.negative(self._costs(states, self._inputs.T[:, actions]), out=rewards)
         finite = np.isfinite(rewards)
         if not finite.all():
             slot = int(np.argmin(finite))
@@ -211,7 +222,18 @@ class Cost:
         if self.function is not None:
             actions = np.arange(samples.shape[1]) % len(self._inputs)
             u = self._inputs.T[:, actions]
-            _check("cost(x, u)", self.function, (samples, u), "iuf", "finite numbers")
+            _check(self._costs, "cost(x, u) must return finite numbers", samples, u)
+
+    def _costs(self, states: FloatArray, u: FloatArray) -> NDArray[Any]:
+        """What the function says of each of the states, `(n,)`.
+
+        Raises:
+            ValueError: it writes to states or inputs, or does not give n real numbers.
+        """
+        arguments = (states, u)
+        return _evaluated(
+            "cost(x, u)", self.function, arguments, "iuf", "finite numbers"
+        )
 
     def largest(self, states: FloatArray) -> float:
         """The largest cost of any action in these states."""
@@ -284,27 +306,49 @@ def _matrix(name: str, values: Any, size: int) -> FloatArray:
     return array
 
 
-def _check(
+def _evaluated(
     name: str, function: Any, arguments: tuple[FloatArray, ...], kinds: str, what: str
-) -> None:
-    """Try a function of many states."""
+) -> NDArray[Any]:
+    """Call a function of many states, which cannot write to them; check its result.
+
+    Args:
+        name: of the function, for messages.
+        function: the user's.
+        arguments: states `(state_size, n)`, and inputs.
+        kinds: of NumPy's types that it may return.
+        what: these are, for messages.
+    """
     size, count = arguments[0].shape
     expects = (
         f"{name} must return {what} of shape (n,) for states x of shape ({size}, n)"
     )
+    # What was compiled for arrays that can be written to takes no others: copies.
+    hand_out = np.copy if isinstance(function, Dispatcher) else validation.read_only
     try:
-        with np.errstate(all="ignore"):
-            given = function(*(argument.copy() for argument in arguments))
+        given = function(*map(hand_out, arguments))
     except Exception as error:  # whatever the user's code raises
-        raise ValueError(f"{expects}, but it raised {error!r}.") from error
+        hint = ""
+        if "read-only" in str(error):
+            hint = "; it must not change what it is given: write to a copy, x.copy()"
+        raise ValueError(f"{expects}, but it raised {error!r}{hint}.") from error
     array = np.asarray(given)
     if array.shape != (count,) or array.dtype.kind not in kinds:
         raise ValueError(
             f"{expects}, got {array.dtype} of shape {array.shape} for n = {count}; "
             "combine conditions with & instead of `and`, sum over axis 0."
         )
+    return array
+
+
+def _check(
+    evaluate: Callable[..., NDArray[Any]],
+    expects: str,
+    samples: FloatArray,
+    *others: FloatArray,
+) -> None:
+    """Try a function of many states on samples, whose results must be finite."""
+    with np.errstate(all="ignore"):
+        array = evaluate(samples, *others)
     if not np.isfinite(array).all():
         j = int(np.argmin(np.isfinite(array)))
-        raise ValueError(
-            f"{expects}, got {array[j]} for x = {arguments[0][:, j].tolist()}."
-        )
+        raise ValueError(f"{expects}, got {array[j]} for x = {samples[:, j].tolist()}.")

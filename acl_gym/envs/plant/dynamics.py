@@ -82,10 +82,11 @@ class Equations:
         with np.errstate(all="ignore"):
             x = states
             if self._discrete_time:
-                x = _evaluated(f, x, u)
+                x = _evaluated(f, validation.read_only(x), u)
             else:
                 for _ in range(substeps):
-                    k1 = _evaluated(f, x, u)
+                    # The others are temporary arrays.
+                    k1 = _evaluated(f, validation.read_only(x), u)
                     k2 = _evaluated(f, x + 0.5 * step * k1, u)
                     k3 = _evaluated(f, x + 0.5 * step * k2, u)
                     k4 = _evaluated(f, x + step * k3, u)
@@ -155,14 +156,14 @@ def _expects(size: int, n_inputs: int) -> str:
 
 
 def _evaluated(dynamics: Any, x: FloatArray, u: FloatArray) -> FloatArray:
-    """f(x, u) as an array; neither the states nor the inputs can be written to.
+    """f(x, u) as an array.
 
     Raises:
-        ValueError: it writes to them, or does not give a row of real numbers for each
+        ValueError: it writes to read-only arguments, or does not give a row of real numbers for each
             variable.
     """
     try:
-        given = dynamics(validation.read_only(x), u)
+        given = dynamics(x, u)
     except ValueError as error:
         if "read-only" not in str(error):
             raise
@@ -180,7 +181,10 @@ def _evaluated(dynamics: Any, x: FloatArray, u: FloatArray) -> FloatArray:
     stacked = np.empty(shape)
     try:
         for row, value in zip(stacked, given, strict=True):
-            np.copyto(row, value)  # refuses complex numbers, which row[...] = cuts
+            entries = value if isinstance(value, np.ndarray) else np.asarray(value)
+            if entries.dtype.kind not in "biuf":  # an assignment would convert them
+                raise TypeError(f"got a row of {entries.dtype}")
+            row[...] = entries
     except (TypeError, ValueError) as error:
         got = f"{given!r:.200}"
         if isinstance(given, np.ndarray):

@@ -318,26 +318,31 @@ def _evaluated(
         kinds: of NumPy's types that it may return.
         what: these are, for messages.
     """
-    size, count = arguments[0].shape
-    expects = (
-        f"{name} must return {what} of shape (n,) for states x of shape ({size}, n)"
-    )
     # What was compiled for arrays that can be written to takes no others: copies.
     hand_out = np.copy if isinstance(function, Dispatcher) else validation.read_only
     try:
-        given = function(*map(hand_out, arguments))
+        array = np.asarray(function(*[hand_out(argument) for argument in arguments]))
     except Exception as error:  # whatever the user's code raises
         hint = ""
         if "read-only" in str(error):
             hint = "; it must not change what it is given: write to a copy, x.copy()"
+        expects = _expects(name, what, arguments[0])
         raise ValueError(f"{expects}, but it raised {error!r}{hint}.") from error
-    array = np.asarray(given)
+    count = arguments[0].shape[1]
     if array.shape != (count,) or array.dtype.kind not in kinds:
         raise ValueError(
-            f"{expects}, got {array.dtype} of shape {array.shape} for n = {count}; "
-            "combine conditions with & instead of `and`, sum over axis 0."
+            f"{_expects(name, what, arguments[0])}, got {array.dtype} of shape "
+            f"{array.shape} for n = {count}; combine conditions with & instead of `and`, "
+            "sum over axis 0."
         )
     return array
+
+
+def _expects(name: str, what: str, states: FloatArray) -> str:
+    return (
+        f"{name} must return {what} of shape (n,) for states x of shape "
+        f"({len(states)}, n)"
+    )
 
 
 def _check(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from numbers import Integral
 from typing import Any
 
@@ -49,7 +49,9 @@ class Goal:
     ) -> None:
         size = low.size
         self.period = period
-        self.function = goal if callable(goal) else None
+        self.function = (
+            _Function("goal(x)", goal, "biu", "booleans") if callable(goal) else None
+        )
         self.centre: FloatArray | None = None
         self._half = np.full(size, -1.0)
         if self.function is not None or goal is None:
@@ -114,16 +116,8 @@ class Goal:
                 states, actions, *self.arguments(), none, costs, rewards, reached
             )
         else:
-            reached[:] = self.judged(states)
+            reached[:] = self.function(states)
         return reached
-
-    def judged(self, states: FloatArray) -> NDArray[Any]:
-        """What the function says of each of the states `(state_size, n)`, `(n,)`.
-
-        Raises:
-            ValueError: it writes to the states, or does not give n booleans.
-        """
-        return _evaluated("goal(x)", self.function, (states,), "biu", "booleans")
 
     def check(self, samples: FloatArray) -> None:
         """Try a function on sample states, `(state_size, n)`.
@@ -132,7 +126,7 @@ class Goal:
             ValueError: it fails, or does not give a bool for each state.
         """
         if self.function is not None:
-            _check(self.judged, "goal(x) must return booleans", samples)
+            self.function.check(samples)
 
 
 class Cost:
@@ -151,11 +145,15 @@ class Cost:
     def __init__(
         self, cost: Any, goal: Goal, inputs: FloatArray, sampling_time: float
     ) -> None:
-        self.function = cost if callable(cost) else None
+        self._function = (
+            _Function("cost(x, u)", cost, "iuf", "finite numbers")
+            if callable(cost)
+            else None
+        )
         self._goal, self._inputs = goal, inputs
         self._weight = np.empty((0, 0))
         self._action_costs = np.zeros(len(inputs))
-        if self.function is not None:
+        if self._function is not None:
             return
         if isinstance(cost, str):
             validation.one_of("cost", cost, ("time",))
@@ -200,9 +198,11 @@ class Cost:
             reached,
         )
         if goal.function is not None:
-            reached[:] = goal.judged(states)
-        if self.function is not None:
-            np.negative(self._costs(states, self._inputs.T[:, actions]), out=rewards)
+            reached[:] = goal.function(states)
+        if self._function is not None:
+            # First as floats: unsigned integers have no negatives.
+            rewards[:] = self._function(states, self._inputs.T[:, actions])
+            np.negative(rewards, out=rewards)
         finite = np.isfinite(rewards)
         if not finite.all():
             slot = int(np.argmin(finite))
@@ -219,21 +219,10 @@ class Cost:
         Raises:
             ValueError: it fails, or does not give a finite number for each state.
         """
-        if self.function is not None:
+        if self._function is not None:
             actions = np.arange(samples.shape[1]) % len(self._inputs)
             u = self._inputs.T[:, actions]
-            _check(self._costs, "cost(x, u) must return finite numbers", samples, u)
-
-    def _costs(self, states: FloatArray, u: FloatArray) -> NDArray[Any]:
-        """What the function says of each of the states, `(n,)`.
-
-        Raises:
-            ValueError: it writes to states or inputs, or does not give n real numbers.
-        """
-        arguments = (states, u)
-        return _evaluated(
-            "cost(x, u)", self.function, arguments, "iuf", "finite numbers"
-        )
+            self._function.check(samples, u)
 
     def largest(self, states: FloatArray) -> float:
         """The largest cost of any action in these states."""
@@ -306,54 +295,64 @@ def _matrix(name: str, values: Any, size: int) -> FloatArray:
     return array
 
 
-def _evaluated(
-    name: str, function: Any, arguments: tuple[FloatArray, ...], kinds: str, what: str
-) -> NDArray[Any]:
-    """Call a function of many states, which cannot write to them; check its result.
+class _Function:
+    """A function of the user's, of many states; what it returns is checked.
 
     Args:
-        name: of the function, for messages.
-        function: the user's.
-        arguments: states `(state_size, n)`, and inputs.
+        name: for messages.
+        function: takes states `(state_size, n)`, and other arrays; returns `(n,)`.
         kinds: of NumPy's types that it may return.
         what: these are, for messages.
     """
-    # What was compiled for arrays that can be written to takes no others: copies.
-    hand_out = np.copy if isinstance(function, Dispatcher) else validation.read_only
-    try:
-        array = np.asarray(function(*[hand_out(argument) for argument in arguments]))
-    except Exception as error:  # whatever the user's code raises
-        hint = ""
-        if "read-only" in str(error):
-            hint = "; it must not change what it is given: write to a copy, x.copy()"
-        expects = _expects(name, what, arguments[0])
-        raise ValueError(f"{expects}, but it raised {error!r}{hint}.") from error
-    count = arguments[0].shape[1]
-    if array.shape != (count,) or array.dtype.kind not in kinds:
-        raise ValueError(
-            f"{_expects(name, what, arguments[0])}, got {array.dtype} of shape "
-            f"{array.shape} for n = {count}; combine conditions with & instead of `and`, "
-            "sum over axis 0."
+
+    def __init__(self, name: str, function: Any, kinds: str, what: str) -> None:
+        self._name, self._function = name, function
+        self._kinds, self._what = kinds, what
+        # What was compiled for arrays that can be written to takes no others: copies.
+        compiled = isinstance(function, Dispatcher)
+        self._handed_out = np.copy if compiled else validation.read_only
+
+    def __call__(self, states: FloatArray, *others: FloatArray) -> NDArray[Any]:
+        """Evaluate states, which it cannot write to; `others` are its own to change.
+
+        Raises:
+            ValueError: it fails, writes to the states, or returns something else.
+        """
+        try:
+            array = np.asarray(self._function(self._handed_out(states), *others))
+        except Exception as error:  # whatever the user's code raises
+            hint = ""
+            if "read-only" in str(error):
+                hint = "; it must not change the states x: write to a copy, x.copy()"
+            raise ValueError(
+                f"{self._expects(states)}, but it raised {error!r}{hint}."
+            ) from error
+        count = states.shape[1]
+        if array.shape != (count,) or array.dtype.kind not in self._kinds:
+            raise ValueError(
+                f"{self._expects(states)}, got {array.dtype} of shape {array.shape} for "
+                f"n = {count}; combine conditions with & instead of `and`, sum over axis "
+                "0."
+            )
+        return array
+
+    def check(self, samples: FloatArray, *others: FloatArray) -> None:
+        """Try it on samples.
+
+        Raises:
+            ValueError: see `__call__`, or a result is not finite.
+        """
+        with np.errstate(all="ignore"):
+            array = self(samples, *others)
+        if not np.isfinite(array).all():
+            j = int(np.argmin(np.isfinite(array)))
+            raise ValueError(
+                f"{self._expects(samples)}, got {array[j]} for x = "
+                f"{samples[:, j].tolist()}."
+            )
+
+    def _expects(self, states: FloatArray) -> str:
+        return (
+            f"{self._name} must return {self._what} of shape (n,) for states x of shape "
+            f"({len(states)}, n)"
         )
-    return array
-
-
-def _expects(name: str, what: str, states: FloatArray) -> str:
-    return (
-        f"{name} must return {what} of shape (n,) for states x of shape "
-        f"({len(states)}, n)"
-    )
-
-
-def _check(
-    evaluate: Callable[..., NDArray[Any]],
-    expects: str,
-    samples: FloatArray,
-    *others: FloatArray,
-) -> None:
-    """Try a function of many states on samples, whose results must be finite."""
-    with np.errstate(all="ignore"):
-        array = evaluate(samples, *others)
-    if not np.isfinite(array).all():
-        j = int(np.argmin(np.isfinite(array)))
-        raise ValueError(f"{expects}, got {array[j]} for x = {samples[:, j].tolist()}.")

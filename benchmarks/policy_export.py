@@ -78,7 +78,7 @@ def seconds_in_c(
     """Seconds a call; bytes of the tables, of the code, and of the stack as stated."""
     header = policy.to_c(folder / "policy.h", precision=precision)
     (folder / "main.c").write_text(MAIN.replace("TYPE", precision))
-    command = ["gcc", "-std=c99", "-O2", "main.c", "-o", "main", "-lm"]
+    command = ["gcc", "-std=c99", "-O2", "main.c", "-o", "main"]
     subprocess.run(command, cwd=folder, check=True)
     # The code alone: one function that calls the policy.
     (folder / "code.c").write_text(

@@ -77,12 +77,12 @@ class Rollout:
     - Where the environment resets slots itself, the outcomes of finished slots are
       ignored; the last observation is recovered from `infos["final_obs"]`.
 
+    What the environment returns is held against the number of slots, see
+    `acl_gym.envs.received`, and copied where it is kept.
+
     Args:
         env: any vector environment with `Discrete` actions.
         max_steps: T, >= 1.
-
-    What the environment returns is held against the number of slots, see
-    `acl_gym.envs.received`, and copied where it is kept.
 
     Attributes:
         num_envs: the number of slots, which must not change.

@@ -22,7 +22,8 @@ class Number:
         type: "float" or "double".
         bytes: of one number.
         largest: the macro of the largest finite number.
-        floor: the function of <math.h>.
+        whole_from: the literal from which on there are no fractions.
+        integer: a type that holds all whole numbers below `whole_from`.
 
     Raises:
         ValueError: `precision` is neither.
@@ -35,7 +36,8 @@ class Number:
         self._suffix = "f" if single else ""
         self.bytes = 4 if single else 8
         self.largest = "FLT_MAX" if single else "DBL_MAX"
-        self.floor = "floorf" if single else "floor"
+        self.whole_from = self.literal(2.0**23 if single else 2.0**52)
+        self.integer = "int32_t" if single else "int64_t"
 
     def rounded(self, values: FloatArray) -> NDArray[Any]:
         """The nearest numbers of this type."""

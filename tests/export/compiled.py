@@ -40,7 +40,8 @@ def compiled(
     """Compile a program around the header, every warning being an error."""
     source, program = header.with_suffix(".main.c"), header.with_suffix(".program")
     source.write_text(MAIN.format(header=header.name, type=number, name=name))
-    command = [*compiler, *STRICT, str(source), "-o", str(program), "-lm"]
+    # Without -lm: a header needs no library.
+    command = [*compiler, *STRICT, str(source), "-o", str(program)]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     return program

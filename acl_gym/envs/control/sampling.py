@@ -8,6 +8,10 @@ import numpy as np
 
 from acl_gym.utils.typing import BoolArray, FloatArray
 
+MOST_IN_VAIN = 10_000
+"""How many states in a row may lie inside a region. Where 1% of all lie outside, as many
+do in one of 10^43 cases."""
+
 
 def sample_outside(
     draw: Callable[[int], FloatArray],
@@ -23,10 +27,23 @@ def sample_outside(
 
     Returns:
         Array of shape `(state_size, count)`.
+
+    Raises:
+        ValueError: `MOST_IN_VAIN` states in a row were drawn in vain.
     """
     states = draw(count)
+    left, in_vain = count, 0
     while (again := np.flatnonzero(inside(states))).size:
-        states[:, again] = draw(again.size)
+        # One slot that found a state outside shows that there are some.
+        in_vain = in_vain + left if again.size == left else 0
+        if in_vain >= MOST_IN_VAIN:
+            raise ValueError(
+                "the goal must leave 1% or more of the initial states outside it, got "
+                f"{in_vain:,} states drawn one after the other that all lie in it; "
+                "narrow the goal, or give other initial states."
+            )
+        left = again.size
+        states[:, again] = draw(left)
     return states
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ from numba.core.errors import NumbaError
 
 from acl_gym.envs.plant import kernels
 from acl_gym.envs.plant.models import Model, is_model
+from acl_gym.utils import validation
 from acl_gym.utils.typing import FloatArray, IntArray
 
 _SAMPLES = 7  # no usual number of variables, so that mixed-up axes are noticed
@@ -75,17 +77,19 @@ class Equations:
                 self._compiled = self._compile(states, inputs)
             return self._compiled(states, actions, inputs, step, substeps)
         f, u = self._dynamics, inputs.T[:, actions]
+        u.setflags(write=False)
         # What is not finite is an error of its own; no need to warn of it as well.
         with np.errstate(all="ignore"):
             x = states
             if self._discrete_time:
-                x = _stacked(f(x, u), x.shape)
+                x = _evaluated(f, validation.read_only(x), u)
             else:
                 for _ in range(substeps):
-                    k1 = _stacked(f(x, u), x.shape)
-                    k2 = _stacked(f(x + 0.5 * step * k1, u), x.shape)
-                    k3 = _stacked(f(x + 0.5 * step * k2, u), x.shape)
-                    k4 = _stacked(f(x + step * k3, u), x.shape)
+                    # The others are temporary arrays.
+                    k1 = _evaluated(f, validation.read_only(x), u)
+                    k2 = _evaluated(f, x + 0.5 * step * k1, u)
+                    k3 = _evaluated(f, x + 0.5 * step * k2, u)
+                    k4 = _evaluated(f, x + step * k3, u)
                     x = x + step / 6.0 * (k1 + 2.0 * (k2 + k3) + k4)
             finite = np.isfinite(x)
         if finite.all():
@@ -96,7 +100,7 @@ class Equations:
         return int(np.argmin(good))
 
     def _compile(self, states: FloatArray, inputs: FloatArray) -> kernels.Advance:
-        given = self._dynamics(np.ascontiguousarray(states[:, 0]), inputs[0])
+        given = self._dynamics(states[:, 0].copy(), inputs[0].copy())
         put = kernels.put_sequence
         if isinstance(given, tuple):
             put = kernels.put_tuple
@@ -143,13 +147,54 @@ def sample_count() -> int:
     return _SAMPLES
 
 
-def _stacked(values: Any, shape: tuple[int, ...]) -> FloatArray:
-    """What `dynamics` returned as an array; numbers count for all slots."""
-    if isinstance(values, np.ndarray) and values.shape == shape:
-        return values
+def _expects(size: int, n_inputs: int) -> str:
+    return (
+        f"dynamics must take states x of shape ({size}, n) and inputs u of shape "
+        f"({n_inputs}, n), so that x[0] is the first variable of all n states, and return "
+        f"{size} rows of n numbers, such as [x[1], -np.sin(x[0]) + u[0]]"
+    )
+
+
+def _evaluated(dynamics: Any, x: FloatArray, u: FloatArray) -> FloatArray:
+    """f(x, u) as an array.
+
+    Raises:
+        ValueError: it writes to read-only arguments, or does not give a row of real numbers for each
+            variable.
+    """
+    try:
+        given = dynamics(x, u)
+    except ValueError as error:
+        if "read-only" not in str(error):
+            raise
+        raise ValueError(
+            "dynamics must not change x and u, which belong to the environment, got "
+            f"{_first_line(error)}; write to a copy, x.copy()."
+        ) from error
+    shape = x.shape
+    if (
+        isinstance(given, np.ndarray)
+        and given.shape == shape
+        and given.dtype.kind in "iuf"
+    ):
+        return given
     stacked = np.empty(shape)
-    for row, value in zip(stacked, values, strict=True):
-        row[...] = value
+    try:
+        for row, value in zip(stacked, given, strict=True):
+            entries = value if isinstance(value, np.ndarray) else np.asarray(value)
+            if entries.dtype.kind not in "biuf":  # an assignment would convert them
+                raise TypeError(f"got a row of {entries.dtype}")
+            row[...] = entries
+    except (TypeError, ValueError) as error:
+        got = f"{given!r:.200}"
+        if isinstance(given, np.ndarray):
+            got = f"shape {given.shape} of {given.dtype}"
+        elif isinstance(given, list | tuple):
+            got = f"{len(given)} rows"
+        raise ValueError(
+            f"{_expects(len(x), len(u))}, in each call, got {got} for {shape[1]} states: "
+            f"{_first_line(error)}"
+        ) from error
     return stacked
 
 
@@ -172,7 +217,7 @@ def _checked_model(
         _check(model, samples, inputs)
     u = _inputs_for(samples, inputs)
     now, later = (
-        _stacked(model.at(time, samples, u), samples.shape) for time in (0.0, 17.3)
+        _evaluated(partial(model.at, time), samples, u) for time in (0.0, 17.3)
     )
     if not np.array_equal(now, later):
         raise ValueError(
@@ -204,11 +249,7 @@ def _check(dynamics: Any, samples: FloatArray, inputs: FloatArray) -> None:
 
 def _tried(dynamics: Any, x: FloatArray, u: FloatArray) -> FloatArray:
     size, count = x.shape
-    expects = (
-        f"dynamics must take states x of shape ({size}, n) and inputs u of shape "
-        f"({len(u)}, n), so that x[0] is the first variable of all n states, and return "
-        f"{size} rows of n numbers, such as [x[1], -np.sin(x[0]) + u[0]]"
-    )
+    expects = _expects(size, len(u))
     x, u = x.copy(), u.copy()
     x.flags.writeable = u.flags.writeable = False
     try:

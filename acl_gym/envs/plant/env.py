@@ -93,7 +93,9 @@ def plant(
               must not depend on time. A model in discrete time gives the next state. An
               update function that cannot take arrays of states is slow.
 
-            It is tried on a few states at once, and must give finite numbers. To send
+            It is tried on a few states at once, and must give finite numbers. The
+            states and inputs of a function of many plants are read-only, as are the
+            states of `goal` and `cost`; a compiled one gets copies. To send
             the environment to other processes, define it at the top of a module.
         low: lower end of each state variable, `(state_size,)`.
         high: upper end of each; states are clipped to both after each step.

@@ -29,7 +29,12 @@ def put_tuple(values: Any, out: FloatArray) -> None:
 
 @njit
 def put_sequence(values: Any, out: FloatArray) -> None:
-    """Copy an array or a list."""
+    """Copy an array or a list, which may be of another length each time."""
+    if len(values) != out.size:
+        raise ValueError(
+            "dynamics compiled by Numba must return one number for each state variable "
+            "in each call, got another count than for the first state; return a tuple."
+        )
     for i in range(out.size):
         out[i] = values[i]
 
@@ -37,6 +42,9 @@ def put_sequence(values: Any, out: FloatArray) -> None:
 @lru_cache(maxsize=64)  # copies of an environment share what was compiled
 def advance_ode(dynamics: Any, size: int, put: Any) -> Advance:
     """Fourth-order Runge-Kutta around a compiled x' = f(x, u), the input held constant.
+
+    The function gets copies of state and input, fresh ones in each call: it may use them
+    as variables of its own.
 
     Args:
         dynamics: compiled by Numba; takes the state `(size,)` and the input
@@ -55,21 +63,33 @@ def advance_ode(dynamics: Any, size: int, put: Any) -> Advance:
     ) -> int:
         x, y = np.empty(size), np.empty(size)
         k1, k2, k3, k4 = np.empty(size), np.empty(size), np.empty(size), np.empty(size)
+        n_inputs = inputs.shape[1]
+        u = np.empty(n_inputs)
         bad = -1
         for slot in range(actions.size):
-            u = inputs[actions[slot]]
+            action = actions[slot]
             for i in range(size):
                 x[i] = states[i, slot]
             for _ in range(substeps):
-                put(dynamics(x, u), k1)
+                for i in range(size):
+                    y[i] = x[i]
+                for i in range(n_inputs):
+                    u[i] = inputs[action, i]
+                put(dynamics(y, u), k1)
                 for i in range(size):
                     y[i] = x[i] + 0.5 * step * k1[i]
+                for i in range(n_inputs):
+                    u[i] = inputs[action, i]
                 put(dynamics(y, u), k2)
                 for i in range(size):
                     y[i] = x[i] + 0.5 * step * k2[i]
+                for i in range(n_inputs):
+                    u[i] = inputs[action, i]
                 put(dynamics(y, u), k3)
                 for i in range(size):
                     y[i] = x[i] + step * k3[i]
+                for i in range(n_inputs):
+                    u[i] = inputs[action, i]
                 put(dynamics(y, u), k4)
                 for i in range(size):
                     x[i] += step / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i])
@@ -99,11 +119,13 @@ def advance_map(dynamics: Any, size: int, put: Any) -> Advance:
         substeps: int,
     ) -> int:
         x, y = np.empty(size), np.empty(size)
+        u = np.empty(inputs.shape[1])
         bad = -1
         for slot in range(actions.size):
-            u = inputs[actions[slot]]
             for i in range(size):
                 x[i] = states[i, slot]
+            for i in range(u.size):
+                u[i] = inputs[actions[slot], i]
             put(dynamics(x, u), y)
             finite = True
             for i in range(size):

@@ -7,6 +7,8 @@ from numbers import Integral
 from typing import Any
 
 import numpy as np
+from numba.core.dispatcher import Dispatcher
+from numpy.typing import NDArray
 
 from acl_gym.envs.control.parameters import is_weight
 from acl_gym.envs.control.system import SlotError
@@ -47,7 +49,9 @@ class Goal:
     ) -> None:
         size = low.size
         self.period = period
-        self.function = goal if callable(goal) else None
+        self.function = (
+            _Function("goal(x)", goal, "biu", "booleans") if callable(goal) else None
+        )
         self.centre: FloatArray | None = None
         self._half = np.full(size, -1.0)
         if self.function is not None or goal is None:
@@ -122,7 +126,7 @@ class Goal:
             ValueError: it fails, or does not give a bool for each state.
         """
         if self.function is not None:
-            _check("goal(x)", self.function, (samples,), "biu", "booleans")
+            self.function.check(samples)
 
 
 class Cost:
@@ -141,11 +145,15 @@ class Cost:
     def __init__(
         self, cost: Any, goal: Goal, inputs: FloatArray, sampling_time: float
     ) -> None:
-        self.function = cost if callable(cost) else None
+        self._function = (
+            _Function("cost(x, u)", cost, "iuf", "finite numbers")
+            if callable(cost)
+            else None
+        )
         self._goal, self._inputs = goal, inputs
         self._weight = np.empty((0, 0))
         self._action_costs = np.zeros(len(inputs))
-        if self.function is not None:
+        if self._function is not None:
             return
         if isinstance(cost, str):
             validation.one_of("cost", cost, ("time",))
@@ -177,6 +185,8 @@ class Cost:
 
         Raises:
             SlotError: a cost is not finite.
+            ValueError: a function of goal or cost writes to what it is given, or does
+                not give a number for each state.
         """
         kernels.judge(
             states,
@@ -189,8 +199,9 @@ class Cost:
         )
         if goal.function is not None:
             reached[:] = goal.function(states)
-        if self.function is not None:
-            rewards[:] = self.function(states, self._inputs.T[:, actions])
+        if self._function is not None:
+            # First as floats: unsigned integers have no negatives.
+            rewards[:] = self._function(states, self._inputs.T[:, actions])
             np.negative(rewards, out=rewards)
         finite = np.isfinite(rewards)
         if not finite.all():
@@ -208,10 +219,10 @@ class Cost:
         Raises:
             ValueError: it fails, or does not give a finite number for each state.
         """
-        if self.function is not None:
+        if self._function is not None:
             actions = np.arange(samples.shape[1]) % len(self._inputs)
             u = self._inputs.T[:, actions]
-            _check("cost(x, u)", self.function, (samples, u), "iuf", "finite numbers")
+            self._function.check(samples, u)
 
     def largest(self, states: FloatArray) -> float:
         """The largest cost of any action in these states."""
@@ -284,27 +295,64 @@ def _matrix(name: str, values: Any, size: int) -> FloatArray:
     return array
 
 
-def _check(
-    name: str, function: Any, arguments: tuple[FloatArray, ...], kinds: str, what: str
-) -> None:
-    """Try a function of many states."""
-    size, count = arguments[0].shape
-    expects = (
-        f"{name} must return {what} of shape (n,) for states x of shape ({size}, n)"
-    )
-    try:
+class _Function:
+    """A function of the user's, of many states; what it returns is checked.
+
+    Args:
+        name: for messages.
+        function: takes states `(state_size, n)`, and other arrays; returns `(n,)`.
+        kinds: of NumPy's types that it may return.
+        what: these are, for messages.
+    """
+
+    def __init__(self, name: str, function: Any, kinds: str, what: str) -> None:
+        self._name, self._function = name, function
+        self._kinds, self._what = kinds, what
+        # What was compiled for arrays that can be written to takes no others: copies.
+        compiled = isinstance(function, Dispatcher)
+        self._handed_out = np.copy if compiled else validation.read_only
+
+    def __call__(self, states: FloatArray, *others: FloatArray) -> NDArray[Any]:
+        """Evaluate states, which it cannot write to; `others` are its own to change.
+
+        Raises:
+            ValueError: it fails, writes to the states, or returns something else.
+        """
+        try:
+            array = np.asarray(self._function(self._handed_out(states), *others))
+        except Exception as error:  # whatever the user's code raises
+            hint = ""
+            if "read-only" in str(error):
+                hint = "; it must not change the states x: write to a copy, x.copy()"
+            raise ValueError(
+                f"{self._expects(states)}, but it raised {error!r}{hint}."
+            ) from error
+        count = states.shape[1]
+        if array.shape != (count,) or array.dtype.kind not in self._kinds:
+            raise ValueError(
+                f"{self._expects(states)}, got {array.dtype} of shape {array.shape} for "
+                f"n = {count}; combine conditions with & instead of `and`, sum over axis "
+                "0."
+            )
+        return array
+
+    def check(self, samples: FloatArray, *others: FloatArray) -> None:
+        """Try it on samples.
+
+        Raises:
+            ValueError: see `__call__`, or a result is not finite.
+        """
         with np.errstate(all="ignore"):
-            given = function(*(argument.copy() for argument in arguments))
-    except Exception as error:  # whatever the user's code raises
-        raise ValueError(f"{expects}, but it raised {error!r}.") from error
-    array = np.asarray(given)
-    if array.shape != (count,) or array.dtype.kind not in kinds:
-        raise ValueError(
-            f"{expects}, got {array.dtype} of shape {array.shape} for n = {count}; "
-            "combine conditions with & instead of `and`, sum over axis 0."
-        )
-    if not np.isfinite(array).all():
-        j = int(np.argmin(np.isfinite(array)))
-        raise ValueError(
-            f"{expects}, got {array[j]} for x = {arguments[0][:, j].tolist()}."
+            array = self(samples, *others)
+        if not np.isfinite(array).all():
+            j = int(np.argmin(np.isfinite(array)))
+            raise ValueError(
+                f"{self._expects(samples)}, got {array[j]} for x = "
+                f"{samples[:, j].tolist()}."
+            )
+
+    def _expects(self, states: FloatArray) -> str:
+        return (
+            f"{self._name} must return {self._what} of shape (n,) for states x of shape "
+            f"({len(states)}, n)"
         )

@@ -184,14 +184,14 @@ def test_after_an_exception_a_row_keeps_the_cost_of_its_own_policy(
 ) -> None:
     """The interrupted trial has decayed the pheromone: not the policy of the row."""
     agent = make(ACL, local_decay=0.9)
-    step, kept = agent.rollout.step, []
+    move, kept = agent.rollout.move, []
 
     def breaking(actions: np.ndarray) -> Any:
         if agent.trials == 2 and agent.rollout.steps == 15:
             raise RuntimeError("half-way through the third trial")
-        return step(actions)
+        return move(actions)
 
-    monkeypatch.setattr(agent.rollout, "step", breaking)
+    monkeypatch.setattr(agent.rollout, "move", breaking)
     evaluation = PolicyEvaluation(pendulums(), STATES, every=every, max_steps=25)
     keep = lambda agent, row: kept.append(agent.policy.copy())  # noqa: E731
     with pytest.raises(RuntimeError, match="half-way"):

@@ -7,6 +7,7 @@ from functools import partial
 from typing import Any
 
 import numpy as np
+from numba import types
 from numba.core.dispatcher import Dispatcher
 from numba.core.errors import NumbaError
 
@@ -104,8 +105,10 @@ class Equations:
         put = kernels.put_sequence
         if isinstance(given, tuple):
             put = kernels.put_tuple
-        make = kernels.advance_map if self._discrete_time else kernels.advance_ode
-        return make(self._dynamics, len(states), put)
+        if self._discrete_time:
+            return kernels.advance_map(self._dynamics, len(states), put)
+        writes = _may_write(self._dynamics)
+        return kernels.advance_ode(self._dynamics, len(states), put, writes)
 
     def _check_compiled(self, samples: FloatArray, inputs: FloatArray) -> None:
         """Check a function that takes one state after the other."""
@@ -145,6 +148,16 @@ class Equations:
 def sample_count() -> int:
     """How many states equations are tried on."""
     return _SAMPLES
+
+
+def _may_write(dynamics: Dispatcher) -> bool:
+    """Whether a compiled function may write to its arguments: read-only ones tell."""
+    read_only = types.Array(types.float64, 1, "C", readonly=True)
+    try:
+        dynamics.compile((read_only, read_only))
+    except (NumbaError, RuntimeError):  # the latter where its types are fixed
+        return True
+    return False
 
 
 def _expects(size: int, n_inputs: int) -> str:

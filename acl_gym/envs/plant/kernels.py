@@ -40,17 +40,16 @@ def put_sequence(values: Any, out: FloatArray) -> None:
 
 
 @lru_cache(maxsize=64)  # copies of an environment share what was compiled
-def advance_ode(dynamics: Any, size: int, put: Any) -> Advance:
+def advance_ode(dynamics: Any, size: int, put: Any, writes: bool) -> Advance:
     """Fourth-order Runge-Kutta around a compiled x' = f(x, u), the input held constant.
-
-    The function gets copies of state and input, fresh ones in each call: it may use them
-    as variables of its own.
 
     Args:
         dynamics: compiled by Numba; takes the state `(size,)` and the input
             `(n_inputs,)` of one slot.
         size: the number of state variables.
         put: `put_tuple` or `put_sequence`, for what `dynamics` returns.
+        writes: whether `dynamics` may write to its arguments. It then gets fresh copies
+            in each call, which take a sixth of the time of a simple plant.
     """
 
     @njit(error_model="numpy")
@@ -64,32 +63,39 @@ def advance_ode(dynamics: Any, size: int, put: Any) -> Advance:
         x, y = np.empty(size), np.empty(size)
         k1, k2, k3, k4 = np.empty(size), np.empty(size), np.empty(size), np.empty(size)
         n_inputs = inputs.shape[1]
-        u = np.empty(n_inputs)
+        own = np.empty(n_inputs)
         bad = -1
         for slot in range(actions.size):
             action = actions[slot]
+            u = own if writes else inputs[action]
             for i in range(size):
                 x[i] = states[i, slot]
             for _ in range(substeps):
-                for i in range(size):
-                    y[i] = x[i]
-                for i in range(n_inputs):
-                    u[i] = inputs[action, i]
-                put(dynamics(y, u), k1)
+                if writes:
+                    for i in range(size):
+                        y[i] = x[i]
+                    for i in range(n_inputs):
+                        u[i] = inputs[action, i]
+                    put(dynamics(y, u), k1)
+                else:
+                    put(dynamics(x, u), k1)
                 for i in range(size):
                     y[i] = x[i] + 0.5 * step * k1[i]
-                for i in range(n_inputs):
-                    u[i] = inputs[action, i]
+                if writes:
+                    for i in range(n_inputs):
+                        u[i] = inputs[action, i]
                 put(dynamics(y, u), k2)
                 for i in range(size):
                     y[i] = x[i] + 0.5 * step * k2[i]
-                for i in range(n_inputs):
-                    u[i] = inputs[action, i]
+                if writes:
+                    for i in range(n_inputs):
+                        u[i] = inputs[action, i]
                 put(dynamics(y, u), k3)
                 for i in range(size):
                     y[i] = x[i] + step * k3[i]
-                for i in range(n_inputs):
-                    u[i] = inputs[action, i]
+                if writes:
+                    for i in range(n_inputs):
+                        u[i] = inputs[action, i]
                 put(dynamics(y, u), k4)
                 for i in range(size):
                     x[i] += step / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i])

@@ -163,8 +163,8 @@ class VectorEnvAdapter(VecEnv):
             {key: row[key] for key in row if key not in _FINAL_KEYS}
             for row in _infos_per_slot(infos, n)
         ]
-        batched = received.infos(infos, n)
         if slots and self._resets_itself:
+            batched = received.infos(infos, n)
             if "final_obs" not in batched:
                 raise ValueError(
                     "infos['final_obs'] must hold the last observation of each slot "

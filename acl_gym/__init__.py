@@ -7,6 +7,7 @@ pheromone over (state, action) pairs (J. M. van Ast, Delft, 2010).
 from __future__ import annotations
 
 from importlib import import_module
+from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
 from acl_gym.envs import register_environments
@@ -152,6 +153,10 @@ __all__ = [
     "set_num_threads",
     "value_iteration",
 ]
+
+# The one name that needs it; without it, `from acl_gym import *` imports the others.
+if find_spec("stable_baselines3") is None:
+    __all__.remove("VectorEnvAdapter")
 
 register_environments()
 

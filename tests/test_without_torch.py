@@ -13,13 +13,15 @@ from tests.test_readme import BLOCKS
 
 ABSENT = """
 import sys
+from importlib.machinery import PathFinder
 
-class Absent:
-    def find_spec(self, name, path=None, target=None):
-        if name.partition(".")[0] in ("torch", "stable_baselines3"):
-            raise ModuleNotFoundError(f"No module named {name!r}", name=name)
+installed = PathFinder.find_spec
 
-sys.meta_path.insert(0, Absent())
+def find_spec(name, path=None, target=None):
+    absent = name.partition(".")[0] in ("torch", "stable_baselines3")
+    return None if absent else installed(name, path, target)
+
+PathFinder.find_spec = find_spec
 """
 LOADED = """
 import sys
@@ -95,6 +97,31 @@ def test_the_shell_trains_and_evaluates_with_neither(
 ) -> None:
     done = run(setting + TRAIN + LOADED, tmp_path)
     assert done.returncode == 0, done.stderr
+
+
+def test_a_star_imports_what_works_without_them(tmp_path: Path) -> None:
+    done = run(ABSENT + "from acl_gym import *\nprint(ACL, plant)", tmp_path)
+    assert done.returncode == 0, done.stderr
+
+
+COMPARE = """
+from acl_gym.cli import main
+sys.argv = ["acl-gym", "compare", *{}]
+main()
+"""
+
+
+@pytest.mark.parametrize(
+    ("options", "remedy"),
+    [([], ", or leave it out: --agents acl-fuzzy,"), (["--agents", "dqn"], ".")],
+)
+def test_a_comparison_with_dqn_is_refused_before_it_starts(
+    options: list[str], remedy: str, tmp_path: Path
+) -> None:
+    done = run(ABSENT + COMPARE.format(options), tmp_path)
+    assert done.returncode == 2
+    assert "run `pip install stable-baselines3 torch`" + remedy in done.stderr
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize(

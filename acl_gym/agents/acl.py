@@ -168,7 +168,7 @@ class ACL(TabularAgent):
         if tabu and self.partition.cells_per_state > 1:
             raise ValueError(
                 "tabu needs a partition with one cell per state, such as Crisp or "
-                f"Discrete, got {self.partition!r}; leave tabu out."
+                f"Discrete, got {validation.shown(self.partition)}; leave tabu out."
             )
         self.tabu = tabu
         shape = self.partition.n_cells, self.n_actions

@@ -191,7 +191,8 @@ class SavedAgent(PartitionPolicy):
         """
         if not isinstance(self.metadata, dict):
             raise TypeError(
-                f"metadata must be a dict, got {self.metadata!r:.80}; put it under a "
+                "metadata must be a dict, got "
+                f"{validation.shown(self.metadata)}; put it under a "
                 "key."
             )
         notes: dict[str, Any] = to_json(self.metadata, "metadata")
@@ -307,7 +308,9 @@ class SavedAgent(PartitionPolicy):
         self._ranks = ranks.astype(np.int32)
         first_action = header["first_action"]
         if not isinstance(first_action, int):
-            raise TypeError(f"first_action must be an integer, got {first_action!r}")
+            raise TypeError(
+                f"first_action must be an integer, got {validation.shown(first_action)}"
+            )
         self.first_action = first_action
         for name in ("num_timesteps", "trials"):
             count = validation.integer(name, header[name], at_least=0, at_most=2**62)
@@ -319,7 +322,9 @@ class SavedAgent(PartitionPolicy):
         self.history = history
         metadata = from_json(header.get("metadata", {}))  # older files have none
         if not isinstance(metadata, dict):
-            raise TypeError(f"metadata must be a dict, got {metadata!r:.80}")
+            raise TypeError(
+                f"metadata must be a dict, got {validation.shown(metadata)}"
+            )
         self.metadata = metadata
         generators = (self.rng, self._predict_rng)
         for rng, state in zip(generators, header["generators"], strict=True):

@@ -80,8 +80,15 @@ def is_stop(result: Any) -> bool:
     return isinstance(result, (bool, np.bool_)) and not result
 
 
-def as_callbacks(callback: Callbacks) -> list[Callback]:
+_DEEPEST = 10  # lists within lists of callbacks; one that holds itself has no end
+
+
+def as_callbacks(callback: Callbacks, depth: int = 0) -> list[Callback]:
     """Turn every accepted form of `callback` into a list of `Callback` objects.
+
+    Args:
+        callback: None, one callback or a collection of them.
+        depth: number of collections around it.
 
     Raises:
         TypeError: an element is neither a `Callback` nor callable.
@@ -92,8 +99,9 @@ def as_callbacks(callback: Callbacks) -> list[Callback]:
         return [callback]
     if callable(callback) and not isinstance(callback, type):
         return [_FunctionCallback(callback)]
-    if isinstance(callback, Iterable) and not isinstance(callback, str):
-        return [one for each in callback for one in as_callbacks(each)]
+    several = validation.elements(callback)
+    if several is not None and depth < _DEEPEST:
+        return [one for each in several for one in as_callbacks(each, depth + 1)]
     raise TypeError(
         "callback must be a Callback object, a function of (agent, row) or a list of "
         f"those, got {validation.shown(callback)}."

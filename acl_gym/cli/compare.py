@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -10,6 +11,7 @@ import typer
 from acl_gym.cli.common import DebugOption, JsonOption, check_name, console
 from acl_gym.cli.environments import Environment
 from acl_gym.cli.errors import (
+    BadArgumentError,
     Command,
     InterruptedRunError,
     bad_arguments,
@@ -167,6 +169,7 @@ def compare(
         for name in wanted:
             check_name(f"--agents for {env}", name, names)
         names = list(dict.fromkeys(wanted))
+    _check_packages(names)
     terminal = console(stderr=as_json)
     try:
         found = run_comparison(
@@ -188,6 +191,18 @@ def compare(
     terminal.print(f"\nReport: {out / 'report.html'}\nResults: {out / 'results.json'}")
     if as_json:
         typer.echo((out / "results.json").read_text(encoding="utf-8"))
+
+
+def _check_packages(names: list[str]) -> None:
+    """Refuse DQN before any run where what it needs is not installed."""
+    if "dqn" not in names or all(map(find_spec, ("stable_baselines3", "torch"))):
+        return
+    others = ",".join(name for name in names if name != "dqn")
+    without = f", or leave it out: --agents {others}" if others else ""
+    raise BadArgumentError(
+        "the agent dqn needs Stable-Baselines3 and torch, which are not installed; run "
+        f"`pip install stable-baselines3 torch`{without}."
+    )
 
 
 def _foreign(env_id: str) -> System:

@@ -393,7 +393,7 @@ def cost_from_settings(settings: Any) -> Cost | None:
     """
     cost = from_settings("cost", settings, _KINDS, MissingCost)
     if cost is not None and not isinstance(cost, Cost):
-        raise ValueError(f"cost must be a Cost, got {settings!r:.200}.")
+        raise ValueError(f"cost must be a Cost, got {validation.shown(settings)}.")
     return cost
 
 
@@ -412,7 +412,8 @@ def _check_costs(name: str, costs: Any) -> None:
     for cost in costs if isinstance(costs, (tuple, list)) else (costs,):
         if not isinstance(cost, Cost):
             raise TypeError(
-                f"{name} must be made of Costs such as Steps(), got {validation.shown(cost)}; make "
+                f"{name} must be made of Costs such as Steps(), got "
+                f"{validation.shown(cost)}; make "
                 "a Cost of a function with FunctionCost(function)."
             )
 

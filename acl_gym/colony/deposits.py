@@ -183,7 +183,8 @@ def as_deposit(deposit: str | Deposit | Function) -> Deposit:
         return FunctionDeposit(deposit)
     raise TypeError(
         f"deposit must be one of {', '.join(map(repr, NAMED))}, a Deposit such as "
-        f"InverseCost(offset=20), or a function of the costs, got {validation.shown(deposit)}."
+        "InverseCost(offset=20), or a function of the costs, got "
+        f"{validation.shown(deposit)}."
     )
 
 
@@ -196,5 +197,7 @@ def deposit_from_settings(settings: Any) -> Deposit:
     kinds = (InverseCost, Return, Rank, FunctionDeposit)
     deposit = from_settings("deposit", settings, kinds, MissingDeposit)
     if not isinstance(deposit, Deposit):
-        raise ValueError(f"deposit must be a Deposit, got {settings!r:.200}.")
+        raise ValueError(
+            f"deposit must be a Deposit, got {validation.shown(settings)}."
+        )
     return deposit

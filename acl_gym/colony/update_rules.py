@@ -331,5 +331,7 @@ def update_from_settings(settings: Any) -> UpdateRule:
     kinds = [type(each) for each in UPDATE_RULES.values()]
     rule = from_settings("update", settings, kinds, MissingRule)
     if not isinstance(rule, UpdateRule):
-        raise ValueError(f"update must be an UpdateRule, got {settings!r:.200}.")
+        raise ValueError(
+            f"update must be an UpdateRule, got {validation.shown(settings)}."
+        )
     return rule

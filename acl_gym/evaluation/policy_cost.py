@@ -140,11 +140,7 @@ def evaluate_policy_cost(
     require_vector_env(env)
     base = env.unwrapped
     if states is not None:
-        states = validation.real_array("states", states)
-        if states.ndim == 0:
-            raise ValueError(
-                f"states must hold one row for each episode, got {states}; pass [state]."
-            )
+        states = _rows(states)
     if isinstance(base, ControlVectorEnv):
         if states is None:
             states = base.system.evaluation_states()
@@ -176,6 +172,17 @@ def evaluate_policy_cost(
         costs = solution_costs(episode_cost, rollout.episodes())
     rollout.release()
     return PolicyCost(costs, rollout.success, rollout.length, -rollout.cost)
+
+
+def _rows(states: Any) -> FloatArray:
+    """Return states, one row for each episode."""
+    rows = validation.real_array("states", states)
+    if rows.ndim == 0:
+        raise ValueError(
+            "states must hold one row for each episode, got "
+            f"{validation.shown(states)}; pass [state]."
+        )
+    return rows
 
 
 def with_slots_for(
@@ -383,7 +390,7 @@ def actions_in(
     """
     require_predictor(model)
     control_env(env)
-    states = validation.real_array("states", states)
+    states = _rows(states)
     env = with_slots_for(env, states)
     observation, _ = env.reset(options={"state": states})
     space: Any = env.single_action_space

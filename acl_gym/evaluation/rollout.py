@@ -109,7 +109,10 @@ class Rollout:
                     "wrap each single environment in "
                     "gymnasium.wrappers.DiscretizeAction(env, bins=5)"
                 )
-            raise ValueError(f"env must have Discrete actions, got {space}; {remedy}.")
+            raise ValueError(
+                "env must have Discrete actions, got "
+                f"{validation.shown(space)}; {remedy}."
+            )
         self.env = env
         self.max_steps = validation.integer("max_steps", max_steps, at_least=1)
         self.n_actions = int(space.n)
@@ -251,12 +254,17 @@ class Rollout:
             self._check_idle("step")
         ants, native = self._ants, self._native
         m = ants.size
+        passed: Any = actions
         if type(actions) is not np.ndarray:
-            actions = np.asarray(actions)
-        if actions.shape != ants.shape or actions.dtype.kind not in "iu":
+            actions = validation.as_array(passed)  # type: ignore[assignment]
+        if (
+            actions is None
+            or actions.shape != ants.shape
+            or actions.dtype.kind not in "iu"
+        ):
             raise ValueError(
                 f"actions must be integers of shape ({m},), one for each ant that "
-                f"walks, got {actions.dtype} in shape {actions.shape}."
+                f"walks, got {validation.shown(passed)}."
             )
         if actions.dtype is not _INT:
             actions = actions.astype(np.int64, copy=False)
@@ -488,6 +496,7 @@ def _require_array(observation: Any) -> None:
     if not isinstance(observation, np.ndarray):
         raise ValueError(
             "a cost of complete solutions needs observations that are arrays, got "
+            ""
             f"{validation.shown(observation)}; leave the cost out, or flatten them with "
             "gymnasium.wrappers.vector.FlattenObservation."
         )

@@ -52,7 +52,8 @@ def thesis_partition(
     system = system_of(env)
     if system is None:
         raise TypeError(
-            f"env must be a control environment of this package, got {env}; use "
+            "env must be a control environment of this package, got "
+            f"{validation.shown(env)}; use "
             "automatic_partition(env) for others."
         )
     if isinstance(space, FINITE_SPACES):
@@ -141,7 +142,8 @@ def automatic_partition(
         if cells is not None or bounds is not None:
             raise ValueError(
                 "cells and bounds must be None where observations are cells already, "
-                f"got cells={validation.shown(cells)} and bounds={validation.shown(bounds)} for {space}."
+                "got cells="
+                f"{validation.shown(cells)} and bounds={validation.shown(bounds)} for {space}."
             )
         return Discrete.from_space(space)
     box = real_box(space)

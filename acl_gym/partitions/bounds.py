@@ -138,7 +138,8 @@ def complete_bounds(
         variables = ", ".join(str(axis) for axis in unbounded)
         example = ", ".join(f"{axis}: (low, high)" for axis in unbounded)
         raise ValueError(
-            f"observations must be bounded, got {space} without bounds for variables "
+            "observations must be bounded, got "
+            f"{validation.shown(space)} without bounds for variables "
             f"{variables}; give them, automatic_partition(env, bounds={{{example}}}), "
             "or estimate them, automatic_partition(env, random_steps=10_000)."
         )
@@ -176,7 +177,8 @@ def _checked_bounds(
         ends = validation.real_array(f"bounds[{axis}]", pair, ndim=1)
         if ends.size != 2 or ends[0] >= ends[1]:
             raise ValueError(
-                f"bounds[{axis}] must be (low, high) with low < high, got {validation.shown(pair)}."
+                f"bounds[{axis}] must be (low, high) with low < high, got "
+                f"{validation.shown(pair)}."
             )
         pairs[int(axis)] = (float(ends[0]), float(ends[1]))
     return pairs

@@ -112,7 +112,7 @@ class Discrete(FixedPartition):
                 return
         raise ValueError(
             f"{self!r} takes observations from a finite space of these sizes and "
-            f"starts, got {space}{remedy}"
+            f"starts, got {validation.shown(space)}{remedy}"
         )
 
     def _fill(
@@ -189,7 +189,8 @@ def _sizes_and_starts(space: spaces.Space[Any]) -> tuple[ArrayLike, ArrayLike]:
     if isinstance(space, spaces.MultiBinary):
         return np.full(space.shape, 2), 0
     raise ValueError(
-        f"space must be Discrete, MultiDiscrete or MultiBinary, got {space}; for a "
+        "space must be Discrete, MultiDiscrete or MultiBinary, got "
+        f"{validation.shown(space)}; for a "
         "Box take Crisp or Fuzzy."
     )
 

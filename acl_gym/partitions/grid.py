@@ -61,14 +61,13 @@ class Grid(FixedPartition):
         centres: Sequence[ArrayLike],
         periods: Sequence[float | None] | None = None,
     ) -> None:
-        if not isinstance(centres, Iterable) or (
-            isinstance(centres, np.ndarray) and centres.ndim == 1
-        ):
+        given = validation.elements(centres)
+        if given is None or (isinstance(centres, np.ndarray) and centres.ndim == 1):
             raise ValueError(
                 "centres must be one sequence for each state variable, got "
                 f"{validation.shown(centres)}; pass [sequence] for a single variable."
             )
-        axes = [_checked_centres(axis, values) for axis, values in enumerate(centres)]
+        axes = [_checked_centres(axis, values) for axis, values in enumerate(given)]
         if not axes:
             raise ValueError("centres must hold one or more state variables, got none.")
         lengths = _checked_periods(periods, axes)
@@ -129,26 +128,28 @@ class Grid(FixedPartition):
                 `circular` do not fit it.
         """
         if not isinstance(space, spaces.Box) or len(space.shape) != 1:
-            raise ValueError(f"space must be a one-dimensional Box, got {space}.")
+            raise ValueError(
+                f"space must be a one-dimensional Box, got {validation.shown(space)}."
+            )
         low, high = declared_bounds(space)
         if not (np.isfinite(low) & np.isfinite(high)).all():
             raise ValueError(
-                f"space must be bounded in every variable, got {space}; "
+                "space must be bounded in every variable, got "
+                f"{validation.shown(space)}; "
                 "give the centres of an unbounded variable yourself."
             )
-        counts: list[Any] = []
         if isinstance(cells, Integral):
             counts = [cells] * low.size
-        elif isinstance(cells, Iterable) and not (
-            isinstance(cells, np.ndarray) and cells.ndim == 0
-        ):
-            counts = list(cells)
+        else:
+            counts = validation.elements(cells) or []
         if len(counts) != low.size:
             raise ValueError(
                 f"cells must be an int or {low.size} ints, one a variable, "
                 f"got {validation.shown(cells)}."
             )
-        round_axes = list(circular) if isinstance(circular, Iterable) else [None]
+        round_axes = validation.elements(circular)
+        if round_axes is None:
+            round_axes = [None]  # which is refused
         for axis in round_axes:
             whole = isinstance(axis, Integral) and not isinstance(axis, bool)
             if not whole or not 0 <= axis < low.size:
@@ -176,7 +177,8 @@ class Grid(FixedPartition):
         if not isinstance(space, spaces.Box) or space.shape != (dimensions,):
             raise ValueError(
                 f"{self!r} takes observations from a Box of shape ({dimensions},), "
-                f"got {validation.shown(space)}; build the partition from env.single_observation_space, "
+                "got "
+                f"{validation.shown(space)}; build the partition from env.single_observation_space, "
                 "or let automatic_partition(env) do it."
             )
 

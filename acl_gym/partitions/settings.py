@@ -168,7 +168,8 @@ def given_partition(partition: Any, saved: Partition) -> Partition:
     """
     if not isinstance(partition, Partition):
         raise TypeError(
-            f"partition must be a Partition such as Crisp or Fuzzy, got {partition!r:.80}."
+            "partition must be a Partition such as Crisp or Fuzzy, got "
+            f"{validation.shown(partition)}."
         )
     if partition.n_cells != saved.n_cells:
         raise ValueError(

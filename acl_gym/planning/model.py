@@ -46,17 +46,13 @@ class TabularModel:
     def __post_init__(self) -> None:
         probability = validation.real_array("probability", self.probability, ndim=3)
         reward = validation.real_array("reward", self.reward, ndim=3)
-        next_state, terminated = np.array(self.next_state), np.array(self.terminated)
-        for name, array, kind, wanted in (
-            ("next_state", next_state, "iu", "integers"),
-            ("reward", reward, "f", "numbers"),
-            ("terminated", terminated, "b", "bools"),
-        ):
-            if array.shape != probability.shape or array.dtype.kind not in kind:
-                raise ValueError(
-                    f"{name} must hold {wanted} in the shape of probability, "
-                    f"{probability.shape}, got {array.dtype} in {array.shape}."
-                )
+        next_state = self._like(probability, "next_state", "iu", "integers")
+        terminated = self._like(probability, "terminated", "b", "bools")
+        if reward.shape != probability.shape:
+            raise ValueError(
+                f"reward must have the shape of probability, {probability.shape}, got "
+                f"{reward.shape}."
+            )
         total = probability.sum(axis=2)
         wrong = (probability < 0).any(axis=2) | ~np.isclose(total, 1, rtol=0, atol=1e-9)
         if wrong.any():
@@ -76,11 +72,28 @@ class TabularModel:
             "probability": probability,
             "next_state": next_state.astype(np.int64),
             "reward": reward,
-            "terminated": terminated,
+            "terminated": terminated.copy(),
         }
         for name, kept in arrays.items():
             kept.flags.writeable = False
             object.__setattr__(self, name, kept)
+
+    def _like(
+        self, probability: FloatArray, name: str, kinds: str, wanted: str
+    ) -> NDArray[Any]:
+        """Check an argument before it is copied; a view may stand for far more."""
+        array = validation.as_array(getattr(self, name))
+        if (
+            array is not None
+            and array.shape == probability.shape
+            and array.dtype.kind in kinds
+        ):
+            return array
+        got = f"{array.dtype} in {array.shape}" if array is not None else "no array"
+        raise ValueError(
+            f"{name} must hold {wanted} in the shape of probability, "
+            f"{probability.shape}, got {got}."
+        )
 
     @property
     def n_states(self) -> int:

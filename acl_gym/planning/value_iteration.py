@@ -26,6 +26,7 @@ from acl_gym.planning.sweeps import (
     sweep_until_converged,
 )
 from acl_gym.policies import TablePolicy
+from acl_gym.utils import validation
 from acl_gym.utils.compiling import njit
 from acl_gym.utils.typing import BoolArray, FloatArray, IntArray
 
@@ -161,12 +162,12 @@ def policy_value(
     if not isinstance(model, TabularModel):
         model = TabularModel.from_env(model)
     discount = checked_discount(discount)
-    actions = np.asarray(policy_actions)
+    actions = validation.as_array(policy_actions)
     n = model.n_states
-    if actions.shape != (n,) or actions.dtype.kind not in "iu":
+    if actions is None or actions.shape != (n,) or actions.dtype.kind not in "iu":
         raise ValueError(
-            f"policy_actions must be {n} integers, one per state, got {actions.dtype} "
-            f"in shape {actions.shape}."
+            f"policy_actions must be {n} integers, one per state, got "
+            f"{validation.shown(policy_actions)}."
         )
     if actions.min() < 0 or actions.max() >= model.n_actions:
         raise ValueError(

@@ -80,7 +80,7 @@ def animate(
     if not isinstance(agent, TabularAgent):
         raise TypeError(
             "agent must be an agent that learns a table, such as ACL or QLearning, got "
-            f"{agent!r:.80}; plot_policy draws policies."
+            f"{validation.shown(agent)}; plot_policy draws policies."
         )
     target = None if path is None else _checked_path(path)
     seconds = validation.number("seconds", seconds, above=0)
@@ -221,13 +221,16 @@ def _checked_trials(agent: TabularAgent, trials: Any) -> list[int]:
     if trials is None:
         return [agent.trials] if agent.trials else list(SHOWN)
     if isinstance(trials, str) or not isinstance(trials, (Sequence, np.ndarray)):
-        raise TypeError(f"trials must be a list of integers, got {trials!r}.")
+        raise TypeError(
+            f"trials must be a list of integers, got {validation.shown(trials)}."
+        )
     checked = [
         validation.integer(f"trials[{i}]", trial, at_least=agent.trials)
         for i, trial in enumerate(trials)
     ]
     if not checked or any(b <= a for a, b in itertools.pairwise(checked)):
         raise ValueError(
-            f"trials must be one integer or more, increasing, got {trials!r}."
+            "trials must be one integer or more, increasing, got "
+            f"{validation.shown(trials)}."
         )
     return checked

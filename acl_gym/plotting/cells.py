@@ -17,6 +17,7 @@ from acl_gym.envs.grid_search.system import GridSearch
 from acl_gym.planning.value_iteration import value_iteration
 from acl_gym.plotting import grid_search, palettes, style
 from acl_gym.plotting.subject import Subject
+from acl_gym.utils import validation
 from acl_gym.utils.typing import BoolArray, FloatArray, IntArray
 
 MOVES = {
@@ -81,7 +82,8 @@ def refuse_shape(shape: Any) -> None:
     """
     if shape is not None:
         raise ValueError(
-            f"shape is for states that are one number, got {shape!r}; leave it out, "
+            "shape is for states that are one number, got "
+            f"{validation.shown(shape)}; leave it out, "
             "and choose what is drawn by axes and slice."
         )
 
@@ -249,7 +251,7 @@ def _checked_shape(shape: Any, count: int) -> tuple[int, int]:
     if not whole or shape[0] * shape[1] < count:
         raise ValueError(
             f"shape must be two integers >= 1, rows and columns that hold {count} "
-            f"states, got {shape!r}."
+            f"states, got {validation.shown(shape)}."
         )
     return int(shape[0]), int(shape[1])
 

@@ -193,7 +193,7 @@ def _histories(value: Any) -> list[pd.DataFrame]:
             if not listed or not all(isinstance(row, Mapping) for row in rows):
                 raise TypeError(
                     "runs must be agents or their histories, a list of those, or a "
-                    f"dict from names to those, got {run!r:.80}."
+                    f"dict from names to those, got {validation.shown(run)}."
                 )
             rows = pd.DataFrame(list(rows))
         if not len(rows):

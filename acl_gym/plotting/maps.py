@@ -14,6 +14,7 @@ from acl_gym.envs.pendulum.system import Pendulum
 from acl_gym.plotting import cells, navigation, palettes, style
 from acl_gym.plotting.plane import Key, Plane, plane_of
 from acl_gym.plotting.subject import Labels, Subject, subject_of
+from acl_gym.utils import validation
 from acl_gym.utils.typing import FloatArray
 
 _GOAL: dict[str, Any] = {
@@ -201,7 +202,7 @@ def _column(subject: Subject, action: Any) -> int:
     last = subject.first_action + subject.n_actions - 1
     raise ValueError(
         f"action must be a number {subject.first_action}..{last} or one of "
-        f"{', '.join(map(repr, subject.actions))}, got {action!r}."
+        f"{', '.join(map(repr, subject.actions))}, got {validation.shown(action)}."
     )
 
 

@@ -97,7 +97,8 @@ def norm_of(values: FloatArray, limits: tuple[float, float] | None = None) -> No
         given = validation.real_array("limits", limits, ndim=1)
         if given.size != 2 or not given[0] < given[1]:
             raise ValueError(
-                f"limits must be the lowest and the highest level, got {limits!r}."
+                "limits must be the lowest and the highest level, got "
+                f"{validation.shown(limits)}."
             )
         low, high = given.tolist()
     if low > 0.0:

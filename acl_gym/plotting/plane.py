@@ -112,7 +112,7 @@ def plane_of(
     if not isinstance(slice, Mapping | None):
         raise TypeError(
             "slice must be a dict from state variables to values, such as "
-            f"{{{variables[-1].symbol!r}: 0.0}}, got {slice!r}."
+            f"{{{variables[-1].symbol!r}: 0.0}}, got {validation.shown(slice)}."
         )
     given = {
         number_of(variables, key): _within(variables, key, value)
@@ -124,7 +124,8 @@ def plane_of(
     else:
         if isinstance(axes, str) or not isinstance(axes, Sequence):
             raise TypeError(
-                f"axes must be one or two state variables, got {axes!r}; name them in "
+                "axes must be one or two state variables, got "
+                f"{validation.shown(axes)}; name them in "
                 "a tuple."
             )
         shown = [number_of(variables, key) for key in axes]
@@ -156,7 +157,7 @@ def number_of(variables: Sequence[Variable], key: Any) -> int:
     if len(found) != 1:
         raise ValueError(
             f"a state variable must be one of {_names(variables)} or a number "
-            f"0..{len(variables) - 1}, got {key!r}."
+            f"0..{len(variables) - 1}, got {validation.shown(key)}."
         )
     return found[0]
 

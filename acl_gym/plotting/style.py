@@ -12,7 +12,7 @@ import io
 import math
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from pathlib import Path
+from importlib.resources import as_file, files
 from typing import Any
 
 import matplotlib as mpl
@@ -29,12 +29,17 @@ from matplotlib.ticker import (
     NullFormatter,
 )
 
+from acl_gym.utils import validation
 from acl_gym.utils.pictures import inline_png
 from acl_gym.utils.typing import FloatArray
 
-in_style = functools.partial(
-    mpl.rc_context, fname=Path(__file__).with_name("acl_gym.mplstyle")
-)
+
+def _style() -> Any:
+    with as_file(files("acl_gym.plotting") / "acl_gym.mplstyle") as path:
+        return mpl.rc_params_from_file(path, use_default_template=False)
+
+
+in_style = functools.partial(mpl.rc_context, _style())
 """Makes a context in which figures have this style; it decorates functions as well."""
 
 WIDTH = 7.2
@@ -97,7 +102,8 @@ def checked_axes(ax: Any) -> Axes:
     """
     if not isinstance(ax, Axes):
         raise TypeError(
-            f"ax must be Matplotlib axes or None, got {ax!r:.80}; make some with "
+            "ax must be Matplotlib axes or None, got "
+            f"{validation.shown(ax)}; make some with "
             "figure, ax = plt.subplots()."
         )
     return ax

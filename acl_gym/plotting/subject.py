@@ -20,6 +20,7 @@ from acl_gym.envs.grid_search.system import GridSearch
 from acl_gym.partitions import Discrete, Grid, Partition
 from acl_gym.plotting.style import GREEK
 from acl_gym.policies import PartitionPolicy, SoftPolicy, TablePolicy
+from acl_gym.utils import validation
 from acl_gym.utils.typing import FloatArray, IntArray
 
 _BATCH = 20_000
@@ -221,7 +222,7 @@ def _policy_of(agent: Any, env: Any) -> tuple[Any, Partition | None, FloatArray 
     if isinstance(agent, type) or not predicts:
         raise TypeError(
             "agent must be an agent or a policy, such as ACL, QLearning or "
-            f"agent.policy, got {agent!r:.80}."
+            f"agent.policy, got {validation.shown(agent)}."
         )
     if _space(env, "observation_space") is None:
         raise TypeError(
@@ -238,7 +239,8 @@ def _space(env: Any, name: str) -> Any:
     space = getattr(env, f"single_{name}", None) or getattr(env, name, None)
     if not isinstance(space, spaces.Space):
         raise TypeError(
-            f"env must be a Gymnasium environment, single or vector, got {env!r:.80}."
+            "env must be a Gymnasium environment, single or vector, got "
+            f"{validation.shown(env)}."
         )
     return space
 
@@ -249,7 +251,10 @@ def _actions(policy: Any, env: Any) -> tuple[int, int]:
         return policy.first_action, policy.n_actions
     space = _space(env, "action_space")
     if not isinstance(space, spaces.Discrete):
-        raise ValueError(f"env must have Discrete actions to be drawn, got {space}.")
+        raise ValueError(
+            "env must have Discrete actions to be drawn, got "
+            f"{validation.shown(space)}."
+        )
     return int(space.start), int(space.n)
 
 
@@ -278,7 +283,8 @@ def _action_names(
         names = tuple(given) if not isinstance(given, str) else ()
         if len(names) != count or not all(isinstance(name, str) for name in names):
             raise ValueError(
-                f"actions must be {count} names, one for each action, got {given!r}."
+                f"actions must be {count} names, one for each action, got "
+                f"{validation.shown(given)}."
             )
         return names
     if isinstance(system, GridSearch) and len(system.directions) == count:
@@ -337,7 +343,7 @@ def _labels(labels: Labels, signals: Signals | None, count: int) -> list[str]:
     if not fits or (len(given) != count and not isinstance(labels, Mapping)):
         raise ValueError(
             f"labels must be {count} names, one for each state variable, or a dict "
-            f"from numbers 0..{count - 1} to names, got {labels!r}."
+            f"from numbers 0..{count - 1} to names, got {validation.shown(labels)}."
         )
     return [given.get(i, name) for i, name in enumerate(names)]
 

@@ -97,7 +97,9 @@ def plot_trajectory(
     if kind == "plane":
         return _plot_path(subject, path, ax, axes)
     if axes is not None:
-        raise ValueError(f'axes are for kind="plane", got {axes!r}; leave them out.')
+        raise ValueError(
+            f'axes are for kind="plane", got {validation.shown(axes)}; leave them out.'
+        )
     return _plot_over_time(subject, path, ax)
 
 

@@ -10,6 +10,7 @@ from gymnasium.vector import AsyncVectorEnv, AutoresetMode, SyncVectorEnv, Vecto
 
 from acl_gym.envs import received
 from acl_gym.envs.control.environments import ControlVectorEnv
+from acl_gym.utils import validation
 
 _SUPPORTED_MODES = (AutoresetMode.DISABLED, AutoresetMode.SAME_STEP)
 _ARRAY_SPACES = (
@@ -65,7 +66,8 @@ def check_action_space(space: spaces.Space[Any]) -> None:
     if not isinstance(space, _ARRAY_SPACES):
         raise ValueError(
             "actions must be a Box, Discrete, MultiDiscrete or MultiBinary, since a "
-            f"VecEnv takes them as one array with a row for each slot, got {space}; "
+            "VecEnv takes them as one array with a row for each slot, got "
+            f"{validation.shown(space)}; "
             "rearrange them in each single environment with gymnasium's "
             "TransformAction."
         )
@@ -92,6 +94,7 @@ def _check_start(what: str, space: spaces.Space[Any]) -> None:
     """Stable-Baselines3 assumes that discrete values start from 0."""
     if np.any(getattr(space, "start", 0)):
         raise ValueError(
-            f"{what} must start from 0, got {space}; shift them with gymnasium's "
+            f"{what} must start from 0, got "
+            f"{validation.shown(space)}; shift them with gymnasium's "
             f"{'TransformAction' if what == 'actions' else 'TransformObservation'}."
         )

@@ -16,6 +16,8 @@ import gymnasium as gym
 from gymnasium.vector import AsyncVectorEnv, VectorEnv
 from stable_baselines3.common.env_util import is_wrapped
 
+from acl_gym.utils import validation
+
 WrapperClass = type[gym.Wrapper[Any, Any, Any, Any]]
 
 _OWN_COMMANDS = ("reset", "step", "close")
@@ -136,7 +138,8 @@ class WorkerEnvs(SlotEnvs):
         if name in _OWN_COMMANDS:
             raise ValueError(
                 f"method_name must be none of {', '.join(_OWN_COMMANDS)}, which workers "
-                f"only take together, got {name!r}; call {name}() of the adapter."
+                "only take together, got "
+                f"{validation.shown(name)}; call {name}() of the adapter."
             )
         self._check_all(name, slots)
         values = self._env.call(name, *args, **kwargs)

@@ -21,6 +21,7 @@ import numpy as np
 from numpy.lib import format as npy
 from numpy.typing import NDArray
 
+from acl_gym.utils import validation
 from acl_gym.utils.files import checked_target, with_suffix, write_atomically
 
 FORMAT = "acl-gym agent"
@@ -245,7 +246,7 @@ def _is_file(doing: str, target: Any, method: str) -> bool:
     if not hasattr(target, method) or isinstance(target, io.TextIOBase):
         raise TypeError(
             f"the place to {doing} must be a path or a file open in binary mode, got "
-            f"{target!r:.80}; pass a path, io.BytesIO(), or a file opened in binary mode."
+            f"{validation.shown(target)}; pass a path, io.BytesIO(), or a file opened in binary mode."
         )
     return True
 

@@ -14,6 +14,8 @@ from typing import Any
 
 import numpy as np
 
+from acl_gym.utils import validation
+
 _FORMER_NAMES = {"OwnCost": "FunctionCost", "OwnDeposit": "FunctionDeposit"}
 """What classes were called in older files."""
 
@@ -171,7 +173,8 @@ def from_settings(
         return stand_in(parameter, str(value.get("name")))
     if not isinstance(kind, str) or kind not in known:
         raise ValueError(
-            f"{parameter} must be one of {sorted(known)}, got {value!r:.200}."
+            f"{parameter} must be one of {sorted(known)}, got "
+            f"{validation.shown(value)}."
         )
     arguments = {
         name: from_settings(parameter, each, kinds, stand_in)
@@ -215,7 +218,8 @@ def to_json(value: Any, where: str, depth: int = 0) -> Any:
             if not isinstance(key, str) or key in (_TUPLE, _ARRAY):
                 raise TypeError(
                     f"the keys of {where} must be text other than {_TUPLE!r} and "
-                    f"{_ARRAY!r} to be saved, got {key!r}; use another key."
+                    f"{_ARRAY!r} to be saved, got "
+                    f"{validation.shown(key)}; use another key."
                 )
         return {k: to_json(v, f"{where}[{k!r}]", depth + 1) for k, v in value.items()}
     if isinstance(value, np.ndarray) and value.dtype.name in _DTYPES:
@@ -227,7 +231,8 @@ def to_json(value: Any, where: str, depth: int = 0) -> Any:
         }
     raise TypeError(
         f"{where} must be numbers, text, None, or lists, arrays and dicts of those to be "
-        f"saved, got {value!r:.80} of type {type(value).__name__}; convert it, for "
+        "saved, got "
+        f"{validation.shown(value)} of type {type(value).__name__}; convert it, for "
         "instance with float() or str()."
     )
 

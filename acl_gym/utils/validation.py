@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import os
 import sys
@@ -16,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 _MANY = 10
+_MOST_ELEMENTS = 1_000_000
 _LONGEST = 200  # letters of a value that a message shows
 
 
@@ -182,6 +184,21 @@ def as_array(values: Any) -> NDArray[Any] | None:
         return np.asarray(values)
     except (TypeError, ValueError, OverflowError):
         return None
+
+
+def elements(values: Any) -> list[Any] | None:
+    """Return the elements of a sequence, set or array; None for anything else.
+
+    Strings are no sequences here, and neither is what has more than a million elements,
+    such as a generator without end.
+    """
+    if isinstance(values, str | bytes):
+        return None
+    try:
+        found = list(itertools.islice(iter(values), _MOST_ELEMENTS + 1))
+    except TypeError:
+        return None
+    return found if len(found) <= _MOST_ELEMENTS else None
 
 
 def path(name: str, value: Any) -> Path:

@@ -196,7 +196,13 @@ def test_callbacks_may_be_nested_and_mixed() -> None:
     assert recorder.events[-1] == "end"
 
 
-@pytest.mark.parametrize("callback", [3, "print", [print, 3], {1: 2}])
+OF_ITSELF: list[Any] = [print]
+OF_ITSELF.append(OF_ITSELF)
+
+
+@pytest.mark.parametrize(
+    "callback", [3, "print", [print, 3], {1: 2}, np.array(3), OF_ITSELF]
+)
 def test_what_is_no_callback_is_refused_at_once(callback: Any) -> None:
     agent = make()
     with pytest.raises(

@@ -356,7 +356,7 @@ GOOD: dict[str, Any] = {
         ("next_state", [[[0, -1]], [[1, 1]]], r"lie in 0\.\.1, got -1 to 1"),
         ("next_state", [[[0.0, 1.0]], [[1.0, 1.0]]], "next_state must hold integers"),
         ("reward", [[[-1, np.inf]], [[0, 0]]], "reward must be an array"),
-        ("reward", [[[-1]], [[0]]], "reward must hold numbers in the shape"),
+        ("reward", [[[-1]], [[0]]], "reward must have the shape of probability"),
         ("terminated", [[[0, 1]], [[1, 1]]], "terminated must hold bools"),
     ],
 )

@@ -8,7 +8,7 @@ import gymnasium as gym
 import numpy as np
 from gymnasium.error import ResetNeeded
 from gymnasium.vector import AutoresetMode
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from acl_gym.envs.control.system import ControlSystem
 from acl_gym.utils import validation
@@ -98,10 +98,15 @@ def draw_uniforms(system: ControlSystem, env: Seeded, count: int) -> FloatArray 
     return env.np_random.random((draws, count)) if draws else None
 
 
-def checked_actions(actions: ArrayLike, count: int, n_actions: int) -> IntArray:
+def checked_actions(actions: Any, count: int, n_actions: int) -> IntArray:
     """Return actions as a new int64 array `(count,)` within 0..n_actions - 1."""
     checked = np.empty(count, np.int64)
-    array = actions if type(actions) is np.ndarray else np.asarray(actions)
+    array = actions if type(actions) is np.ndarray else validation.as_array(actions)
+    if array is None:
+        raise TypeError(
+            f"actions must be {count} integers, one a slot, got "
+            f"{validation.shown(actions)}."
+        )
     ready = array.dtype == _INT and array.shape == (count,)
     if ready and copy_if_below(array, n_actions, checked):
         return checked

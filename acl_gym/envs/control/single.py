@@ -110,7 +110,7 @@ class ControlEnv(gym.Env[NDArray[Any], np.int64]):
                 + ("has not begun" if self._state is None else "reached its goal")
                 + "; call reset() first."
             )
-        actions = checked_actions(np.asarray([action]), 1, self._n_actions)
+        actions = checked_actions([action], 1, self._n_actions)
         rewards, reached = np.empty(1), np.empty(1, dtype=np.bool_)
         uniforms = draw_uniforms(self.system, self, 1)
         self.system.advance(self._state, actions, uniforms, rewards, reached)

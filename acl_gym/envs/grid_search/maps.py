@@ -80,7 +80,8 @@ def checked_map(desc: Any) -> tuple[str, ...]:
             if character not in (WALL, FREE, GOAL):
                 raise ValueError(
                     f"desc must hold '{WALL}' (obstacle), '{FREE}' (free) and '{GOAL}' "
-                    f"(goal) only, got {character!r} in row {number}, column {column} "
+                    "(goal) only, got "
+                    f"{validation.shown(character)} in row {number}, column {column} "
                     "(from 0)."
                 )
     _check_ways(rows)

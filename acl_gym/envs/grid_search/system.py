@@ -68,7 +68,8 @@ class GridSearch(NumberedSystem):
         object.__setattr__(self, "transition_probability", p)
         if not isinstance(self.mask_blocked, bool | np.bool_):
             raise TypeError(
-                f"mask_blocked must be True or False, got {self.mask_blocked!r}."
+                "mask_blocked must be True or False, got "
+                f"{validation.shown(self.mask_blocked)}."
             )
         object.__setattr__(self, "mask_blocked", bool(self.mask_blocked))
 

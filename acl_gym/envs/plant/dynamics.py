@@ -53,7 +53,7 @@ class Equations:
         elif not callable(dynamics):
             raise TypeError(
                 "dynamics must be a function of (x, u) or a python-control system, "
-                f"got {dynamics!r}."
+                f"got {validation.shown(dynamics)}."
             )
         elif isinstance(dynamics, Dispatcher):
             self._check_compiled(samples, inputs)
@@ -135,7 +135,8 @@ class Equations:
                 ) from error
             if values.shape != (size,) or not np.isfinite(values).all():
                 raise ValueError(
-                    f"{expects}, got {given!r} for x = {x.tolist()}, u = {u.tolist()}."
+                    f"{expects}, got "
+                    f"{validation.shown(given)} for x = {x.tolist()}, u = {u.tolist()}."
                 )
         try:
             self._compiled = self._compile(samples, inputs)
@@ -199,7 +200,7 @@ def _evaluated(dynamics: Any, x: FloatArray, u: FloatArray) -> FloatArray:
                 raise TypeError(f"got a row of {entries.dtype}")
             row[...] = entries
     except (TypeError, ValueError) as error:
-        got = f"{given!r:.200}"
+        got = f"{validation.shown(given)}"
         if isinstance(given, np.ndarray):
             got = f"shape {given.shape} of {given.dtype}"
         elif isinstance(given, list | tuple):
@@ -282,7 +283,7 @@ def _tried(dynamics: Any, x: FloatArray, u: FloatArray) -> FloatArray:
         stacked = np.stack([np.broadcast_to(row, (count,)) for row in rows])
     except (TypeError, ValueError) as error:
         shape = getattr(given, "shape", None)
-        got = f"shape {shape}" if shape is not None else f"{given!r:.200}"
+        got = f"shape {shape}" if shape is not None else f"{validation.shown(given)}"
         raise ValueError(f"{expects}, got {got} for {count} states.") from error
     if len(stacked) != size or stacked.dtype.kind not in "iuf":
         raise ValueError(

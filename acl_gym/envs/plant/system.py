@@ -10,6 +10,7 @@ import numpy as np
 from gymnasium import spaces
 
 from acl_gym.envs.control import sampling
+from acl_gym.envs.control.parameters import MOST_SUBSTEPS
 from acl_gym.envs.control.signals import Signals
 from acl_gym.envs.control.system import ControlSystem, SlotError
 from acl_gym.envs.plant import kernels, targets
@@ -59,15 +60,12 @@ class Plant(ControlSystem):
         self.low, self.high = _bounds(low, high)
         self.inputs = _inputs(inputs)
         self.sampling_time = validation.number("sampling_time", sampling_time, above=0)
-        self.substeps = validation.integer("substeps", substeps, at_least=1)
+        self.substeps = validation.integer(
+            "substeps", substeps, at_least=1, at_most=MOST_SUBSTEPS
+        )
         self.evaluation_steps = validation.integer(
             "evaluation_steps", evaluation_steps, at_least=1
         )
-        if self.substeps > targets.MOST_SUBSTEPS:
-            raise ValueError(
-                f"substeps must be at most {targets.MOST_SUBSTEPS:,}, got {substeps}; "
-                "a step would take seconds."
-            )
         size = self.low.size
         self.circular = targets.checked_axes(circular, size)
         self._period = np.zeros(size)
@@ -239,7 +237,7 @@ class Plant(ControlSystem):
                 initial.low.astype(float), initial.high.astype(float), dtype=np.float64
             )
         elif initial is not None and not callable(initial):
-            rows = np.asarray(initial)
+            rows = validation.real_array("initial", initial)
             return self.checked_states(rows[None] if rows.shape == (size,) else rows)
         self._initial = initial
         if callable(initial) and not isinstance(initial, spaces.Box):

@@ -16,8 +16,6 @@ from acl_gym.envs.plant import kernels
 from acl_gym.utils import validation
 from acl_gym.utils.typing import BoolArray, FloatArray, IntArray
 
-MOST_SUBSTEPS = 100_000
-
 _TOLERANCE = 1 / 40  # of the range of a variable, to either side: a decision
 
 
@@ -78,7 +76,7 @@ class Goal:
         else:
             raise ValueError(
                 f"goal must be a state of {size} variables, a pair of states (low, "
-                f"high), a function of x, or None, got {goal!r}."
+                f"high), a function of x, or None, got {validation.shown(goal)}."
             )
 
     def _set_box(self, bottom: FloatArray, top: FloatArray, goal: Any) -> None:
@@ -87,7 +85,7 @@ class Goal:
         if (top < bottom).any():
             raise ValueError(
                 f"goal must have low <= high in every variable, within the bounds of "
-                f"the plant, got {goal!r}."
+                f"the plant, got {validation.shown(goal)}."
             )
         self.centre = (bottom + top) / 2
         self._half = np.maximum(top - self.centre, self.centre - bottom)
@@ -170,7 +168,7 @@ class Cost:
         else:
             raise ValueError(
                 'cost must be "time", a pair (Q, R) of weights on error and input, or a '
-                f"function of x and u, got {cost!r}."
+                f"function of x and u, got {validation.shown(cost)}."
             )
 
     def judge(
@@ -242,12 +240,15 @@ def checked_axes(circular: Iterable[int], size: int) -> tuple[int, ...]:
     Raises:
         ValueError: one is not among 0..size - 1.
     """
-    axes = list(circular) if isinstance(circular, Iterable) else [None]
+    axes = validation.elements(circular)
+    if axes is None:
+        axes = [None]  # which is refused
     for axis in axes:
         whole = isinstance(axis, Integral) and not isinstance(axis, bool)
         if not whole or not 0 <= axis < size:
             raise ValueError(
-                f"circular must hold variables of 0..{size - 1}, got {circular!r}."
+                f"circular must hold variables of 0..{size - 1}, got "
+                f"{validation.shown(circular)}."
             )
     return tuple(sorted({int(axis) for axis in axes}))
 
@@ -264,7 +265,9 @@ def checked_names(
         return tuple(f"{letter}[{i}]" for i in range(size))
     good = isinstance(names, Sequence) and not isinstance(names, str)
     if not good or len(names) != size or not all(isinstance(n, str) for n in names):
-        raise ValueError(f"{name} must be {size} strings, got {names!r}.")
+        raise ValueError(
+            f"{name} must be {size} strings, got {validation.shown(names)}."
+        )
     return tuple(names)
 
 
@@ -290,7 +293,8 @@ def _matrix(name: str, values: Any, size: int) -> FloatArray:
     if not is_weight(array, size):
         raise ValueError(
             f"{name} of cost=(Q, R) must be a number, {size} of them, or a symmetric "
-            f"positive semi-definite ({size}, {size}) matrix, got {values!r}."
+            f"positive semi-definite ({size}, {size}) matrix, got "
+            f"{validation.shown(values)}."
         )
     return array
 

@@ -36,7 +36,7 @@ class TwoState(NumberedSystem):
         if costs.size < 2 or not (costs > 0).all() or not (np.diff(costs) > 0).all():
             raise ValueError(
                 "costs must be two or more, positive and increasing from the best action "
-                f"to the worst, got {self.costs!r}."
+                f"to the worst, got {validation.shown(self.costs)}."
             )
         object.__setattr__(self, "costs", tuple(costs.tolist()))
 

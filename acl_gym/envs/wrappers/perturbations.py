@@ -280,7 +280,9 @@ class ReversedDraws:
 def _box(space: spaces.Space[Any]) -> spaces.Box:
     """The space if it is a Box of one axis."""
     if not isinstance(space, spaces.Box) or len(space.shape) != 1:
-        raise ValueError(f"observations must be a Box of one axis, got {space}.")
+        raise ValueError(
+            f"observations must be a Box of one axis, got {validation.shown(space)}."
+        )
     return space
 
 

@@ -15,6 +15,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv, VectorObservationWrapper
 from gymnasium.vector.utils import batch_space
 from numpy.typing import ArrayLike, NDArray
 
+from acl_gym.utils import validation
 from acl_gym.utils.boxes import declared_bounds
 from acl_gym.utils.typing import Float32Array
 from acl_gym.utils.vector_envs import require_vector_env
@@ -159,7 +160,8 @@ class ScaledVectorObservation(
 def _bounds(space: spaces.Space[Any]) -> tuple[NDArray[np.float64], ...]:
     if not isinstance(space, spaces.Box) or len(space.shape) != 1:
         raise ValueError(
-            f"observations must be a Box of one axis, got {space}; use "
+            "observations must be a Box of one axis, got "
+            f"{validation.shown(space)}; use "
             "gymnasium's FlattenObservation first."
         )
     low, high = declared_bounds(space)
@@ -178,7 +180,8 @@ def _checked_axes(circular: Iterable[int], size: int) -> NDArray[np.int64]:
         axes = [operator.index(axis) for axis in circular]
     except TypeError:
         raise TypeError(
-            f"circular must be a sequence of indices of variables, got {circular!r}."
+            "circular must be a sequence of indices of variables, got "
+            f"{validation.shown(circular)}."
         ) from None
     if not set(axes) <= set(range(size)) or len(set(axes)) < len(axes):
         raise ValueError(

@@ -84,7 +84,7 @@ NARROW = spaces.Box(-0.1, 0.1, (2,), np.float64)
         ({"inputs": [[[1.0]]]}, "inputs must hold the input of each action"),
         ({"inputs": []}, "inputs must be an array"),
         ({"sampling_time": 0.0}, "sampling_time must lie in"),
-        ({"substeps": 10**12}, "substeps must be at most 100,000"),
+        ({"substeps": 10**12}, "substeps must be at most 10000"),
         ({"circular": [2]}, r"circular must hold variables of 0\.\.1"),
         ({"circular": 0}, r"circular must hold variables of 0\.\.1"),
         ({"goal": [0.0, 0.0, 0.0]}, "goal must be a state of 2 variables"),

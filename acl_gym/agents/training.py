@@ -138,7 +138,7 @@ class Training:
             "seconds": agent.seconds,
             "ants_cost": float((rollout.cost if costs is None else costs).mean()),
             **self._outcomes(),
-            "policy_variation": float(np.mean(policy != self._policy)),
+            "policy_variation": float(np.mean(policy != self._policy)) if policy.shape == self._policy.shape else 1.0,
             **agent.measures(policy),
         }
         self._policy = policy

@@ -216,3 +216,25 @@ def _span(
         axis in circular or (line[0] == box.low[axis] and line[-1] == box.high[axis])
         for axis, line in enumerate(centres)
     )
+
+
+COARSE = {1: 21, 2: 9, 3: 6, 4: 5, 5: 4, 6: 3}
+
+
+def coarse_partition(env: Env) -> Partition:
+    """A partition for a colony that lets it grow."""
+    space = observation_space(env)
+    if isinstance(space, FINITE_SPACES):
+        return Discrete.from_space(space)
+    box = real_box(space)
+    system = system_of(env)
+    if system is not None and system.observation_space != space:
+        system = None
+    circular = () if system is None else system.circular
+    number = COARSE[box.low.size]
+    low, high = complete_bounds(env, box, None, circular, 2_000, 0)
+    cells = [
+        number + (axis in circular) if low[axis] < high[axis] else 1
+        for axis in range(low.size)
+    ]
+    return Fuzzy.from_box(spaces.Box(low, high, dtype=np.float64), cells, circular)

@@ -1,0 +1,326 @@
+"""What a colony remembers of its solutions, so that ants can walk them back again."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acl_gym.colony.greedy import ALL
+from acl_gym.partitions import Grid, Partition, locate_checked
+from acl_gym.utils.compiling import njit
+from acl_gym.utils.typing import (
+    ActionArray,
+    BoolArray,
+    CellArray,
+    FloatArray,
+    IntArray,
+)
+
+FIRST_ROWS = 4_096
+"""States for which there is memory at first; more is made when needed."""
+
+UNITS = 2**36
+"""Parts of a degree in which evidence is counted."""
+
+
+class Walk:
+    """What the ants do in a part of a trial, step by step, until it is remembered.
+
+    Args:
+        n_slots: M, the number of ants.
+    """
+
+    def __init__(self, n_slots: int) -> None:
+        self._n_slots = n_slots
+        self._ants: list[IntArray] = []
+        self._seen: list[NDArray[Any]] = []
+        self._actions: list[IntArray] = []
+        self._rewards: list[FloatArray] = []
+        self._allowed: list[BoolArray | None] = []
+        self.steps = 0
+
+    def append(
+        self,
+        ants: IntArray,
+        observation: NDArray[Any],
+        actions: IntArray,
+        rewards: FloatArray,
+        allowed: BoolArray | None,
+    ) -> None:
+        """Add a step.
+
+        Args:
+            ants: the ants that took it, `(m,)`.
+            observation: of all slots before the step, `(n_slots, ...)`.
+            actions: what these ants did, `(m,)`.
+            rewards: what they got for it, `(m,)`.
+            allowed: U_q of each of them before the step, `(m, n_actions)`; None: all.
+        """
+        self._add(ants, observation, actions, rewards, allowed)
+        self.steps += ants.size
+
+    def stop(
+        self, ants: IntArray, observation: NDArray[Any], allowed: BoolArray | None
+    ) -> None:
+        """Add the states in which ants stand when their walks are remembered.
+
+        Args:
+            ants: who stops, `(m,)`.
+            observation: of all slots, `(n_slots, ...)`.
+            allowed: see `append`.
+        """
+        self._add(ants, observation, _zeros(ants), _zeros(ants), allowed)
+
+    def _add(
+        self, ants: Any, observation: Any, actions: Any, rewards: Any, allowed: Any
+    ) -> None:
+        self._ants.append(ants)
+        self._seen.append(observation[ants])
+        self._actions.append(actions)
+        self._rewards.append(rewards)
+        self._allowed.append(allowed)
+
+    def rows(self) -> tuple[IntArray, dict[str, NDArray[Any]]]:
+        """All of it, ant by ant.
+
+        Returns:
+            The number of states of each ant, `(n_slots,)`, and of all states, `(n, ...)`,
+            what was "seen", the "action", the "reward", and what was "allowed", if there
+            are masks.
+        """
+        ants = np.concatenate(self._ants)
+        count = np.bincount(ants, minlength=self._n_slots)
+        order = _by_ant(ants, np.cumsum(count) - count)
+        parts: dict[str, list[Any]] = {
+            "seen": self._seen,
+            "action": self._actions,
+            "reward": self._rewards,
+        }
+        masks = [each for each in self._allowed if each is not None]
+        if masks:
+            parts["allowed"] = [
+                np.ones((ant.size, masks[0].shape[1]), np.bool_) if m is None else m
+                for ant, m in zip(self._ants, self._allowed, strict=True)
+            ]
+        rows = {
+            name: np.take(np.concatenate(part), order, axis=0)
+            for name, part in parts.items()
+        }
+        return count, rows
+
+
+def _zeros(ants: IntArray) -> Any:
+    return np.zeros(ants.size, dtype=np.int64)
+
+
+@njit
+def _by_ant(ants: IntArray, first: IntArray) -> IntArray:
+    """The order of the rows in which those of an ant stand together, in time."""
+    order = np.empty(ants.size, np.int64)
+    for row in range(ants.size):
+        order[first[ants[row]]] = row
+        first[ants[row]] += 1
+    return order
+
+
+class Memory:
+    """The newest solutions of a colony, each a path of states, actions and rewards.
+
+    A path of T steps has T + 1 states; to the last belongs no action. Cells and degrees
+    of the states are kept, and the observations of those that a finer partition may
+    locate anew. The oldest paths are forgotten when there are more states than `most`.
+
+    Args:
+        most: how many states are remembered; the newest walk always is.
+        n_actions: how many actions there are.
+        partition: turns observations into cells and degrees.
+
+    Attributes:
+        partition: the present one.
+        first: the row of the first state of each path, `(n_paths,)`.
+        last: the row of its last state, `(n_paths,)`.
+        terminated: whether it ended in a terminal state, `(n_paths,)`.
+        evidence: how often each pair of a cell and an action was tried: the sum of the
+            degrees, in units of 1 / `UNITS`, `(n_cells * n_actions,)`. Integers, so that
+            the sum does not depend on the order, and forgetting undoes adding exactly.
+    """
+
+    def __init__(self, most: int, n_actions: int, partition: Partition) -> None:
+        self.most, self.n_actions = most, n_actions
+        self.first: IntArray = np.empty(0, np.int64)
+        self.last: IntArray = np.empty(0, np.int64)
+        self.terminated: BoolArray = np.empty(0, np.bool_)
+        self._used = 0  # rows, those of forgotten paths before them included
+        self._rows: dict[str, NDArray[Any]] = {
+            "action": np.empty(0, np.min_scalar_type(n_actions - 1)),
+            "reward": np.empty(0),
+        }
+        self._state_shape: tuple[int, ...] = ()
+        self.set_partition(partition)
+
+    @property
+    def n_paths(self) -> int:
+        """How many paths are remembered."""
+        return int(self.first.size)
+
+    @property
+    def n_steps(self) -> int:
+        """How many steps they have together."""
+        return int((self.last - self.first).sum())
+
+    @property
+    def index(self) -> CellArray:
+        """Cells of the states, `(rows, k)`."""
+        return self._rows["index"]
+
+    @property
+    def degree(self) -> FloatArray:
+        """Their degrees, `(rows, k)`."""
+        return self._rows["degree"]
+
+    @property
+    def action(self) -> ActionArray:
+        """What was done there, `(rows,)`."""
+        return self._rows["action"]
+
+    @property
+    def reward(self) -> FloatArray:
+        """What that gave, `(rows,)`."""
+        return self._rows["reward"]
+
+    @property
+    def allowed(self) -> BoolArray:
+        """U_q of each state, `(rows, n_actions)`; empty where all is allowed."""
+        return self._rows.get("allowed", ALL)
+
+    def add(self, walk: Walk, terminated: BoolArray) -> IntArray:
+        """Remember what ants have done, in the order of their numbers.
+
+        Args:
+            walk: their steps.
+            terminated: whether each slot is in a terminal state now, `(n_slots,)`.
+
+        Returns:
+            The numbers of these paths.
+
+        Raises:
+            ValueError: an observation does not belong to the partition, or is not like
+                those before.
+        """
+        count, new = walk.rows()
+        seen = new["seen"]
+        size = len(seen)
+        self._forget(self.most - size)
+        if isinstance(self.partition, Grid):
+            self._state_shape = seen.shape[1:]
+        else:
+            del new["seen"]
+        rows = self._room(size, new)
+        for name, kept in self._rows.items():
+            if name in new:
+                kept[rows] = new[name]
+            elif name == "allowed":
+                kept[rows] = True
+        self._locate(seen, rows)
+        walked = count > 0
+        ends = rows.start + np.cumsum(count)[walked]
+        paths = np.arange(self.n_paths, self.n_paths + ends.size)
+        self.first = np.concatenate([self.first, ends - count[walked]])
+        self.last = np.concatenate([self.last, ends - 1])
+        self.terminated = np.concatenate([self.terminated, terminated[walked]])
+        self._count(paths, 1)
+        return paths
+
+    def set_partition(self, partition: Partition) -> None:
+        """Locate everything anew, in a partition of the same state variables."""
+        self.partition = partition
+        shape = len(self.action), partition.cells_per_state
+        self._rows["index"] = np.zeros(shape, np.int32)
+        self._rows["degree"] = np.zeros(shape)
+        self.evidence: IntArray = np.zeros(partition.n_cells * self.n_actions, np.int64)
+        if self.n_paths:
+            rows = slice(int(self.first[0]), self._used)
+            self._locate(self._rows["seen"][rows], rows)
+            self._count(np.arange(self.n_paths), 1)
+
+    def _locate(self, states: NDArray[Any], rows: slice) -> None:
+        index, degree = self.index[rows], self.degree[rows]
+        every = np.arange(len(states))
+        n_cells = self.partition.n_cells
+        locate_checked(self.partition, states, every, index, degree, n_cells)
+
+    def _count(self, paths: IntArray, sign: int) -> None:
+        """Add the degrees of paths to the evidence, or subtract them."""
+        first, last = self.first[paths], self.last[paths]
+        _count(
+            first,
+            last,
+            self.index,
+            self.degree,
+            self.action,
+            self.n_actions,
+            sign * UNITS,
+            self.evidence,
+        )
+
+    def _forget(self, most: int) -> None:
+        """Forget the oldest paths, until at most so many states are left."""
+        sizes = self.last - self.first + 1
+        newer = np.cumsum(sizes[::-1])[::-1]  # states of each path and all after it
+        gone = int(np.count_nonzero(newer > most))
+        if gone:
+            self._count(np.arange(gone), -1)
+            self.first, self.last = self.first[gone:], self.last[gone:]
+            self.terminated = self.terminated[gone:]
+
+    def _room(self, size: int, new: dict[str, NDArray[Any]]) -> slice:
+        """Make room for rows; forgotten ones go first, then memory doubles."""
+        for name, array in new.items():
+            kept = self._rows.get(name)
+            if kept is None:
+                fill = np.ones if name == "allowed" else np.zeros
+                shape = len(self.action), *array.shape[1:]
+                self._rows[name] = fill(shape, dtype=array.dtype)
+            elif kept.shape[1:] != array.shape[1:]:
+                raise ValueError(
+                    "observations must have as many variables in every trial, got "
+                    f"{kept.shape[1:]}, then {array.shape[1:]}; check the environment."
+                )
+            elif name == "seen" and kept.dtype != array.dtype:
+                kind = np.result_type(kept, array)
+                self._rows[name] = kept.astype(kind)
+        if self._used + size > len(self.action):
+            begin = int(self.first[0]) if self.n_paths else self._used
+            live = self._used - begin
+            length = max(len(self.action), FIRST_ROWS)
+            while length < 2 * live + size:
+                length *= 2
+            for name, kept in self._rows.items():
+                moved = np.zeros((length, *kept.shape[1:]), dtype=kept.dtype)
+                moved[:live] = kept[begin : self._used]
+                self._rows[name] = moved
+            self.first, self.last = self.first - begin, self.last - begin
+            self._used = live
+        rows = slice(self._used, self._used + size)
+        self._used += size
+        return rows
+
+
+@njit
+def _count(
+    first: IntArray,
+    last: IntArray,
+    index: CellArray,
+    degree: FloatArray,
+    action: ActionArray,
+    n_actions: int,
+    unit: int,
+    evidence: IntArray,
+) -> None:
+    for path in range(first.size):
+        for row in range(first[path], last[path]):
+            for c in range(index.shape[1]):
+                pair = np.int64(index[row, c]) * n_actions + np.int64(action[row])
+                evidence[pair] += np.int64(np.rint(degree[row, c] * unit))

@@ -57,13 +57,20 @@ class ReturningACL(TabularAgent):
         learning_rate: float = 0.9,
         trust: float = 1.0,
         epsilon: float = 0.1,
-        optimism: float = 0.9,
+        optimism: float = 0.5,
         walks_back: int = 10,
         older_paths: int = 50,
         steps_per_walk: int = 300,
         memory: int = 100_000,
         visits_to_grow: float | None = 4.0,
         max_cells: int = 20_000,
+        ranging: bool = True,
+        varied: bool = True,
+        turns: int = 1,
+        sure: bool = True,
+        widen: float | None = None,
+        finest: float = 0.01,
+        local: Any = None,
         max_steps: int | None = None,
         seed: int | None = None,
         n_actions: int | None = None,
@@ -77,12 +84,19 @@ class ReturningACL(TabularAgent):
         self.steps_per_walk = steps_per_walk
         self.visits_to_grow, self.max_cells = visits_to_grow, max_cells
         if partition is None and env is not None:
-            partition = coarse_partition(env)
+            partition = coarse_partition(env, ranging)
         super().__init__(
             env, partition, max_steps=max_steps, seed=seed, n_actions=n_actions
         )
         self.mix = (0.0 if isinstance(self.partition, Discrete) else 0.2) if mix is None else mix
         self._level = 0.0
+        self.stretched = 0
+        self.sure = sure
+        self.widen, self.local, self.finest = widen, local, finest
+        self.ranging, self.varied, self.turns = ranging, varied, turns
+        if env is not None and ranging and isinstance(self.partition, Grid):
+            from acl_gym.utils.boxes import declared_bounds
+            self._declared = declared_bounds(env.single_observation_space)
         self._growths = 0
         self._walk_back = WalkBack(np.zeros((self.partition.n_cells, self.n_actions)))
         self.memory = Memory(memory, self.n_actions, self.partition)
@@ -103,6 +117,7 @@ class ReturningACL(TabularAgent):
                 while rollout._ants.size:
                     walk, observation = self._walk(observation)
                     newest = self.memory.add(walk, rollout.terminated)
+                    self._stretch()
                     self._promise()
                     for _ in range(self.walks_back):
                         self._return(newest)
@@ -163,15 +178,102 @@ class ReturningACL(TabularAgent):
         grid = self.partition
         if self.visits_to_grow is None or not isinstance(grid, Grid):
             return
+        axes = [a for a, line in enumerate(grid.centres) if line.size > 1]
+        if self.local:
+            for a in np.roll(axes, -(self._growths % len(axes))):
+                where = self._ready(a)
+                if where.any():
+                    finer = refined(grid, int(a), where)
+                    if finer.n_cells <= self.max_cells:
+                        self._growths += 1
+                        self._become(finer)
+                    return
+            return
         tried = self.memory.evidence[self.memory.evidence > 0]
         visits = float(np.median(tried)) / 2**36 * grid.cells_per_state
         if visits <= self.visits_to_grow:
             return
-        axes = [a for a, line in enumerate(grid.centres) if line.size > 1]
-        finer = refined(grid, axes[self._growths % len(axes)])
+        turn = len(axes) if self.varied else 10**9
+        if self._growths < turn * self.turns:
+            axis = axes[self._growths % len(axes)]
+        else:
+            axis = max(axes, key=self._variation)
+        finer = refined(grid, axis)
         if finer.n_cells > self.max_cells:
             return
         self._growths += 1
+        self._become(finer)
+
+    def _ready(self, axis):
+        grid = self.partition
+        shape = tuple(line.size for line in grid.centres) + (self.n_actions,)
+        e = self.memory.evidence.reshape(shape) / 2**36 * grid.cells_per_state
+        e = np.moveaxis(e, axis, 0).reshape(shape[axis], -1)
+        n = (e > 0).sum(axis=1)
+        if self.local == "mean":
+            v = e.sum(axis=1) / np.maximum(n, 1)
+        else:
+            v = np.array([np.median(row[row > 0]) if (row > 0).any() else 0.0 for row in e])
+        if grid.periods[axis] is not None:
+            v = np.append(v, v[0])
+        width = np.diff(grid.centres[axis]) if grid.periods[axis] is None else np.diff(np.append(grid.centres[axis], grid.centres[axis][0] + grid.periods[axis]))
+        span = width.sum()
+        return (np.minimum(v[:-1], v[1:]) > self.visits_to_grow) & (width > self.finest * span)
+
+    def _variation(self, axis: int) -> float:
+        """How often the policy differs between neighbours along an axis, by evidence."""
+        shape = tuple(line.size for line in self.partition.centres)
+        best = self._table.argmax(axis=1).reshape(shape)
+        tried = self.memory.evidence.reshape(-1, self.n_actions).sum(axis=1)
+        tried = tried.reshape(shape).astype(float)
+        n = shape[axis]
+        a, b = (np.take(tried, r, axis) for r in (range(n - 1), range(1, n)))
+        x, y = (np.take(best, r, axis) for r in (range(n - 1), range(1, n)))
+        weight = np.minimum(a, b)
+        return float((weight * (x != y)).sum() / max(weight.sum(), 1e-300))
+
+    def _stretch(self) -> None:
+        grid = self.partition
+        if not self.ranging or not isinstance(grid, Grid):
+            return
+        m = self.memory
+        seen = m._rows["seen"][int(m.first[0]) : m._used]
+        low, high = seen.min(axis=0), seen.max(axis=0)
+        axes, changed = list(grid.centres), False
+        for a, line in enumerate(axes):
+            if grid.periods[a] is not None:
+                continue
+            if low[a] < line[0] - 1e-9 or high[a] > line[-1] + 1e-9 or line.size == 1 and high[a] > low[a]:
+                dl, dh = self._declared
+                new = line
+                if self.widen is None:
+                    lo, hi = min(low[a], line[0]), max(high[a], line[-1])
+                    margin = 0.1 * (hi - lo)
+                    lo = max(lo - margin, dl[a]) if low[a] < line[0] else lo
+                    hi = min(hi + margin, dh[a]) if high[a] > line[-1] else hi
+                    if lo < line[0] or hi > line[-1]:
+                        axes[a] = np.linspace(lo, hi, line.size)
+                        changed = True
+                    continue
+                if line.size == 1:
+                    continue
+                if low[a] < line[0] - 1e-9:
+                    gap = max(self.widen * (line[1] - line[0]), line[0] - low[a])
+                    lo = max(line[0] - gap, dl[a])
+                    if lo < line[0] - 1e-6: new = np.concatenate([[lo], new])
+                if high[a] > line[-1] + 1e-9:
+                    gap = max(self.widen * (line[-1] - line[-2]), high[a] - line[-1])
+                    hi = min(line[-1] + gap, dh[a])
+                    if hi > line[-1] + 1e-6: new = np.concatenate([new, [hi]])
+                if new is not line:
+                    axes[a] = new
+                    changed = True
+        if changed:
+            self.stretched += 1
+            self._become(type(grid)(axes, grid.periods))
+
+    def _become(self, finer: Any) -> None:
+        grid = self.partition
         known = carried_over(self._walk_back.known.astype(float), grid, finer) > 1 - 1e-9
         table = carried_over(self._table, grid, finer)
         self.__dict__["partition"] = finer
@@ -189,6 +291,19 @@ class ReturningACL(TabularAgent):
 
     def parameters(self) -> dict[str, Any]:
         return {}
+
+    def _sure(self):
+        """levels of what is known; of unknown pairs the worst known in the cell"""
+        known, t = self._walk_back.known, self._table
+        if known.all() or not self.sure: return t
+        low = np.where(known, t, np.inf).min(axis=1)
+        low = np.where(np.isfinite(low), low, t.min(axis=1))
+        return np.where(known, t, np.minimum(low[:, None], t))
+
+    @property
+    def policy(self):
+        from acl_gym.policies import TablePolicy
+        return TablePolicy(self.partition, np.ascontiguousarray(self._sure()), self._ranks, self.first_action, self._signals)
 
     def _explore(
         self, index: CellArray, degree: FloatArray, allowed: BoolArray | None

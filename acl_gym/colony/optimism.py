@@ -18,7 +18,28 @@ def promised_levels(
     first, last = memory.first[-count:], memory.last[-count:]
     values = np.empty(int((last - first).sum()))
     _values(first, last, memory.index, memory.degree, memory.allowed, levels, values)
-    return float(np.quantile(values, quantile))
+    level = float(np.quantile(values, 0.9))
+    going, ending = _best_rewards(
+        memory.first, memory.last, memory.terminated, memory.reward
+    )
+    bound = max(0.0, going / (1 - discount), ending)
+    return level + quantile * (bound - level)
+
+
+@njit
+def _best_rewards(
+    first: IntArray, last: IntArray, terminated: BoolArray, reward: FloatArray
+) -> tuple[float, float]:
+    """The best reward of a step after which the ant went on, and of one that ended."""
+    going = ending = -np.inf
+    for path in range(first.size):
+        for row in range(first[path], last[path] - 1):
+            going = max(going, reward[row])
+        if terminated[path]:
+            ending = max(ending, reward[last[path] - 1])
+        else:
+            going = max(going, reward[last[path] - 1])
+    return going, ending
 
 
 @njit

@@ -10,14 +10,16 @@ from numpy.typing import ArrayLike
 from acl_gym.partitions.base import Partition, locate_all
 from acl_gym.partitions.grid import Grid
 from acl_gym.utils import validation
-from acl_gym.utils.typing import FloatArray
+from acl_gym.utils.typing import BoolArray, FloatArray
 
 _ROWS = 65_536  # cells that are carried over at a time
 
 AnyGrid = TypeVar("AnyGrid", bound=Grid)
 
 
-def refined(grid: AnyGrid, axis: int) -> AnyGrid:
+def refined(
+    grid: AnyGrid, axis: int, where: BoolArray | None = None
+) -> AnyGrid:
     """Return the grid with a new centre in the middle of each interval of one axis.
 
     All old centres stay, so that a fuzzy table can be carried over exactly. An axis with
@@ -26,6 +28,8 @@ def refined(grid: AnyGrid, axis: int) -> AnyGrid:
     Args:
         grid: a crisp or a fuzzy partition.
         axis: the state variable, 0 .. d - 1.
+        where: which intervals to halve, `(n,)`: those between neighbouring centres, of a
+            circular axis also the one that closes the circle. None halves all.
 
     Raises:
         ValueError: there is no such axis, or there would be 2^31 cells or more.
@@ -33,15 +37,19 @@ def refined(grid: AnyGrid, axis: int) -> AnyGrid:
     last = len(grid.centres) - 1
     axis = validation.integer("axis", axis, at_least=0, at_most=last)
     axes = list(grid.centres)
-    axes[axis] = _halved(axes[axis], grid.periods[axis])
+    axes[axis] = _halved(axes[axis], grid.periods[axis], where)
     return type(grid)(axes, grid.periods)
 
 
-def _halved(centres: FloatArray, period: float | None) -> FloatArray:
+def _halved(
+    centres: FloatArray, period: float | None, where: BoolArray | None
+) -> FloatArray:
     edges = centres
     if period is not None and centres.size > 1:
         edges = np.append(centres, centres[0] + period)
     middles = edges[:-1] + np.diff(edges) / 2
+    if where is not None:
+        middles = middles[where]
     return np.sort(np.concatenate([centres, middles]))
 
 

@@ -55,7 +55,9 @@ def short_runs(monkeypatch: pytest.MonkeyPatch) -> None:
             study = replace(study, steps=min(study.steps, MOST_STEPS))
         return methods.run(study, seed)
 
-    def in_this_process(jobs: list[Job], store: Store, *, workers: int) -> Iterator[Job]:
+    def in_this_process(
+        jobs: list[Job], store: Store, *, workers: int
+    ) -> Iterator[Job]:
         made = circumstances(workers)
         for job in jobs:
             executors.write_run(job, run_briefly(job.study, job.seed), store, made)

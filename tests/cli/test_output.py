@@ -31,6 +31,12 @@ def test_environments_fit_the_terminal(
         assert text.split() == wide.split(), "no word is cut"
 
 
+@pytest.mark.parametrize("command", ["", "train", "evaluate", "envs", "compare"])
+def test_help_fits_the_terminal(command: str) -> None:
+    text = invoke(*filter(None, [command, "--help"])).stdout
+    assert max(map(len, text.splitlines())) <= 80
+
+
 @pytest.mark.parametrize("encoding", ["ascii", "cp1252"])
 @pytest.mark.parametrize(
     "command", [["envs"], ["train", "--help"], ["--help"], ["evaluate", "λ.npz"]]

@@ -97,6 +97,17 @@ def test_a_film_of_one_state_variable(tmp_path: Path) -> None:
     assert len(pictures(path)) > 1
 
 
+def test_the_name_of_a_high_bar_does_not_cover_the_title() -> None:
+    agent = colony("acl_gym/Navigation-v0")  # nine actions
+    looks = {**LOOKS, "axes": (0, 1)}
+    (stage,) = scenes.stages_of(agent, [2], 0.4, None, None, looks)
+    panels = Figure().subplots(1, 3)
+    scenes.draw_stage(panels, stage)
+    (bar,) = panels[0].child_axes
+    assert bar.get_title() == ""
+    assert "force" in bar.get_xlabel()
+
+
 def test_arrows_need_no_bar() -> None:
     agent = colony("acl_gym/Navigation-v0")
     (stage,) = scenes.stages_of(agent, [2], 0.4, None, None, LOOKS)

@@ -137,11 +137,11 @@ def add_bar(
     place = (1.03, 0.5 * (1.0 - height), 0.045, height)
     bar = _bar(ax, ScalarMappable(norm, cmap), "" if slim else colours.title, place)
     if slim:
-        title = colours.title.replace(" (", "\n(")
         if height < 1.0:
-            bar.ax.set_title(title, size="small")
+            bar.ax.set_title(colours.title.replace(" (", "\n("), size="small")
         else:  # above it the title of the picture may stand
-            bar.ax.set_xlabel(title, size="small")
+            names = colours.title.replace(", ", ",\n")
+            bar.ax.set_xlabel(names, size="small", loc="left")
     bar.set_ticks(list(range(count)), labels=colours.names)
     bar.ax.tick_params(length=0)
 

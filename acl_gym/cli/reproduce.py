@@ -149,6 +149,11 @@ def report(
     debug: DebugOption = False,
 ) -> None:
     """Write the report; see `REPORT_HELP`."""
+    if not directory.is_dir():  # before the import, which takes seconds
+        raise BadArgumentError(
+            f"there is no folder {directory}; `acl-gym reproduce --out {directory}` "
+            "makes one."
+        )
     from acl_gym.experiments import reproduce as engine
 
     try:

@@ -181,3 +181,9 @@ def test_lines_of_progress_are_seconds_apart() -> None:
     began = time.monotonic()
     shown = invoke(*SMALL)
     assert len(shown.stderr.splitlines()) <= (time.monotonic() - began) / 5
+
+
+def test_a_report_of_a_folder_that_is_not_there(tmp_path: Path) -> None:
+    done = invoke("report", str(tmp_path / "no"))
+    assert done.exit_code == 2
+    assert "there is no folder" in done.stderr

@@ -31,6 +31,12 @@ def test_environments_fit_the_terminal(
         assert text.split() == wide.split(), "no word is cut"
 
 
+@pytest.mark.parametrize("command", ["", "train", "evaluate", "envs", "compare"])
+def test_help_fits_the_terminal(command: str) -> None:
+    text = invoke(*filter(None, [command, "--help"])).stdout
+    assert max(map(len, text.splitlines())) <= 80
+
+
 @pytest.mark.parametrize("encoding", ["ascii", "cp1252"])
 @pytest.mark.parametrize(
     "command", [["envs"], ["train", "--help"], ["--help"], ["evaluate", "λ.npz"]]
@@ -176,3 +182,9 @@ def test_lines_of_progress_are_seconds_apart() -> None:
     began = time.monotonic()
     shown = invoke(*SMALL)
     assert len(shown.stderr.splitlines()) <= (time.monotonic() - began) / 5
+
+
+def test_a_report_of_a_folder_that_is_not_there(tmp_path: Path) -> None:
+    done = invoke("report", str(tmp_path / "no"))
+    assert done.exit_code == 2
+    assert "there is no folder" in done.stderr

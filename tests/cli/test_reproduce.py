@@ -96,5 +96,5 @@ def test_bad_arguments() -> None:
     assert "--executor must be one of 'local', 'ray'" in refused(
         *(2, "reproduce", "fig3.9", "--executor", "slurm")
     )
-    assert "there is no results.json in" in refused(2, "report", "/no/such/folder")
+    assert "there is no folder" in refused(2, "report", "/no/such/folder")
     refused(2, "reproduce", "fig3.9", "--runs", "0")

@@ -161,6 +161,12 @@ class VectorEnvAdapter(VecEnv):
         n = self.num_envs
         check_observations(observations, self.observation_space, n)
         rewards = received.rewards(rewards, n)
+        if not np.isfinite(rewards).all():
+            slot = int(np.argmin(np.isfinite(rewards)))
+            raise ValueError(
+                f"rewards must be finite, got {rewards[slot]} in slot {slot}; check the "
+                "environment's reward function."
+            )
         terminated = received.flags("terminated", terminated, n)
         truncated = received.flags("truncated", truncated, n)
         dones = np.logical_or(terminated, truncated)

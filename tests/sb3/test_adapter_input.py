@@ -278,6 +278,11 @@ class Returning(gym.vector.VectorWrapper):
             lambda result: (np.zeros((2, 3)), *result[1:]),
             r"got \(2, 3\); check",
         ),
+        (
+            "step",
+            lambda result: (result[0], [0.0, np.nan], *result[2:]),
+            "rewards must be finite, got nan in slot 1; check",
+        ),
     ],
 )
 def test_what_is_returned_is_checked(

@@ -231,7 +231,8 @@ class PartitionPolicy(Fixed, ABC):
 
         Args:
             path: the file; `.h` is added to a name without an ending.
-            name: what all names in the file begin with, a C identifier.
+            name: what all names in the file begin with, a C identifier; two headers
+                of one program need different ones.
             precision: "float" or "double", of observations and tables.
             inputs: what each action sets, `(n_actions,)` or `(n_actions, n_inputs)`,
                 in place of what the environment knows.

@@ -178,15 +178,17 @@ def as_cases(
     return cases
 
 
+FIRST_TRIAL = (
+    "import gymnasium as gym, time; from acl_gym import ACL; "
+    "from acl_gym.partitions.automatic import thesis_partition; start = time.perf_counter(); "
+    "env = gym.make_vec('acl_gym/Pendulum-v0', num_envs=2); "
+    "ACL(env, thesis_partition(env), seed=0, max_steps=2).learn(trials=1); "
+    "print(time.perf_counter() - start)"
+)
+
+
 def startup_seconds(repetitions: int) -> dict[str, float]:
     """Seconds of `import acl_gym`, and of a first trial without and with a cache."""
-    trial = (
-        "import gymnasium as gym, time; from acl_gym import ACL; "
-        "from acl_gym.partitions.automatic import thesis_partition; start = time.perf_counter(); "
-        "env = gym.make_vec('acl_gym/Pendulum-v0', num_envs=2); "
-        "ACL(env, thesis_partition(env), seed=0, max_steps=2).learn(trials=1); "
-        "print(time.perf_counter() - start)"
-    )
     imported = (
         "import time; start = time.perf_counter(); import acl_gym; "
         "print(time.perf_counter() - start)"
@@ -203,8 +205,8 @@ def startup_seconds(repetitions: int) -> dict[str, float]:
         return float(done.stdout)
 
     with tempfile.TemporaryDirectory() as cache:
-        first = seconds(trial, cache)
-        again = [seconds(trial, cache) for _ in range(repetitions)]
+        first = seconds(FIRST_TRIAL, cache)
+        again = [seconds(FIRST_TRIAL, cache) for _ in range(repetitions)]
         imports = [seconds(imported, cache) for _ in range(repetitions)]
     return {
         "import acl_gym": statistics.median(imports),

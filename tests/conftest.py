@@ -1,9 +1,20 @@
 """Settings for all tests, including what NumPy, torch and Numba read on import."""
 
-import os
-from pathlib import Path
+from __future__ import annotations
 
+import os
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
 from hypothesis import settings
+
+if TYPE_CHECKING:
+    from acl_gym.experiments.results import Run
+    from acl_gym.experiments.store import Job, Store
+    from acl_gym.experiments.study import Study
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -22,3 +33,34 @@ if worker := os.environ.get("PYTEST_XDIST_WORKER"):
 settings.register_profile("local", deadline=None)
 settings.register_profile("ci", deadline=None, derandomize=True, print_blob=True)
 settings.load_profile("ci" if os.environ.get("CI") else "local")
+
+MOST_TRIALS, MOST_STEPS = 5, 2_000
+"""Of a run that a test needs only to have rows and a table, see `short_runs`."""
+
+
+@pytest.fixture
+def short_runs(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Studies are run in this process, for a few trials, and stored as whole runs.
+
+    For tests of what becomes of runs. A process of its own takes seconds to start, which
+    the tests of the runner and of the commands as a whole pay for.
+    """
+    from acl_gym.experiments import executors, methods, runner
+    from acl_gym.experiments.provenance import circumstances
+
+    def run_briefly(study: Study, seed: int) -> Run:
+        if study.trials is not None:
+            study = replace(study, trials=min(study.trials, MOST_TRIALS))
+        elif study.steps is not None:
+            study = replace(study, steps=min(study.steps, MOST_STEPS))
+        return methods.run(study, seed)
+
+    def in_this_process(
+        jobs: list[Job], store: Store, *, workers: int
+    ) -> Iterator[Job]:
+        made = circumstances(workers)
+        for job in jobs:
+            executors.write_run(job, run_briefly(job.study, job.seed), store, made)
+            yield job
+
+    monkeypatch.setattr(runner, "in_processes", in_this_process)

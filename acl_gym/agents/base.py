@@ -139,11 +139,14 @@ class TabularAgent(SavedAgent):
             if self.env is not None:
                 parts += [name_of(self.env), f"{self.num_envs} {self.slots_are}"]
             parts.append(repr(self.partition))
-            trials = "1 trial" if self.trials == 1 else f"{self.trials} trials"
-            parts += [trials, f"{count(self.num_timesteps)} steps"]
+            parts.append(self._learned())
         except AttributeError:  # not made completely
             return f"{name}(not complete)"
         return f"{name}({', '.join(map(short, parts))})"
+
+    def _learned(self) -> str:
+        trials = "1 trial" if self.trials == 1 else f"{self.trials} trials"
+        return f"{trials}, {count(self.num_timesteps)} steps"
 
     @guarded
     def _repr_html_(self) -> str:
@@ -154,7 +157,7 @@ class TabularAgent(SavedAgent):
             facts = [("environment", f"{name_of(self.env)}, {slots}"), *facts]
         facts += [
             ("longest episode", f"{self.max_steps} steps"),
-            ("learned", f"{self.trials} trials, {count(self.num_timesteps)} steps"),
+            ("learned", self._learned()),
             ("time", f"{self.seconds:.3g} s"),
         ]
         last = self.history[-1] if self.history else {}

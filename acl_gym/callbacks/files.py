@@ -92,7 +92,7 @@ class CSVLog(Callback):
     """
 
     def __init__(self, path: str | Path) -> None:
-        self.path = files.checked_target(validation.path("path", path))
+        self.path = files.checked_target(validation.file_path("path", path))
         if self.path.exists() and not _is_log(self.path):
             raise ValueError(
                 f"{self.path} exists and is not a log of acl-gym, whose first column "

@@ -24,11 +24,11 @@ HELP = """Ant Colony Learning: colonies of ants that learn control policies.
 
 \b
 Examples:
-  acl-gym envs                                    list the environments
-  acl-gym train acl_gym/Pendulum-v0 --out a.npz   learn, in a few seconds
-  acl-gym evaluate a.npz                          evaluate the saved policy
-  acl-gym compare                                 compare ACL, Q-learning, DQN
-  acl-gym reproduce fig5.4 --runs 3               repeat a figure of the thesis
+  acl-gym envs                                   list the environments
+  acl-gym train acl_gym/Pendulum-v0 --out a.npz  learn, in a few seconds
+  acl-gym evaluate a.npz                         evaluate the saved policy
+  acl-gym compare                                compare ACL, Q-learning, DQN
+  acl-gym reproduce fig5.4 --runs 3              repeat a figure of the thesis
 
 For the options of a command: acl-gym train --help. Exit codes are 0 for success, 1 for
 a run that failed, 2 for bad arguments, 130 for Ctrl-C, 143 for SIGTERM, and 141 where

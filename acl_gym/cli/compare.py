@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -64,7 +65,7 @@ class CompareCommand(Command):
         environments = "\n".join(
             f"  {system.env_id}\n    trials: {system.budgets['quick'].trials}, steps of "
             f"DQN: {system.budgets['quick'].dqn_steps:,} (quick)\n"
-            f"    {', '.join(system.agents)}"
+            + textwrap.indent(textwrap.fill(", ".join(system.agents), 72), "    ")
             for system in systems
         )
         self.epilog = (

@@ -26,7 +26,7 @@ Examples:
   acl-gym evaluate pendulum.npz
   acl-gym evaluate pendulum-best.npz --video pendulum.gif
   acl-gym evaluate pendulum.npz --render
-  acl-gym evaluate pendulum.npz --episodes 1000 --seed 7     random initial states
+  acl-gym evaluate pendulum.npz --episodes 1000 --seed 7   random starts
   acl-gym evaluate swing_up.npz --env-id acl_gym/Pendulum-v0 --json
   acl-gym evaluate mine.npz --env-id my_module:MyEnv-v0
 """

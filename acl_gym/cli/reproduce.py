@@ -24,12 +24,12 @@ same code, is not made again: after an interruption the same command continues.
 
 \b
 Examples:
-  acl-gym reproduce --list                   the figures, and what they need
-  acl-gym reproduce fig5.4 --runs 3          one figure, in a minute
-  acl-gym reproduce claims --out results/c   all that decides a claim
-  acl-gym reproduce versus --runs 3          against Q-learning, Q(lambda) and DQN
-  acl-gym reproduce all                      everything, an hour or so on two cores
-  acl-gym reproduce all --executor ray       on a cluster (pip install acl-gym[cluster])
+  acl-gym reproduce --list                 the figures, and what they need
+  acl-gym reproduce fig5.4 --runs 3        one figure, in a minute
+  acl-gym reproduce claims --out results   all that decides a claim
+  acl-gym reproduce versus --runs 3        against Q-learning and DQN
+  acl-gym reproduce all                    everything, about an hour
+  acl-gym reproduce all --executor ray     needs pip install acl-gym[cluster]
 """
 
 REPORT_HELP = """Write the report of a reproduction again.
@@ -149,6 +149,11 @@ def report(
     debug: DebugOption = False,
 ) -> None:
     """Write the report; see `REPORT_HELP`."""
+    if not directory.is_dir():  # before the import, which takes seconds
+        raise BadArgumentError(
+            f"there is no folder {directory}; `acl-gym reproduce --out {directory}` "
+            "makes one."
+        )
     from acl_gym.experiments import reproduce as engine
 
     try:

@@ -53,12 +53,23 @@ class PolicyCost:
     def _repr_html_(self) -> str:
         """What a notebook shows: the measures as a table."""
         rows = [(name.replace("_", " "), value) for name, value in self._facts()]
-        costs = [digits(float(q)) for q in np.quantile(self.costs, (0.0, 0.5, 1.0))]
-        spread = f"lowest {costs[0]}, median {costs[1]}, highest {costs[2]}"
-        return table([*rows, ("costs", spread), ("episodes", self._episodes())])
+        name, values = ("costs", self.costs)
+        if self._are_returns():
+            name, values = ("returns", self.returns)
+        ends = [digits(float(q)) for q in np.quantile(values, (0.0, 0.5, 1.0))]
+        spread = f"lowest {ends[0]}, median {ends[1]}, highest {ends[2]}"
+        return table([*rows, (name, spread), ("episodes", self._episodes())])
+
+    def _are_returns(self) -> bool:
+        """Whether the costs are returns turned round, of rewards that are no costs."""
+        return bool((self.returns > 0).any()) and bool(
+            np.array_equal(self.costs, -self.returns)
+        )
 
     def _facts(self) -> list[tuple[str, str]]:
         facts = [("cost", digits(self.cost))]
+        if self._are_returns():
+            facts = [("mean_return", digits(self.mean_return))]
         if self.success is not None:
             facts.append(("success_rate", f"{self.success_rate:.0%}"))
         return facts
@@ -66,7 +77,10 @@ class PolicyCost:
     def _episodes(self) -> str:
         shortest, longest = int(self.lengths.min()), int(self.lengths.max())
         span = f"{shortest}" if shortest == longest else f"{shortest} to {longest}"
-        return f"{self.lengths.size} episodes of {span} steps"
+        episodes = (
+            "1 episode" if self.lengths.size == 1 else f"{self.lengths.size} episodes"
+        )
+        return f"{episodes} of {span} {'step' if span == '1' else 'steps'}"
 
     @property
     def cost(self) -> float:

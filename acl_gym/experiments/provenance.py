@@ -11,7 +11,7 @@ import subprocess
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import acl_gym
 
@@ -44,7 +44,7 @@ def code_of_runs(root: Path = ROOT) -> str:
         return hashlib.sha256(archive.read_bytes()).hexdigest()
     for name, path in sorted(sources_of(RUNS, root).items()):
         digest.update(name.encode())
-        digest.update(ast.dump(_executed_tree(path)).encode())
+        digest.update(_read(path).executed.encode())
     for path in sorted(root.glob("envs/**/*.txt")):
         digest.update(path.name.encode())
         digest.update(path.read_bytes())
@@ -77,13 +77,10 @@ def _module_name(path: Path, root: Path) -> str:
 
 def _imported(path: Path, files: dict[str, Path]) -> list[str]:
     """The modules of this package that a file imports when it is run."""
-    names = []
-    for node in ast.walk(_executed_tree(path)):
-        if isinstance(node, ast.Import):
-            names += [each.name for each in node.names]
-        elif isinstance(node, ast.ImportFrom) and node.module:
-            names += [_home(node.module, each.name, files) for each in node.names]
-    return names
+    return [
+        each.module if each.name is None else _home(each.module, each.name, files)
+        for each in _read(path).imports
+    ]
 
 
 def _home(package: str, name: str, files: dict[str, Path]) -> str:
@@ -95,16 +92,44 @@ def _home(package: str, name: str, files: dict[str, Path]) -> str:
         return f"{package}.{name}"
     path = files.get(package)
     if path is not None and path.name == "__init__.py":
-        for node in ast.walk(_executed_tree(path)):
-            if isinstance(node, ast.ImportFrom) and node.module:
-                for each in node.names:
-                    if (each.asname or each.name) == name:
-                        return _home(node.module, each.name, files)
+        for each in _read(path).imports:
+            if each.name is not None and (each.alias or each.name) == name:
+                return _home(each.module, each.name, files)
     return package
 
 
+class _Import(NamedTuple):
+    """A module that is imported, or a name of it; and what the name is called then."""
+
+    module: str
+    name: str | None = None
+    alias: str | None = None
+
+
+class _Source(NamedTuple):
+    """What runs when a file is imported and its functions called."""
+
+    executed: str
+    imports: tuple[_Import, ...]
+
+
+def _read(path: Path) -> _Source:
+    return _parse(path.read_bytes())
+
+
+@cache
+def _parse(content: bytes) -> _Source:
+    """Read a file once: packages are asked for again and again."""
+    visitor = _Executed()
+    executed = ast.dump(visitor.visit(ast.parse(content)))
+    return _Source(executed, tuple(visitor.imports))
+
+
 class _Executed(ast.NodeTransformer):
-    """Removes docstrings, and what only a type checker reads."""
+    """Removes docstrings, and what only a type checker reads; collects imports."""
+
+    def __init__(self) -> None:
+        self.imports: list[_Import] = []
 
     def visit_Expr(self, node: ast.Expr) -> ast.AST | None:
         value = node.value
@@ -113,19 +138,24 @@ class _Executed(ast.NodeTransformer):
         return self.generic_visit(node)
 
     def visit_If(self, node: ast.If) -> ast.AST | list[ast.AST]:
-        self.generic_visit(node)
         name = getattr(node.test, "id", getattr(node.test, "attr", None))
-        return [*node.orelse] if name == "TYPE_CHECKING" else node
+        if name != "TYPE_CHECKING":
+            return self.generic_visit(node)
+        node.body = []  # not visited, so that none of its imports is collected
+        self.generic_visit(node)
+        return [*node.orelse]
+
+    def visit_Import(self, node: ast.Import) -> ast.AST:
+        self.imports += [_Import(each.name) for each in node.names]
+        return node
 
     def visit_ImportFrom(self, node: ast.ImportFrom) -> ast.AST | None:
         node.names = [each for each in node.names if each.name != "TYPE_CHECKING"]
+        if node.module:
+            self.imports += [
+                _Import(node.module, each.name, each.asname) for each in node.names
+            ]
         return node if node.names else None
-
-
-def _executed_tree(path: Path) -> ast.Module:
-    """The syntax tree of what runs when a file is imported and its functions called."""
-    tree: ast.Module = _Executed().visit(ast.parse(path.read_bytes()))
-    return tree
 
 
 @cache

@@ -45,7 +45,7 @@ def write_c_header(
     path: str | Path, source: Source, name: str = "policy", precision: str = "float"
 ) -> Path:
     """Write a header; see `PartitionPolicy.to_c`."""
-    target = validation.path("path", path)
+    target = validation.file_path("path", path)
     if not target.suffix:
         target = target.with_name(f"{target.name}.h")
     files.checked_target(target)

@@ -20,7 +20,7 @@ from acl_gym.plotting.plane import Key
 from acl_gym.plotting.scenes import Stage, draw_stage, stages_of
 from acl_gym.plotting.subject import Labels
 from acl_gym.utils import validation
-from acl_gym.utils.files import write_atomically
+from acl_gym.utils.files import checked_target, write_atomically
 
 SHOWN = (0, 2, 4, 6, 8, 10, 12, 15, 20, 30, 60, 100)
 """After these trials of a new agent its policy is shown and followed."""
@@ -75,6 +75,7 @@ def animate(
     Raises:
         TypeError: `agent` is no agent.
         ValueError: an argument does not fit the agent, or `path` is of another kind.
+        OSError: `path` cannot be written, which is found before the agent learns.
         RuntimeError: ffmpeg is missing.
     """
     if not isinstance(agent, TabularAgent):
@@ -214,7 +215,7 @@ def _checked_path(path: Any) -> Path:
             f"path must lie in a folder that exists, got {str(target)!r}; make "
             f"{str(target.parent)!r} first."
         )
-    return target
+    return checked_target(target)
 
 
 def _checked_trials(agent: TabularAgent, trials: Any) -> list[int]:

@@ -78,7 +78,7 @@ def plot_policy(
         return _policy_curve(subject, plane, ax)
     wide = 5.2 if colorbar else 4.0
     with style.axes_or_new(ax, wide, 3.9 if plane.fixed else 3.7) as ax:
-        if isinstance(subject.system, Navigation) and plane.shown == (0, 2):
+        if draws_arrows(subject, plane):
             _draw_forces(ax, subject, plane)
         else:
             colours = palettes.of_inputs(subject)
@@ -149,6 +149,11 @@ def plot_pheromone(
             palettes.add_level_bar(ax, mesh, name)
         _set_title(ax, _kind(subject), subject, plane)
     return ax
+
+
+def draws_arrows(subject: Subject, plane: Plane) -> bool:
+    """Whether actions are drawn as arrows, which need no bar that explains colours."""
+    return isinstance(subject.system, Navigation) and plane.shown == (0, 2)
 
 
 def draw_actions(

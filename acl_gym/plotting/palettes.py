@@ -120,7 +120,8 @@ def add_bar(
         ax: the picture.
         colours: what is explained.
         below: whether patches stand below the figure instead.
-        slim: whether the name of the bar stands above it.
+        slim: whether the name of the bar stands above it, or below one that is as high
+            as the picture.
     """
     if below:
         handles = [
@@ -136,7 +137,11 @@ def add_bar(
     place = (1.03, 0.5 * (1.0 - height), 0.045, height)
     bar = _bar(ax, ScalarMappable(norm, cmap), "" if slim else colours.title, place)
     if slim:
-        bar.ax.set_title(colours.title.replace(" (", "\n("), size="small")
+        if height < 1.0:
+            bar.ax.set_title(colours.title.replace(" (", "\n("), size="small")
+        else:  # above it the title of the picture may stand
+            names = colours.title.replace(", ", ",\n")
+            bar.ax.set_xlabel(names, size="small", loc="left")
     bar.set_ticks(list(range(count)), labels=colours.names)
     bar.ax.tick_params(length=0)
 

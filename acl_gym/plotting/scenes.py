@@ -17,7 +17,7 @@ from acl_gym.envs.pendulum.system import Pendulum
 from acl_gym.evaluation import evaluate_policy_cost
 from acl_gym.plotting import cells, palettes, style
 from acl_gym.plotting.learning import Y_AXES
-from acl_gym.plotting.maps import plot_pheromone, plot_policy
+from acl_gym.plotting.maps import draws_arrows, plot_pheromone, plot_policy
 from acl_gym.plotting.plane import Plane, plane_of
 from acl_gym.plotting.subject import Subject, subject_of
 from acl_gym.plotting.trajectories import run, without_jumps
@@ -135,9 +135,14 @@ def draw_stage(panels: Sequence[Axes], stage: Stage) -> Callable[[int], list[Any
         policy, middle, env=subject.env, limits=stage.limits, colorbar=False, **looks
     )
     words = "" if not subject.variables else _plane(stage).words()
+    curves = bool(subject.variables) and len(_plane(stage).shown) == 1
+    levels = "pheromone" if curves else "strongest pheromone"
     left.set_title("\n".join(filter(None, ["policy", words])))
-    middle.set_title("\n".join(filter(None, ["strongest pheromone", words])))
-    _explain(left, middle, stage)
+    middle.set_title("\n".join(filter(None, [levels, words])))
+    if curves:  # both have names at their lines
+        middle.set_ylabel("")
+    else:
+        _explain(left, middle, stage)
     movers = [_walker(left, stage, "black"), _walker(middle, stage, "white")]
     if isinstance(subject.system, Pendulum):
         movers.append(_pendulum(right, stage))
@@ -158,7 +163,8 @@ def _explain(left: Axes, middle: Axes, stage: Stage) -> None:
     if subject.variables:
         middle.set_ylabel("")
         middle.tick_params(labelleft=False)
-        palettes.add_bar(left, palettes.of_inputs(subject), slim=True)
+        if not draws_arrows(subject, _plane(stage)):
+            palettes.add_bar(left, palettes.of_inputs(subject), slim=True)
     norm = palettes.norm_of(np.array(stage.limits), stage.limits)
     palettes.add_level_bar(middle, palettes.levels(norm), "", extend="max")
 
@@ -172,8 +178,8 @@ def _walker(ax: Axes, stage: Stage, color: str) -> Callable[[int], list[Any]]:
     subject = stage.subject
     if subject.variables:
         plane = _plane(stage)
-        if len(plane.shown) != 2:
-            return lambda at: []
+        if len(plane.shown) == 1:
+            return _line_walker(ax, stage.states[:, plane.shown[0]])
         places = stage.states[:, plane.shown]
         circular: Plane | None = plane
     else:
@@ -188,6 +194,21 @@ def _walker(ax: Axes, stage: Stage, color: str) -> Callable[[int], list[Any]]:
         tail.set_data(*(way if circular is None else without_jumps(way, circular)).T)
         dot.set_data(places[at : at + 1, 0], places[at : at + 1, 1])
         return [tail, dot]
+
+    return move
+
+
+def _line_walker(ax: Axes, values: FloatArray) -> Callable[[int], list[Any]]:
+    """The only state variable that is shown, as a line across the curves."""
+    line = ax.axvline(values[0], color="0.2", linewidth=1.2, zorder=5)
+    (dot,) = ax.plot([], [], transform=ax.get_xaxis_transform(), **_DOT)
+    dot.set_clip_on(False)
+    dot.set_in_layout(False)  # an empty line beyond the panel confuses the layout
+
+    def move(at: int) -> list[Any]:
+        line.set_xdata([values[at], values[at]])
+        dot.set_data([values[at]], [0.0])
+        return [line, dot]
 
     return move
 

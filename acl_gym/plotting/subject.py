@@ -240,7 +240,8 @@ def _space(env: Any, name: str) -> Any:
     if not isinstance(space, spaces.Space):
         raise TypeError(
             "env must be a Gymnasium environment, single or vector, got "
-            f"{validation.shown(env)}."
+            f"{validation.shown(env)}; make one with gym.make(id) or gym.make_vec(id, "
+            "num_envs=n)."
         )
     return space
 

@@ -288,7 +288,7 @@ def _result(subject: Subject, path: Trajectory) -> str:
     time, name = _times(subject, path)
     end = f"{time[-1]:.3g} s" if name == "time (s)" else f"{len(path.costs)} steps"
     if subject.system is None:
-        return f"{end}, return {-path.costs.sum():.4g}"
+        return f"{end}, return {0.0 - path.costs.sum():.4g}"
     how = "at the goal after" if path.success else "not at the goal in"
     return f"{how} {end}, cost {path.costs.sum():.3g}"
 

@@ -26,9 +26,11 @@ from acl_gym.envs.wrappers.partial_reset import reset_slots
 from acl_gym.sb3.checks import (
     check_action_space,
     check_observation_space,
+    check_observations,
     settle_mode,
 )
 from acl_gym.sb3.slots import SlotEnvs, slot_envs
+from acl_gym.utils import validation
 from acl_gym.utils.vector_envs import require_vector_env
 
 _FINAL_KEYS = ("final_obs", "_final_obs", "final_info", "_final_info")
@@ -78,6 +80,7 @@ class VectorEnvAdapter(VecEnv):
 
     def __init__(self, env: VectorEnv[Any, Any, Any]) -> None:
         require_vector_env(env)
+        validation.integer("env.num_envs", env.num_envs, at_least=1)
         check_observation_space(env.single_observation_space)
         check_action_space(env.single_action_space)
         self.env = env
@@ -103,9 +106,11 @@ class VectorEnvAdapter(VecEnv):
             The first observations; infos are in `reset_infos`.
         """
         seed, options = self._seeds[0], self._options[0]
-        observations, infos = self.env.reset(
+        result = self.env.reset(
             seed=None if seed is None else int(seed), options=options or None
         )
+        observations, infos = received.parts("reset", result, 2)
+        check_observations(observations, self.observation_space, self.num_envs)
         self.reset_infos = _infos_per_slot(infos, self.num_envs)
         self._reset_seeds()
         self._reset_options()
@@ -151,10 +156,17 @@ class VectorEnvAdapter(VecEnv):
                 "reset()."
             )
         actions, self._actions = self._actions, None
-        observations, rewards, terminated, truncated, infos = self.env.step(actions)
+        result = received.parts("step", self.env.step(actions), 5)
+        observations, rewards, terminated, truncated, infos = result
         n = self.num_envs
-        received.observations(observations, n)
+        check_observations(observations, self.observation_space, n)
         rewards = received.rewards(rewards, n)
+        if not np.isfinite(rewards).all():
+            slot = int(np.argmin(np.isfinite(rewards)))
+            raise ValueError(
+                f"rewards must be finite, got {rewards[slot]} in slot {slot}; check the "
+                "environment's reward function."
+            )
         terminated = received.flags("terminated", terminated, n)
         truncated = received.flags("truncated", truncated, n)
         dones = np.logical_or(terminated, truncated)
@@ -358,7 +370,7 @@ def _infos_per_slot(infos: Any, count: int) -> list[dict[str, Any]]:
     infos = received.infos(infos, count)
     rows: list[dict[str, Any]] = [{} for _ in range(count)]
     for key, values in infos.items():
-        if key.startswith("_") and key[1:] in infos:
+        if str(key).startswith("_") and key[1:] in infos:
             continue
         mask = infos.get(f"_{key}")
         slots = range(count) if mask is None else np.flatnonzero(mask).tolist()

@@ -90,6 +90,36 @@ def check_observation_space(space: spaces.Space[Any]) -> None:
         _check_start("observations", part)
 
 
+def check_observations(
+    observations: Any, space: spaces.Space[Any], n_slots: int
+) -> None:
+    """Refuse observations that buffers of Stable-Baselines3 would not take.
+
+    Raises:
+        ValueError: there is not one row a slot, or a row has not the shape of `space`.
+    """
+    received.observations(observations, n_slots)
+    if isinstance(space, spaces.Dict):
+        given = (
+            set(observations) if isinstance(observations, dict) else type(observations)
+        )
+        if given != set(space.spaces):
+            raise ValueError(
+                f"observations must be a dict with the keys {list(space.spaces)}, got "
+                f"{given}; check the environment's reset and step."
+            )
+    parts = space.spaces if isinstance(space, spaces.Dict) else {None: space}
+    for key, part in parts.items():
+        shape = np.shape(observations if key is None else observations[key])
+        if shape != (n_slots, *(part.shape or ())):
+            name = "observations" if key is None else f"observations[{key!r}]"
+            raise ValueError(
+                f"{name} must have shape {(n_slots, *(part.shape or ()))}, a row for "
+                f"each slot in {validation.shown(part)}, got {shape}; check the "
+                "environment's reset and step."
+            )
+
+
 def _check_start(what: str, space: spaces.Space[Any]) -> None:
     """Stable-Baselines3 assumes that discrete values start from 0."""
     if np.any(getattr(space, "start", 0)):

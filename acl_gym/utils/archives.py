@@ -258,8 +258,8 @@ def _content(source: Target, most: int) -> tuple[str, bytes]:
         return name, _read(source, name, most)  # type: ignore[arg-type]
     named = with_suffix(source)  # type: ignore[arg-type]
     typed = Path(source)  # type: ignore[arg-type]
-    path = named if named.is_file() else typed
-    if not path.is_file():
+    path = named if _is_there(named) else typed
+    if not _is_there(path):
         or_typed = "" if typed == named else f", and none at {typed}"
         raise FileNotFoundError(
             f"no agent file at {named}{or_typed}; give the name of a file that "
@@ -267,6 +267,14 @@ def _content(source: Target, most: int) -> tuple[str, bytes]:
         )
     with path.open("rb") as file:
         return str(path), _read(file, str(path), most)
+
+
+def _is_there(path: Path) -> bool:
+    """Whether there is such a file; names that are too long are of none."""
+    try:
+        return path.is_file()
+    except OSError:
+        return False
 
 
 def _read(file: BinaryIO, name: str, most: int) -> bytes:

@@ -27,7 +27,7 @@ _OLD = 24 * 3600.0
 
 def with_suffix(path: str | os.PathLike[str]) -> Path:
     """Add `.npz` to a path that lacks it."""
-    path = validation.path("path", path)
+    path = validation.file_path("path", path)
     return path if path.suffix == ".npz" else path.with_name(path.name + ".npz")
 
 
@@ -47,11 +47,18 @@ def checked_target(
         IsADirectoryError: the path is a folder.
         OSError: the folder, or the file that is there, cannot be written.
     """
-    if not path.parent.is_dir():
+    try:
+        has_folder, is_folder = path.parent.is_dir(), path.is_dir()
+    except OSError as error:  # such as a name that is too long
+        raise type(error)(
+            f"{validation.shown(str(path))} cannot be the name of a file "
+            f"({error.strerror}); give another name."
+        ) from error
+    if not has_folder:
         raise FileNotFoundError(
             f"there is no folder {path.parent} to save {path.name} in; make it first."
         )
-    if path.is_dir():
+    if is_folder:
         raise IsADirectoryError(f"{path} is a folder; give the name of a file.")
     try:
         target, before = _resolved(path)

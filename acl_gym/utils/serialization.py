@@ -80,6 +80,10 @@ class Missing:
     def __init__(self, parameter: str, name: str) -> None:
         self.parameter, self.name = parameter, name
 
+    def __repr__(self) -> str:
+        """What it stands in for."""
+        return f"<{self.name}, which is not in the file>"
+
     def error(self) -> ValueError:
         """What to raise where the object is needed."""
         return ValueError(

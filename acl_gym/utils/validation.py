@@ -220,6 +220,22 @@ def path(name: str, value: Any) -> Path:
     return Path(text)
 
 
+def file_path(name: str, value: Any) -> Path:
+    """Return the path of a file: one that ends in a name, as `.`, `..` and `/` do not.
+
+    Raises:
+        TypeError: `value` is neither text nor a path.
+        ValueError: `value` has no name at its end, or holds a NUL.
+    """
+    checked = path(name, value)
+    if checked.name in ("", ".."):
+        raise ValueError(
+            f"{name} must be the name of a file, got the folder {shown(value)}; add a "
+            "name to it."
+        )
+    return checked
+
+
 def read_only(array: NDArray[Any]) -> NDArray[Any]:
     """Return a view of `array` that cannot be written to."""
     view = array.view()
@@ -228,7 +244,7 @@ def read_only(array: NDArray[Any]) -> NDArray[Any]:
 
 
 def shown(value: Any) -> str:
-    """Return what a message shows of a value: its repr, shortened.
+    """Return what a message shows of a value: its repr, on one line and shortened.
 
     Works for any value: one whose repr fails is described by its type.
     """
@@ -236,6 +252,8 @@ def shown(value: Any) -> str:
         text = repr(value)
     except Exception:
         return f"an object of type {type(value).__name__}"
+    if "\n" in text:  # as of arrays
+        text = " ".join(text.split())
     return text if len(text) <= _LONGEST else f"{text[:_LONGEST]}..."
 
 

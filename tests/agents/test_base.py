@@ -341,7 +341,9 @@ def test_a_file_from_before_there_were_notes_is_read(
 
 def test_the_wrong_class_is_refused(tmp_path: Path) -> None:
     on_chain(ACL).save(tmp_path / "agent")
-    with pytest.raises(ValueError, match="must hold a QLearning, got 'ACL'; load it"):
+    with pytest.raises(
+        ValueError, match="must hold an agent of class QLearning, got 'ACL'; load it"
+    ):
         QLearning.load(tmp_path / "agent")
 
 

@@ -125,6 +125,13 @@ def test_what_cannot_be_saved_is_given_again(name: str, tmp_path: Path) -> None:
     assert at_once.table.tobytes() == agent.table.tobytes()
 
 
+def test_what_is_missing_shows_its_name(tmp_path: Path) -> None:
+    loaded = ACL.load(colony(epsilon=one_third).save(tmp_path / "agent"))
+    name = own_name(one_third)
+    assert repr(loaded.epsilon) == f"<{name}, which is not in the file>"
+    assert name in loaded._repr_html_()
+
+
 def test_a_name_says_where_it_is_from() -> None:
     assert own_name(length).endswith("test_own_objects:length")
     assert own_name(Falling()) == own_name(Falling)
@@ -243,7 +250,9 @@ def test_a_subclass_gets_the_arguments_that_its_file_lacks(tmp_path: Path) -> No
     loaded = Bonus.load(path, bonus=7)
     assert loaded.bonus == 7
     assert loaded.table.tobytes() == agent.table.tobytes()
-    with pytest.raises(ValueError, match="must hold a ACL, got 'Bonus'"):
+    with pytest.raises(
+        ValueError, match="must hold an agent of class ACL, got 'Bonus'"
+    ):
         ACL.load(path)
 
 

@@ -314,13 +314,12 @@ def test_parameters_are_those_of_the_system() -> None:
 # --- compare -------------------------------------------------------------------
 
 
+@pytest.mark.usefixtures("short_runs")
 def test_compare_prints_results_as_json(tmp_path: Path) -> None:
     out = tmp_path / "results"
     arguments = ["compare", "--preset", "smoke", "--agents", "q-crisp", "--seeds", "2"]
-    arguments += ["--seed", "5", "--workers", "1", "--out", str(out), "--json"]
-    done = run(*arguments, cwd=tmp_path)
-    assert done.returncode == 0, done.stderr
-    results = json.loads(done.stdout)
+    arguments += ["--seed", "5", "--workers", "1", "--out", str(out)]
+    results = figures(*arguments)
     assert results == json.loads((out / "results.json").read_text())
     assert {row["seed"] for row in results["rows"]} == {5, 6}
     command = (

@@ -165,6 +165,7 @@ def test_a_window(monkeypatch: pytest.MonkeyPatch) -> None:
     assert found == figures("evaluate", "x.npz")
 
 
+@pytest.mark.usefixtures("short_runs")
 def test_any_environment_is_compared(tmp_path: Path) -> None:
     shown = invoke(
         *("compare", "--env", "FrozenLake-v1", "--preset", "smoke", "--seeds", "2"),

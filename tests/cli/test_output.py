@@ -31,6 +31,12 @@ def test_environments_fit_the_terminal(
         assert text.split() == wide.split(), "no word is cut"
 
 
+@pytest.mark.parametrize("command", ["", "train", "evaluate", "envs", "compare"])
+def test_help_fits_the_terminal(command: str) -> None:
+    text = invoke(*filter(None, [command, "--help"])).stdout
+    assert max(map(len, text.splitlines())) <= 80
+
+
 @pytest.mark.parametrize("encoding", ["ascii", "cp1252"])
 @pytest.mark.parametrize(
     "command", [["envs"], ["train", "--help"], ["--help"], ["evaluate", "λ.npz"]]
@@ -83,42 +89,43 @@ def test_the_list_of_environments_from_a_zip_file(tmp_path: Path) -> None:
     assert "--param has no 'x'; choose from" in bad.stderr
 
 
-@pytest.mark.parametrize(
-    "arguments",
-    [
-        ["trian"],
-        ["train", "CartPol-v1"],
-        ["train", "CartPole-v1", "--agent", "sarsa"],
-        ["train", "CartPole-v1", "--param", "speed=1"],
-        ["train", "CartPole-v1", "--param", "deposit=rnak"],
-        ["reproduce", "fig39"],
-        ["compare", "--env", "CartPol-v1"],
-        ["compare", "--agents", "sarsa"],
-        ["envs", "CartPole-v1"],
-    ],
-)
-def test_wrong_names_are_answered_before_anything_slow_is_imported(
-    arguments: list[str],
-) -> None:
-    code = f"""
+WRONG = [
+    ["trian"],
+    ["train", "CartPol-v1"],
+    ["train", "CartPole-v1", "--agent", "sarsa"],
+    ["train", "CartPole-v1", "--param", "speed=1"],
+    ["train", "CartPole-v1", "--param", "deposit=rnak"],
+    ["reproduce", "fig39"],
+    ["compare", "--env", "CartPol-v1"],
+    ["compare", "--agents", "sarsa"],
+    ["envs", "CartPole-v1"],
+]
+REFUSE_EACH = f"""
 import sys
 from acl_gym.cli.app import app
-try:
-    app({arguments!r}, prog_name="acl-gym")
-except SystemExit as end:
-    assert end.code == 2, end.code
-heavy = {{"torch", "numba", "matplotlib", "pandas"}} & set(sys.modules)
-assert not heavy, heavy
+for arguments in {WRONG}:
+    try:
+        app(arguments, prog_name="acl-gym")
+    except SystemExit as end:
+        assert end.code == 2, end.code
+    heavy = {{"torch", "numba", "matplotlib", "pandas"}} & set(sys.modules)
+    assert not heavy, (arguments, heavy)
+    print("end of", arguments, file=sys.stderr)
 """
+
+
+def test_wrong_names_are_answered_before_anything_slow_is_imported() -> None:
     done = subprocess.run(
-        [sys.executable, "-c", code],
+        [sys.executable, "-c", REFUSE_EACH],
         env={**os.environ, "PYTHONPATH": str(ROOT)},
         capture_output=True,
         text=True,
         check=False,
     )
     assert done.returncode == 0, done.stderr
-    assert len(done.stderr.splitlines()) == 1
+    lines = done.stderr.splitlines()
+    assert lines[1::2] == [f"end of {arguments}" for arguments in WRONG]
+    assert all(line.startswith("acl-gym: ") for line in lines[::2])
 
 
 def test_the_names_are_those_that_there_are() -> None:
@@ -175,3 +182,9 @@ def test_lines_of_progress_are_seconds_apart() -> None:
     began = time.monotonic()
     shown = invoke(*SMALL)
     assert len(shown.stderr.splitlines()) <= (time.monotonic() - began) / 5
+
+
+def test_a_report_of_a_folder_that_is_not_there(tmp_path: Path) -> None:
+    done = invoke("report", str(tmp_path / "no"))
+    assert done.exit_code == 2
+    assert "there is no folder" in done.stderr

@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
-from tests.cli.runner import figures, invoke, refused, run
+import pytest
+
+from tests.cli.runner import figures, invoke, refused
 
 SMALL = ["reproduce", "fig3.9", "--runs", "2", "--workers", "1"]
 
 
+@pytest.fixture(autouse=True)
+def elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
+@pytest.mark.usefixtures("short_runs")
 def test_a_figure_and_its_report(tmp_path: Path) -> None:
-    done = run(*SMALL, "--out", "r", "--json", cwd=tmp_path)
-    assert done.returncode == 0, done.stderr
-    found = json.loads(done.stdout)
+    found = figures(*SMALL, "--out", "r")
     assert found["runs"] == 2
     (experiment,) = found["experiments"]
     assert experiment["name"] == "fig3.9"
@@ -42,21 +47,21 @@ def test_a_figure_and_its_report(tmp_path: Path) -> None:
 
     everything = [path for path in folder.rglob("*") if path.is_file()]
     times = [path.stat().st_mtime_ns for path in everything]
-    again = run(*SMALL, "--out", "r", cwd=tmp_path)
-    assert again.returncode == 0, again.stderr
+    again = invoke(*SMALL, "--out", "r")
+    assert again.exit_code == 0, again.output
     assert "Nothing to do" in again.stdout
     assert "Report" in again.stdout
     assert [path.stat().st_mtime_ns for path in everything] == times
 
     # What is missing is made, and nothing else.
     (folder / "figures" / "fig3.9.png").unlink()
-    again = run(*SMALL, "--out", "r", cwd=tmp_path)
+    again = invoke(*SMALL, "--out", "r")
     assert "Nothing to do" not in again.stdout
     assert (folder / "figures" / "fig3.9.png").is_file()
     assert [path.stat().st_mtime_ns for path in files] == before
 
     # Whoever wants no figures leaves those that are there, of these results.
-    again = run(*SMALL, "--out", "r", "--no-figures", cwd=tmp_path)
+    again = invoke(*SMALL, "--out", "r", "--no-figures")
     assert "Nothing to do" in again.stdout
     assert (folder / "figures" / "fig3.9.png").is_file()
 
@@ -67,13 +72,14 @@ def test_a_figure_and_its_report(tmp_path: Path) -> None:
     assert (folder / "report.html").is_file()
 
 
+@pytest.mark.usefixtures("short_runs")
 def test_results_replace_what_was_made_of_others_only(tmp_path: Path) -> None:
     for name in ("fig3.9.svg", "fig5.4.png", "holiday.png"):
         path = tmp_path / "r" / "figures" / name
         path.parent.mkdir(parents=True, exist_ok=True)
         path.touch()
-    again = run(*SMALL, "--out", "r", "--no-figures", cwd=tmp_path)
-    assert again.returncode == 0, again.stderr
+    again = invoke(*SMALL, "--out", "r", "--no-figures")
+    assert again.exit_code == 0, again.output
     assert [path.name for path in path.parent.iterdir()] == ["holiday.png"]
 
 
@@ -90,5 +96,5 @@ def test_bad_arguments() -> None:
     assert "--executor must be one of 'local', 'ray'" in refused(
         *(2, "reproduce", "fig3.9", "--executor", "slurm")
     )
-    assert "there is no results.json in" in refused(2, "report", "/no/such/folder")
+    assert "there is no folder" in refused(2, "report", "/no/such/folder")
     refused(2, "reproduce", "fig3.9", "--runs", "0")

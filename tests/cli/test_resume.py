@@ -250,8 +250,10 @@ def test_a_trial_that_takes_long_is_given_up(tmp_path: Path) -> None:
 
 
 def test_the_second_signal_ends_at_once(tmp_path: Path) -> None:
-    (tmp_path / "my_slow.py").write_text(SLOW.replace("SLEEP", "0.01"))
+    """Steps take long once there is a log, so that a trial is under way from then on."""
     log = tmp_path / "log.csv"
+    seconds = f"0.05 if __import__('os').path.exists({str(log)!r}) else 0.0"
+    (tmp_path / "my_slow.py").write_text(SLOW.replace("SLEEP", seconds))
     arguments = ["train", "my_slow:Slow-v0", "--ants", "2", "--cells", "5"]
     arguments += ["--evaluate-every", "1000"]
     process = start(tmp_path, *arguments, "--param", "tau0=0.001", "--log", str(log))

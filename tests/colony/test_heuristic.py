@@ -100,14 +100,14 @@ def test_a_heuristic_of_ones_gives_the_same_bits(
 ) -> None:
     monkeypatch.setattr(threads, "worth_it", lambda ants: n_threads > 1)
     rng = np.random.default_rng(1)
-    levels = np.exp(rng.normal(size=(30, 4)))
+    levels = np.exp(rng.normal(size=(30, 5)))
     index = rng.integers(0, 30, (500, 4)).astype(np.int32)
     degree = rng.dirichlet(np.ones(4), 500)
-    allowed = np.ones((500, 4), dtype=bool)
+    allowed = np.ones((500, 5), dtype=bool)
     allowed[:, 1] = rng.random(500) < 0.5
     found = []
-    for eta in (None, np.ones((30, 4)), np.full((30, 4), 7.0)):
-        pheromone = Pheromone(30, 4, 1e-4, 2.5, eta, 2.0)
+    for eta in (None, np.ones((30, 5)), np.full((30, 5), 7.0)):
+        pheromone = Pheromone(30, 5, 1e-4, 2.5, eta, 2.0)
         pheromone.set_levels(levels)
         actions = choose_actions(
             *(rule, pheromone, index, degree, 0.1, np.random.default_rng(2)),

@@ -305,6 +305,17 @@ def test_policy_variation_and_sensitivity_of_every_trial(kind: type) -> None:
     assert agent.history[0]["policy_variation"] > 0
 
 
+def test_rewards_that_are_no_costs_are_shown_as_returns() -> None:
+    returns = np.array([1.0, 3.0])
+    result = PolicyCost(-returns, None, np.array([4, 20]), returns)
+    assert repr(result) == "PolicyCost(mean_return=2, 2 episodes of 4 to 20 steps)"
+    page = result._repr_html_()
+    assert "lowest 1, median 2, highest 3" in page
+    assert "cost" not in page
+    steps = replace(result, costs=np.array([4.0, 20.0]))  # with a cost of the user
+    assert "cost=12" in repr(steps)
+
+
 def test_a_cost_says_what_it_is() -> None:
     env = gym.make_vec("acl_gym/Pendulum-v0", num_envs=1)
     agent = ACL(env, seed=0)
@@ -319,6 +330,8 @@ def test_a_cost_says_what_it_is() -> None:
     page = result._repr_html_()
     assert "lowest 1, median 2, highest 3" in page
     assert ">50%<" in page
+    one = replace(result, lengths=np.array([1]))
+    assert repr(one).endswith(" 1 episode of 1 step)")
     none = replace(
         result, **dict.fromkeys(("costs", "success", "lengths"), np.empty(0))
     )

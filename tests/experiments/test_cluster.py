@@ -41,7 +41,7 @@ def cluster() -> Iterator[None]:
 
 
 @pytest.mark.filterwarnings("default")  # Ray's own
-@pytest.mark.usefixtures("cluster")
+@pytest.mark.usefixtures("cluster", "short_runs")
 def test_a_cluster_gives_the_bits_of_this_machine(tmp_path: Path) -> None:
     found = {}
     for executor in ("ray", "local"):

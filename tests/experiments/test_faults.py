@@ -225,7 +225,7 @@ def test_numbers_that_are_edited_are_seen(tmp_path: Path) -> None:
 # --- whole commands ----------------------------------------------------------------
 
 
-@pytest.mark.slow
+@pytest.mark.usefixtures("short_runs")
 def test_a_figure_that_fails_loses_nothing(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -248,7 +248,7 @@ def reproduced(folder: Path) -> tuple[dict[str, Any], bool]:
     return reproduce.reproduce(["fig3.9"], 1, folder, workers=1, figures=False)
 
 
-@pytest.mark.slow
+@pytest.mark.usefixtures("short_runs")
 def test_files_that_were_changed_do_not_count_as_done(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:

@@ -33,6 +33,7 @@ def times_of(folder: Path) -> dict[str, int]:
     return {path.name: path.stat().st_mtime_ns for path in folder.glob("*.parquet")}
 
 
+@pytest.mark.usefixtures("short_runs")
 def test_runs_come_by_study_and_seed_and_are_made_once(tmp_path: Path) -> None:
     first = run_studies([SHORT, OTHER, SHORT], range(3), tmp_path, workers=2)
     before = times_of(tmp_path)
@@ -61,6 +62,7 @@ def test_of_equal_studies_the_most_demanding_counts() -> None:
     assert few.key == SHORT.key
 
 
+@pytest.mark.usefixtures("short_runs")
 def test_other_settings_or_other_code_run_again(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -75,6 +77,7 @@ def test_other_settings_or_other_code_run_again(
     assert not Store(tmp_path).has(Job(SHORT, 0))
 
 
+@pytest.mark.usefixtures("short_runs")
 def test_a_damaged_run_is_made_again_with_a_word(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
@@ -96,6 +99,7 @@ def test_a_failure_is_one_clear_error_and_loses_nothing(tmp_path: Path) -> None:
     assert times_of(tmp_path) == before
 
 
+@pytest.mark.usefixtures("short_runs")
 def test_two_runners_do_not_share_a_folder(tmp_path: Path) -> None:
     with FileLock(tmp_path / "running.lock"):
         with pytest.raises(FolderInUseError, match="another run works on"):
@@ -224,43 +228,50 @@ def test_processes_of_the_caller_are_left_alone(tmp_path: Path) -> None:
 
 FULL = """
 import resource, sys
+from dataclasses import replace
 from pathlib import Path
 from acl_gym.experiments.executors import RunFailedError
+from acl_gym.experiments.methods import warm_up
 from acl_gym.experiments.runner import run_studies
 from acl_gym.experiments.systems import pendulum
-from dataclasses import replace
 from tests.experiments.test_runner import SHORT
 
 if __name__ == "__main__":
-    large = replace(pendulum("crisp", 50, (60, 61)), trials=20)
-    run_studies([large.brief(), SHORT.brief()], [0], Path(sys.argv[1]) / "warm", workers=1)
+    large = replace(pendulum("crisp", 50, (60, 61)), trials=2)
+    for study in (SHORT, large):  # kernels are compiled while there is room for them
+        warm_up(study)
     # No file may grow beyond this: writing fails as on a full disk.
     resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000))
-    try:
-        run_studies([SHORT, large], [0], Path(sys.argv[1]), workers=1)
-    except RunFailedError as error:
-        print(error)
+    for _ in range(2):
+        try:
+            run_studies([SHORT, large], [0], Path(sys.argv[1]), workers=1)
+        except RunFailedError as error:
+            print(error)
+        print(*(path.name for path in Path(sys.argv[1]).iterdir()))
 """
 
 
 def test_a_full_disk_loses_nothing(tmp_path: Path) -> None:
     script, runs = tmp_path / "full.py", tmp_path / "runs"
     script.write_text(FULL)
-    for _ in range(2):
-        done = subprocess.run(
-            [sys.executable, script, runs],
-            env={**os.environ, "PYTHONPATH": os.pathsep.join(["", *sys.path])},
-            capture_output=True,
-            text=True,
-            check=False,
-            timeout=120,
-        )
-        assert "cannot be written to" in done.stdout, done.stderr
-        assert "make room and call again" in done.stdout
-        assert [name.split("-")[1] for name in times_of(runs)] == ["gridsearch1d"]
-        assert not list(runs.glob(".*")), "no temporary file may stay"
+    done = subprocess.run(
+        [sys.executable, script, runs],
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(["", *sys.path])},
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=120,
+    )
+    first, names, again, names_then = done.stdout.splitlines()
+    for error in (first, again):
+        assert "cannot be written to" in error, done.stderr
+        assert "make room and call again" in error
+    kept = [name for name in names.split() if name != "running.lock"]
+    assert [name.split("-")[1] for name in kept] == ["gridsearch1d"], "no half file"
+    assert set(names_then.split()) == set(names.split())
 
 
+@pytest.mark.usefixtures("short_runs")
 def test_progress_counts_what_was_there(tmp_path: Path) -> None:
     from rich.console import Console
 

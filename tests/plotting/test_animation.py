@@ -8,11 +8,14 @@ from typing import Any
 import numpy as np
 import pytest
 from matplotlib.animation import FuncAnimation, writers
+from matplotlib.figure import Figure
 from PIL import Image
 
+from acl_gym import ACL, plant
 from acl_gym.plotting import animate, scenes
 from tests.plotting.agents import colony, pendulum, q_learning
 
+LOOKS = dict.fromkeys(("axes", "slice", "labels", "actions"))
 QUICK: dict[str, Any] = {"seconds": 0.4, "dpi": 40}
 
 
@@ -70,6 +73,49 @@ def test_every_kind_of_agent_has_a_film(make: Any, start: Any, tmp_path: Path) -
     assert len(pictures(path)) > 1
 
 
+def test_a_film_of_one_state_variable(tmp_path: Path) -> None:
+    def tank(x: Any, u: Any) -> Any:
+        return [u[0] - 0.5 * np.sqrt(np.maximum(x[0], 0.0))]
+
+    agent = ACL(
+        plant(
+            *(tank,), low=[0], high=[4], inputs=[0, 1, 2], sampling_time=0.1, goal=[2],
+            cost=([1], 0), max_episode_steps=20, num_envs=5
+        ),
+        seed=0,
+    ).learn(trials=1)  # fmt: skip
+    (stage,) = scenes.stages_of(agent, [1], 0.4, None, [0.5], LOOKS)
+    panels = Figure().subplots(1, 3)
+    move = scenes.draw_stage(panels, stage)
+    # Lines have names, no colours to be explained by a bar.
+    assert [ax.child_axes for ax in panels] == [[], [], []]
+    assert [ax.get_title() for ax in panels[:2]] == ["policy", "pheromone"]
+    for frame in (0, 2):
+        across = [artist.get_xdata()[0] for artist in move(frame)]
+        assert across == [stage.states[frame, 0]] * 4  # a line and a dot in both
+    path = animate(agent, tmp_path / "film.gif", start=[0.5], **QUICK)
+    assert len(pictures(path)) > 1
+
+
+def test_the_name_of_a_high_bar_does_not_cover_the_title() -> None:
+    agent = colony("acl_gym/Navigation-v0")  # nine actions
+    looks = {**LOOKS, "axes": (0, 1)}
+    (stage,) = scenes.stages_of(agent, [2], 0.4, None, None, looks)
+    panels = Figure().subplots(1, 3)
+    scenes.draw_stage(panels, stage)
+    (bar,) = panels[0].child_axes
+    assert bar.get_title() == ""
+    assert "force" in bar.get_xlabel()
+
+
+def test_arrows_need_no_bar() -> None:
+    agent = colony("acl_gym/Navigation-v0")
+    (stage,) = scenes.stages_of(agent, [2], 0.4, None, None, LOOKS)
+    panels = Figure().subplots(1, 3)
+    scenes.draw_stage(panels, stage)
+    assert [len(ax.child_axes) for ax in panels] == [0, 1, 0]
+
+
 @pytest.mark.skipif(not writers.is_available("ffmpeg"), reason="needs ffmpeg")
 def test_an_mp4(tmp_path: Path) -> None:
     path = animate(pendulum(1), tmp_path / "film.mp4", **QUICK)
@@ -90,6 +136,7 @@ def test_without_ffmpeg_there_is_a_word(
         ({"path": "film.avi"}, ValueError, r"path must end in \.gif or \.mp4"),
         ({"path": "no/such/film.gif"}, ValueError, "a folder that exists"),
         ({"path": 3}, ValueError, "path must end in"),
+        ({"path": f"{'x' * 300}.gif"}, OSError, "give another name"),
         ({"trials": 3}, TypeError, "trials must be a list of integers"),
         ({"trials": ()}, ValueError, "one integer or more, increasing"),
         ({"trials": (3, 2)}, ValueError, "one integer or more, increasing"),

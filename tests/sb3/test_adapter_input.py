@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 from typing import Any
 
@@ -15,6 +16,7 @@ from gymnasium.wrappers.vector import RecordEpisodeStatistics
 
 import acl_gym
 from acl_gym.sb3.adapter import VectorEnvAdapter
+from acl_gym.sb3.checks import check_observations
 from tests.sb3.vector_envs import (
     DICT_SPACE,
     PENDULUM,
@@ -234,3 +236,93 @@ def test_spaces_are_those_of_one_slot() -> None:
     assert adapter.spec is env.spec
     assert adapter.env is env
     assert acl_gym.VectorEnvAdapter is VectorEnvAdapter
+
+
+# --- what an environment returns --------------------------------------------------
+
+
+class Returning(gym.vector.VectorWrapper):
+    """Changes what `reset`, or what `step`, returns."""
+
+    def __init__(self, name: str, change: Callable[[Any], Any]) -> None:
+        super().__init__(countdowns(3, 3))
+        self._name, self._change = name, change
+
+    def reset(self, **kwargs: Any) -> Any:
+        result = self.env.reset(**kwargs)
+        return self._change(result) if self._name == "reset" else result
+
+    def step(self, actions: Any) -> Any:
+        result = self.env.step(actions)
+        return self._change(result) if self._name == "step" else result
+
+
+@pytest.mark.parametrize(
+    ("name", "change", "words"),
+    [
+        ("reset", lambda result: None, r"env\.reset must return 2 parts.* got None"),
+        ("reset", lambda result: result[0], r"env\.reset must return 2 parts"),
+        (
+            "reset",
+            lambda result: (result[0][:1], {}),
+            "one row for each of the 2 slots",
+        ),
+        (
+            "reset",
+            lambda result: (result[0][:, :1], {}),
+            r"shape \(2, 2\).* got \(2, 1",
+        ),
+        ("step", lambda result: result[:4], r"env\.step must return 5 parts"),
+        (
+            "step",
+            lambda result: (np.zeros((2, 3)), *result[1:]),
+            r"got \(2, 3\); check",
+        ),
+        (
+            "step",
+            lambda result: (result[0], [0.0, np.nan], *result[2:]),
+            "rewards must be finite, got nan in slot 1; check",
+        ),
+    ],
+)
+def test_what_is_returned_is_checked(
+    name: str, change: Callable[[Any], Any], words: str
+) -> None:
+    adapter = VectorEnvAdapter(Returning(name, change))
+    if name == "step":
+        adapter.reset()
+    act: Any = adapter.reset if name == "reset" else functools.partial(step, adapter)
+    with pytest.raises(ValueError, match=words):
+        act()
+
+
+@pytest.mark.parametrize(
+    ("observations", "words"),
+    [
+        (np.zeros((2, 2)), "a dict with the keys"),
+        ({"place": np.zeros((2, 2))}, "a dict with the keys"),
+        (
+            {"place": np.zeros((2, 3)), "flag": np.zeros(2)},
+            r"\['place'\] must have shape",
+        ),
+    ],
+)
+def test_parts_of_observations_are_checked(observations: Any, words: str) -> None:
+    with pytest.raises(ValueError, match=words):
+        check_observations(observations, DICT_SPACE, 2)
+
+
+def test_keys_of_infos_that_are_no_text() -> None:
+    adapter = VectorEnvAdapter(
+        Returning("step", lambda result: (*result[:4], {1: np.array([5, 6])}))
+    )
+    adapter.reset()
+    assert [info[1] for info in step(adapter)[3]] == [5, 6]
+
+
+@pytest.mark.parametrize("slots", [0, "2", None])
+def test_the_number_of_slots(slots: Any) -> None:
+    env = countdowns(3, 3)
+    env.num_envs = slots
+    with pytest.raises((TypeError, ValueError), match=r"env\.num_envs must be"):
+        VectorEnvAdapter(env)

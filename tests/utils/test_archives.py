@@ -295,6 +295,11 @@ def test_other_versions_are_refused_by_number(
         ACL.load(tmp_path / "a")
 
 
+def test_a_name_that_no_file_can_have_is_that_of_none() -> None:
+    with pytest.raises(FileNotFoundError, match="no agent file at xxx"):
+        ACL.load("x" * 300)
+
+
 NONSENSE = [None, True, -1, 2.5, 10**400, float("nan"), "text", [], [1], {}, {"a": 1}]
 PLACES = [
     "agent",

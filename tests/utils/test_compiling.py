@@ -20,10 +20,10 @@ from acl_gym.utils import compiling
 TRIAL = """
 import gymnasium as gym
 from acl_gym import ACL
-from acl_gym.partitions.automatic import thesis_partition
-env = gym.make_vec("acl_gym/Pendulum-v0", num_envs=2)
-ACL(env, thesis_partition(env), seed=0, max_steps=2).learn(trials=1)
+env = gym.make_vec("acl_gym/GridSearch1D-v0", num_envs=2)
+ACL(env, seed=0, max_steps=2).learn(trials=1)
 """
+"""The environment that needs the fewest kernels, a few seconds of compilation."""
 
 
 def event(module: str) -> SimpleNamespace:

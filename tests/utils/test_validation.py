@@ -2,6 +2,7 @@
 
 from decimal import Decimal
 from fractions import Fraction
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -85,6 +86,7 @@ class _NoRepr:
 
 def test_any_value_is_shown_shortly() -> None:
     assert validation.shown(1.5) == "1.5"
+    assert validation.shown(np.eye(2)) == "array([[1., 0.], [0., 1.]])"  # on one line
     assert len(validation.shown("x" * 10_000)) < 300  # the limit and the dots
     assert validation.shown(_NoRepr()) == "an object of type _NoRepr"
     assert validation.shown(10**5000) == "an object of type int"  # too long for Python
@@ -154,3 +156,13 @@ def test_one_of_the_choices_passes() -> None:
 def test_anything_but_a_choice_is_refused(value: Any) -> None:
     with pytest.raises(ValueError, match=r"^mode must be one of 'slow', 'fast', got"):
         validation.one_of("mode", value, ("slow", "fast"))
+
+
+@pytest.mark.parametrize("folder", [".", "..", "/", "a/.."])
+def test_a_file_has_a_name(folder: str) -> None:
+    assert validation.path("directory", folder) == Path(folder)
+    with pytest.raises(
+        ValueError, match="path must be the name of a file, got the fol"
+    ):
+        validation.file_path("path", folder)
+    assert validation.file_path("path", f"{folder}/name").name == "name"

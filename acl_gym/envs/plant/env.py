@@ -103,7 +103,8 @@ def plant(
         sampling_time: s, > 0.
         goal: where an episode ends in success: a state, a pair of states (low, high), a
             function of x, `(state_size, n)`, that returns n booleans, or None: nowhere.
-            The pair may have infinite ends, and lead over the end of a circle.
+            A state must lie within low and high, or within the tolerance of them. The
+            pair may have infinite ends, and lead over the end of a circle.
         cost: what a step costs: "time", the sampling time; a pair (Q, R), the quadratic
             cost e' Q e + u' R u of the error e from the goal after the step, each a
             number, a diagonal or a matrix; or a function of x and u, as `dynamics` takes

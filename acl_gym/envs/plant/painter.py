@@ -35,11 +35,15 @@ class PlantPainter(Painter[Plant]):
             if i < state.size:
                 low, high, value = system.low[i], system.high[i], state[i]
                 if goal is not None:
-                    begin, end = (
-                        left + width * _share(edge, low, high) for edge in goal[:, i]
-                    )
-                    area = (begin, top, max(end - begin, 2.0), 0.4 * height)
-                    pygame.draw.rect(canvas, _GOAL, area)
+                    turns = (-1, 0, 1) if i in system.circular else (0,)
+                    for edges in (goal[:, i] + turn * (high - low) for turn in turns):
+                        if edges[1] < low or edges[0] > high:
+                            continue
+                        begin, end = (
+                            left + width * _share(edge, low, high) for edge in edges
+                        )
+                        area = (begin, top, max(end - begin, 2.0), 0.4 * height)
+                        pygame.draw.rect(canvas, _GOAL, area)
                 colour = _STATE
             else:
                 column = inputs[:, i - state.size]

@@ -66,6 +66,7 @@ class Goal:
         if array.shape == (size,) and np.isfinite(array).all():
             self.centre = array
             self._half = _half_widths(tolerance, (high - low) * _TOLERANCE)
+            self._check_reach(goal, low, high)
         elif array.shape == (2, size) and not np.isnan(array).any():
             if tolerance is not None:
                 raise ValueError(
@@ -77,6 +78,17 @@ class Goal:
             raise ValueError(
                 f"goal must be a state of {size} variables, a pair of states (low, "
                 f"high), a function of x, or None, got {validation.shown(goal)}."
+            )
+
+    def _check_reach(self, goal: Any, low: FloatArray, high: FloatArray) -> None:
+        bottom, top = self.centre - self._half, self.centre + self._half
+        missed = (self.period == 0) & ((bottom > high) | (top < low))
+        if missed.any():
+            i = int(np.argmax(missed))
+            raise ValueError(
+                f"goal must lie within low and high, or come within the tolerance of "
+                f"them, got {validation.shown(goal)}, where variable {i} lies in "
+                f"[{low[i]:g}, {high[i]:g}]; widen the bounds, or move the goal."
             )
 
     def _set_box(self, bottom: FloatArray, top: FloatArray, goal: Any) -> None:

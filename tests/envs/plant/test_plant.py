@@ -358,3 +358,15 @@ def test_gauges_are_drawn(mode: str) -> None:
     vector = make_mass(render_mode="rgb_array", num_envs=2, goal=inside, tolerance=None)
     vector.reset(seed=0)
     assert len(vector.render()) == 2
+
+
+def test_a_goal_over_the_end_of_a_circle_is_drawn_at_both_ends() -> None:
+    pytest.importorskip("pygame")
+    env = make_mass(render_mode="rgb_array", circular=[0], goal=[1.0, 0.0])
+    env.reset(seed=0)
+    picture = env.render().astype(int)
+    # Three gauges, for two variables and an input; the first one is circular.
+    row = np.abs(picture[picture.shape[0] // 6] - [170, 215, 190]).sum(axis=-1) < 10
+    left, right = np.split(row, 2)
+    assert left.any()
+    assert right.any()

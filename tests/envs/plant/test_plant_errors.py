@@ -89,6 +89,7 @@ NARROW = spaces.Box(-0.1, 0.1, (2,), np.float64)
         ({"circular": 0}, r"circular must hold variables of 0\.\.1"),
         ({"goal": [0.0, 0.0, 0.0]}, "goal must be a state of 2 variables"),
         ({"goal": "up"}, "goal must be an array"),
+        ({"goal": [0.0, 1e6]}, "variable 1 lies in .*widen the bounds"),
         ({"goal": None}, "tolerance belongs to a goal that is a state"),
         ({"goal": ([-1, -1], [1, 1])}, "tolerance belongs to a goal that is a state"),
         ({"goal": ([1, -1], [-1, 1]), "tolerance": None}, "low <= high in every"),

@@ -32,6 +32,20 @@ def compare(*arguments: str) -> subprocess.CompletedProcess[str]:
     )
 
 
+def invoke(*arguments: str) -> Result:
+    """Run the command in this process."""
+    app = runpy.run_path(str(SCRIPT))["app"]
+    return CliRunner().invoke(app, arguments, prog_name=SCRIPT.name)
+
+
+def in_this_process(out: Path, *arguments: str) -> Result:
+    """Run the command in this process; it must succeed."""
+    common = ("--preset", "smoke", "--workers", "1", "--out", str(out))
+    done = invoke(*common, *arguments)
+    assert done.exit_code == 0, done.output
+    return done
+
+
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return tmp_path_factory.mktemp("comparison")
@@ -90,20 +104,11 @@ def times(folder: Path) -> list[int]:
 def test_a_second_call_runs_nothing_again(finished, folder: Path) -> None:
     before = times(folder)
     assert len(before) == 2 * 3 + 2  # of them two of dynamic programming
-    again = compare(*SMALL, "--out", str(folder))
-    assert again.returncode == 0, again.stderr
+    in_this_process(folder, *SMALL)
     assert times(folder) == before
 
 
-def in_this_process(out: Path, *arguments: str) -> Result:
-    """Run the command here; only the runs are in processes of their own."""
-    common = ("--preset", "smoke", "--workers", "1", "--out", str(out))
-    app = runpy.run_path(str(SCRIPT))["app"]
-    done = CliRunner().invoke(app, [*common, *arguments])
-    assert done.exit_code == 0, done.output
-    return done
-
-
+@pytest.mark.usefixtures("short_runs")
 def test_a_fresh_call_makes_every_run_anew(tmp_path: Path) -> None:
     arguments = ("--env", "acl_gym/GridSearch1D-v0", "--agents", "q-crisp", "--json")
     found = [
@@ -129,12 +134,13 @@ def test_a_fresh_call_makes_every_run_anew(tmp_path: Path) -> None:
     ],
 )
 def test_bad_arguments_exit_with_2(arguments: list[str], message: str) -> None:
-    failed = compare(*arguments)
-    assert failed.returncode == 2
+    failed = invoke(*arguments)
+    assert failed.exit_code == 2
     assert message in failed.stderr
     assert len(failed.stderr.strip().splitlines()) == 1
 
 
+@pytest.mark.usefixtures("short_runs")
 @pytest.mark.parametrize("name", ["Navigation", "GridSearch1D", "GridSearch2D"])
 def test_the_other_systems(name: str, tmp_path: Path) -> None:
     env_id, moving = f"acl_gym/{name}-v0", name == "Navigation"
@@ -155,12 +161,12 @@ def test_the_other_systems(name: str, tmp_path: Path) -> None:
 
 def test_a_folder_that_cannot_be_made_is_one_line(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
-    failed = compare("--preset", "smoke", "--out", str(tmp_path / "file" / "x"))
-    assert failed.returncode == 1
+    failed = invoke("--preset", "smoke", "--out", str(tmp_path / "file" / "x"))
+    assert failed.exit_code == 1
     assert len(failed.stderr.strip().splitlines()) == 1
 
 
 def test_help_teaches() -> None:
-    text = compare("--help").stdout
+    text = invoke("--help").stdout
     for word in ("--preset", "--env", "--agents", "--seeds", "--out", "acl-fuzzy"):
         assert word in text

@@ -15,6 +15,7 @@ from acl_gym.envs import register_environments
 if TYPE_CHECKING:
     from acl_gym.agents.acl import ACL
     from acl_gym.agents.q_learning import QLearning
+    from acl_gym.agents.returning import ReturningACL
     from acl_gym.callbacks import (
         Callback,
         Checkpoint,
@@ -81,6 +82,7 @@ _PUBLIC = {
     "Quadratic": "acl_gym.costs",
     "Rank": "acl_gym.deposits",
     "Return": "acl_gym.deposits",
+    "ReturningACL": "acl_gym.agents.returning",
     "RiseTime": "acl_gym.costs",
     "ScaledObservation": "acl_gym.envs.wrappers",
     "ScaledVectorObservation": "acl_gym.envs.wrappers",
@@ -130,6 +132,7 @@ __all__ = [
     "Quadratic",
     "Rank",
     "Return",
+    "ReturningACL",
     "RiseTime",
     "ScaledObservation",
     "ScaledVectorObservation",

@@ -269,7 +269,10 @@ class TabularAgent(SavedAgent):
         self.env = rollout.env
         self._signals = signals_of(rollout.env)
         self._rollout = rollout
-        slots, k = rollout.num_envs, self.partition.cells_per_state
+        self._make_room(rollout.num_envs, self.partition.cells_per_state)
+
+    def _make_room(self, slots: int, k: int) -> None:
+        """Make memory for the cells of the walking slots."""
         validation.check_memory(
             f"the cells of {slots} slots",
             12 * slots * k,

@@ -2,32 +2,92 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any, Self
 
 import numpy as np
 from gymnasium.vector import VectorEnv
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from acl_gym.agents.base import TabularAgent
+from acl_gym.agents.saving import Snapshot
 from acl_gym.agents.training import Training
 from acl_gym.callbacks.base import Callbacks
 from acl_gym.colony.greedy import epsilon_greedy_actions, epsilon_greedy_unchecked
-from acl_gym.colony.memory import Memory, Walk
-from acl_gym.colony.optimism import promised_levels
+from acl_gym.colony.memory import UNITS, Memory, Walk
+from acl_gym.colony.optimism import promised_level
 from acl_gym.colony.walking_back import WalkBack
 from acl_gym.partitions import Discrete, Grid, Partition
-from acl_gym.partitions.automatic import coarse_partition
-from acl_gym.partitions.refinement import carried_over, refined
+from acl_gym.partitions.growing import carried_over, refined, seed_partition, widened
 from acl_gym.policies import random_ranks
 from acl_gym.utils import validation
 from acl_gym.utils.parameters import Parameter
-from acl_gym.utils.typing import BoolArray, CellArray, FloatArray, IntArray
-
-_SAMPLE = 20_000  # newest remembered states from which the initial level is taken
+from acl_gym.utils.typing import BoolArray, CellArray, FloatArray, IntArray, Row
 
 
 class ReturningACL(TabularAgent):
-    """x"""
+    """A colony whose ants walk back from where they end, and which remembers.
+
+    Each slot of the environment is an ant, as in `ACL`, and all share one table of
+    levels over (cell, action) pairs. Three things differ, each of which the thesis names
+    (§2.3, §7.3):
+
+    - After a while the ants walk their paths back. At each pair an ant lays what it
+      expects by then: the reward of the step and what follows, see
+      `acl_gym.colony.walking_back`. A pair is judged by itself, not by the cost of the
+      whole solution, and levels become means, not sums, so that what is popular does not
+      beat what is good.
+    - The colony remembers its paths and walks them back again many times.
+    - The partition grows where it was chosen for you: wider when something is seen
+      beyond its range, finer when its pairs have been tried often enough.
+
+    A level is the discounted return that a pair promises: the reward or, where rewards
+    are negative stage costs, minus the cost to go. The policy takes the pair that
+    promises most. No `deposit` is to be chosen, and rewards may have any sign.
+
+    Args:
+        env: a vector environment with `Discrete` actions; its slots are the M ants.
+        partition: turns observations into cells and degrees, and stays as it is. None:
+            it is chosen, and grows.
+        discount: gamma_rl, in [0, 1], weight of what follows a step.
+        mix: in [0, 1], how much an ant trusts its own continuation; the rest is the best
+            that the levels promise. None takes 0.2, or 0 where states are cells already:
+            there, continuations only bring in the accidents of exploration.
+        learning_rate: rho, in (0, 1], the share of the way to the mean of what was laid.
+        trust: in [0, 1]. With 1, a level moves by the share of its remembered evidence
+            that the ants have just walked back, and so comes to the mean over all that
+            is remembered; with 0 it follows the paths that were walked back last.
+        epsilon: probability of a random action, in [0, 1].
+        optimism: in [0, 1], what pairs promise that were never tried: with 0 the value
+            of a good state, with 1 the most that could be had.
+        walks_back: how often the ants walk back after each walk, >= 1.
+        older_paths: how many older paths they walk back beside the newest each time.
+        steps_per_walk: after how many steps of all ants together they walk back, >= 1.
+            Ants that have not finished go on from where they are.
+        memory_size: how many states are remembered, >= 1.
+        visits_to_grow: how often the median pair of those tried must have been tried
+            before the partition becomes finer along one variable, > 0.
+        max_cells: the partition does not become finer than this, >= 1.
+        max_steps: T, the most steps an ant may make, >= 1. None takes the time limit of
+            the environment, or 300 if it has none.
+        seed: the same seed gives the same run; None draws one from the system.
+        n_actions: only needed without an environment.
+
+    Attributes:
+        memory: the paths that the colony remembers.
+
+    Raises:
+        TypeError: `env` or `partition` is of the wrong kind.
+        ValueError: a parameter is out of range.
+
+    Example:
+        >>> import gymnasium as gym
+        >>> from acl_gym import ReturningACL
+        >>> env = gym.make_vec("acl_gym/Pendulum-v0", num_envs=5)
+        >>> colony = ReturningACL(env, seed=0).learn(total_timesteps=1_000)
+        >>> colony.num_timesteps >= 1_000
+        True
+    """
 
     slots_are = "ants"
 
@@ -38,14 +98,19 @@ class ReturningACL(TabularAgent):
         "Share of the way to the mean of what is laid", "rho", above=0, at_most=1
     )
     trust = Parameter(
-        "Whether a level follows the latest paths, 0, or the mean of all, 1",
-        at_least=0,
-        at_most=1,
+        "Follow the latest paths, 0, or the mean of all, 1", at_least=0, at_most=1
     )
     epsilon = Parameter(
         "Probability of a random action", "epsilon", at_least=0, at_most=1
     )
-    optimism = Parameter("q", at_least=0, at_most=1)
+    optimism = Parameter(
+        "What untried pairs promise: a good state, 0, or the most, 1",
+        at_least=0,
+        at_most=1,
+    )
+    visits_to_grow = Parameter(
+        "Tries of the median pair before cells are split", above=0
+    )
 
     def __init__(
         self,
@@ -61,16 +126,10 @@ class ReturningACL(TabularAgent):
         walks_back: int = 10,
         older_paths: int = 50,
         steps_per_walk: int = 300,
-        memory: int = 100_000,
-        visits_to_grow: float | None = 4.0,
+        memory_size: int = 100_000,
+        visits_to_grow: float = 5.0,
         max_cells: int = 20_000,
-        ranging: bool = True,
-        varied: bool = True,
-        turns: int = 1,
-        sure: bool = True,
-        widen: float | None = None,
-        finest: float = 0.01,
-        local: Any = None,
+        grows: bool | None = None,
         max_steps: int | None = None,
         seed: int | None = None,
         n_actions: int | None = None,
@@ -80,26 +139,29 @@ class ReturningACL(TabularAgent):
         self.trust = trust
         self.epsilon = epsilon
         self.optimism = optimism
-        self.walks_back, self.older_paths = walks_back, older_paths
-        self.steps_per_walk = steps_per_walk
-        self.visits_to_grow, self.max_cells = visits_to_grow, max_cells
+        self.visits_to_grow = visits_to_grow
+        self.walks_back = validation.integer("walks_back", walks_back, at_least=1)
+        self.older_paths = validation.integer("older_paths", older_paths, at_least=0)
+        self.steps_per_walk = validation.integer(
+            "steps_per_walk", steps_per_walk, at_least=1
+        )
+        self.max_cells = validation.integer("max_cells", max_cells, at_least=1)
+        self.grows = partition is None if grows is None else grows
         if partition is None and env is not None:
-            partition = coarse_partition(env, ranging)
+            partition = seed_partition(env)
         super().__init__(
             env, partition, max_steps=max_steps, seed=seed, n_actions=n_actions
         )
-        self.mix = (0.0 if isinstance(self.partition, Discrete) else 0.2) if mix is None else mix
-        self._level = 0.0
-        self.stretched = 0
-        self.sure = sure
-        self.widen, self.local, self.finest = widen, local, finest
-        self.ranging, self.varied, self.turns = ranging, varied, turns
-        if env is not None and ranging and isinstance(self.partition, Grid):
-            from acl_gym.utils.boxes import declared_bounds
-            self._declared = declared_bounds(env.single_observation_space)
-        self._growths = 0
-        self._walk_back = WalkBack(np.zeros((self.partition.n_cells, self.n_actions)))
-        self.memory = Memory(memory, self.n_actions, self.partition)
+        if mix is None:
+            mix = 0.0 if isinstance(self.partition, Discrete) else 0.2
+        self.mix = validation.number("mix", mix, at_least=0, at_most=1)
+        self._splits = 0
+        shape = self.partition.n_cells, self.n_actions
+        self._walk_back = WalkBack(np.zeros(shape))
+        memory_size = validation.integer(
+            "memory_size", memory_size, at_least=1, at_most=2**25
+        )
+        self.memory = Memory(memory_size, self.n_actions, self.partition)
 
     def learn(
         self,
@@ -109,24 +171,43 @@ class ReturningACL(TabularAgent):
         log_interval: int | None = None,
         progress_bar: bool = False,
     ) -> Self:
+        """Let the ants walk, remember, walk back and, where it may, the partition grow.
+
+        A trial is one episode in every slot. Called again, it continues from the levels
+        and the memory as they are.
+
+        Args:
+            total_timesteps: stop after the trial that reaches this many steps of all
+                ants together; None sets no such limit.
+            trials: how many trials to make; None sets no such limit. Without either
+                limit, 100.
+            callback: as in `ACL.learn`.
+            log_interval: print a line every `log_interval` trials; None prints nothing.
+            progress_bar: show a bar (of tqdm).
+
+        Returns:
+            The agent itself.
+
+        Raises:
+            ValueError: the environment does not return what it should.
+        """
         budget = (total_timesteps, trials, callback, log_interval, progress_bar)
         with Training(self, *budget) as training:
             while training.next_trial():
-                rollout = self.rollout
-                observation = rollout.start(seed=self._next_seed())
-                while rollout._ants.size:
+                observation = self.rollout.start(seed=self._next_seed())
+                while self.rollout._ants.size:
                     walk, observation = self._walk(observation)
-                    newest = self.memory.add(walk, rollout.terminated)
-                    self._stretch()
+                    self._widen(walk)
+                    newest = self.memory.add(walk, self.rollout.terminated)
                     self._promise()
                     for _ in range(self.walks_back):
                         self._return(newest)
-                    self._grow()
+                    self._split()
                 training.end_trial()
         return self
 
     def _walk(self, observation: Any) -> tuple[Walk, Any]:
-        """Let the ants walk until they have made enough steps together."""
+        """Let the ants that still walk make some steps; return these and where they are."""
         rollout, walk = self.rollout, Walk(self.num_envs)
         while rollout._ants.size and walk.steps < self.steps_per_walk:
             ants, allowed = rollout._ants, rollout.allowed()
@@ -144,166 +225,153 @@ class ReturningACL(TabularAgent):
         return walk, observation
 
     def _stop(self, walk: Walk, ants: IntArray, observation: Any) -> None:
-        mask = self.rollout.action_mask
-        if mask is not None:
-            mask = mask[ants]
-            mask[~mask.any(axis=1)] = True
-        walk.stop(ants, observation, mask)
+        allowed = self.rollout.action_mask
+        if allowed is not None:
+            allowed = allowed[ants]
+            # Where an episode ends, an environment may allow nothing any more.
+            allowed[~allowed.any(axis=1)] = True
+        walk.stop(ants, observation, allowed)
 
     def _promise(self) -> None:
         """Set what pairs promise of which nothing is known yet."""
-        self._level = promised_levels(
-            self.memory, self._table, self.optimism, self.discount, _SAMPLE
-        )
-        self._table[~self._walk_back.known] = self._level
+        level = promised_level(self.memory, self._table, self.optimism, self.discount)
+        self._table[~self._walk_back.known] = level
 
     def _return(self, newest: IntArray) -> None:
+        """Let the ants walk the newest paths back, and some older ones."""
         older = self.memory.n_paths - newest.size
-        paths = newest
+        drawn = np.arange(older)
         if older > self.older_paths:
-            drawn = self.rng.integers(older, size=self.older_paths)
-            paths = np.concatenate([np.unique(drawn), newest])
-        elif older:
-            paths = np.arange(self.memory.n_paths)
+            drawn = np.unique(self.rng.integers(older, size=self.older_paths))
         self._walk_back.walk(
             self.memory,
-            paths,
+            np.concatenate([drawn, newest]),
             discount=self.discount,
             mix=self.mix,
             rate=self.learning_rate,
             trust=self.trust,
         )
 
-    def _grow(self) -> None:
+    def _widen(self, walk: Walk) -> None:
+        """Widen the partition if the ants have come beyond its range."""
+        if self.grows and isinstance(self.partition, Grid):
+            space: Any = self.rollout.env.single_observation_space
+            wider = widened(self.partition, walk.states(), space)
+            if wider is not None:
+                self._grow_to(wider)
+
+    def _split(self) -> None:
+        """Halve the cells along the next variable if there is evidence for finer ones."""
         grid = self.partition
-        if self.visits_to_grow is None or not isinstance(grid, Grid):
-            return
-        axes = [a for a, line in enumerate(grid.centres) if line.size > 1]
-        if self.local:
-            for a in np.roll(axes, -(self._growths % len(axes))):
-                where = self._ready(a)
-                if where.any():
-                    finer = refined(grid, int(a), where)
-                    if finer.n_cells <= self.max_cells:
-                        self._growths += 1
-                        self._become(finer)
-                    return
+        if not (self.grows and isinstance(grid, Grid)):
             return
         tried = self.memory.evidence[self.memory.evidence > 0]
-        visits = float(np.median(tried)) / 2**36 * grid.cells_per_state
-        if visits <= self.visits_to_grow:
+        tries = float(np.median(tried)) / UNITS * grid.cells_per_state
+        several = [axis for axis, line in enumerate(grid.centres) if line.size > 1]
+        if tries <= self.visits_to_grow or not several:
             return
-        turn = len(axes) if self.varied else 10**9
-        if self._growths < turn * self.turns:
-            axis = axes[self._growths % len(axes)]
-        else:
-            axis = max(axes, key=self._variation)
-        finer = refined(grid, axis)
-        if finer.n_cells > self.max_cells:
-            return
-        self._growths += 1
-        self._become(finer)
+        finer = refined(grid, several[self._splits % len(several)])
+        if finer.n_cells <= self.max_cells:
+            self._splits += 1
+            self._grow_to(finer)
 
-    def _ready(self, axis):
-        grid = self.partition
-        shape = tuple(line.size for line in grid.centres) + (self.n_actions,)
-        e = self.memory.evidence.reshape(shape) / 2**36 * grid.cells_per_state
-        e = np.moveaxis(e, axis, 0).reshape(shape[axis], -1)
-        n = (e > 0).sum(axis=1)
-        if self.local == "mean":
-            v = e.sum(axis=1) / np.maximum(n, 1)
-        else:
-            v = np.array([np.median(row[row > 0]) if (row > 0).any() else 0.0 for row in e])
-        if grid.periods[axis] is not None:
-            v = np.append(v, v[0])
-        width = np.diff(grid.centres[axis]) if grid.periods[axis] is None else np.diff(np.append(grid.centres[axis], grid.centres[axis][0] + grid.periods[axis]))
-        span = width.sum()
-        return (np.minimum(v[:-1], v[1:]) > self.visits_to_grow) & (width > self.finest * span)
+    def _grow_to(self, partition: Grid) -> None:
+        """Take over another partition; levels and what is known are carried over."""
+        old, walk_back = self.partition, self._walk_back
+        known = carried_over(walk_back.known.astype(np.float64), old, partition)
+        self._set_partition(partition, carried_over(walk_back.levels, old, partition))
+        # A cell between one that is known and one that is not is not known.
+        self._walk_back.known[:] = known > 1.0 - 1e-9
+        self.memory.set_partition(partition)
 
-    def _variation(self, axis: int) -> float:
-        """How often the policy differs between neighbours along an axis, by evidence."""
-        shape = tuple(line.size for line in self.partition.centres)
-        best = self._table.argmax(axis=1).reshape(shape)
-        tried = self.memory.evidence.reshape(-1, self.n_actions).sum(axis=1)
-        tried = tried.reshape(shape).astype(float)
-        n = shape[axis]
-        a, b = (np.take(tried, r, axis) for r in (range(n - 1), range(1, n)))
-        x, y = (np.take(best, r, axis) for r in (range(n - 1), range(1, n)))
-        weight = np.minimum(a, b)
-        return float((weight * (x != y)).sum() / max(weight.sum(), 1e-300))
-
-    def _stretch(self) -> None:
-        grid = self.partition
-        if not self.ranging or not isinstance(grid, Grid):
-            return
-        m = self.memory
-        seen = m._rows["seen"][int(m.first[0]) : m._used]
-        low, high = seen.min(axis=0), seen.max(axis=0)
-        axes, changed = list(grid.centres), False
-        for a, line in enumerate(axes):
-            if grid.periods[a] is not None:
-                continue
-            if low[a] < line[0] - 1e-9 or high[a] > line[-1] + 1e-9 or line.size == 1 and high[a] > low[a]:
-                dl, dh = self._declared
-                new = line
-                if self.widen is None:
-                    lo, hi = min(low[a], line[0]), max(high[a], line[-1])
-                    margin = 0.1 * (hi - lo)
-                    lo = max(lo - margin, dl[a]) if low[a] < line[0] else lo
-                    hi = min(hi + margin, dh[a]) if high[a] > line[-1] else hi
-                    if lo < line[0] or hi > line[-1]:
-                        axes[a] = np.linspace(lo, hi, line.size)
-                        changed = True
-                    continue
-                if line.size == 1:
-                    continue
-                if low[a] < line[0] - 1e-9:
-                    gap = max(self.widen * (line[1] - line[0]), line[0] - low[a])
-                    lo = max(line[0] - gap, dl[a])
-                    if lo < line[0] - 1e-6: new = np.concatenate([[lo], new])
-                if high[a] > line[-1] + 1e-9:
-                    gap = max(self.widen * (line[-1] - line[-2]), high[a] - line[-1])
-                    hi = min(line[-1] + gap, dh[a])
-                    if hi > line[-1] + 1e-6: new = np.concatenate([new, [hi]])
-                if new is not line:
-                    axes[a] = new
-                    changed = True
-        if changed:
-            self.stretched += 1
-            self._become(type(grid)(axes, grid.periods))
-
-    def _become(self, finer: Any) -> None:
-        grid = self.partition
-        known = carried_over(self._walk_back.known.astype(float), grid, finer) > 1 - 1e-9
-        table = carried_over(self._table, grid, finer)
-        self.__dict__["partition"] = finer
-        self._walk_back = WalkBack(table)
-        self._walk_back.known[:] = known
-        self.memory.set_partition(finer)
-        self._ranks = random_ranks(finer.n_cells, self.n_actions, np.random.default_rng(self._growths))
+    def _set_partition(self, partition: Partition, levels: FloatArray) -> None:
+        self.__dict__["partition"] = partition  # which nobody else may set
+        self._walk_back = WalkBack(levels)
+        # A function of the size, so that a run that is resumed breaks ties alike.
+        ties = np.random.default_rng(partition.n_cells)
+        self._ranks = random_ranks(partition.n_cells, self.n_actions, ties)
+        if self._rollout is not None:
+            self._make_room(self.num_envs, partition.cells_per_state)
 
     @property
     def _table(self) -> FloatArray:
         return self._walk_back.levels
 
     def set_table(self, table: ArrayLike) -> None:
+        """Replace all levels; all pairs then count as known.
+
+        Raises:
+            ValueError: the shape differs, or a level is not finite.
+        """
         self._table[:] = self._checked_table(table)
+        self._walk_back.known[:] = True
+
+    def measures(self, policy: IntArray) -> Row:
+        """How many cells the partition has, and how many steps are remembered."""
+        return {
+            "cells": self.partition.n_cells,
+            "remembered_steps": self.memory.n_steps,
+        }
 
     def parameters(self) -> dict[str, Any]:
-        return {}
+        """The keyword arguments of the constructor."""
+        return {
+            "discount": self.discount,
+            "mix": self.mix,
+            "learning_rate": self.learning_rate,
+            "trust": self.trust,
+            "epsilon": self.epsilon,
+            "optimism": self.optimism,
+            "walks_back": self.walks_back,
+            "older_paths": self.older_paths,
+            "steps_per_walk": self.steps_per_walk,
+            "memory_size": self.memory.most,
+            "visits_to_grow": self.visits_to_grow,
+            "max_cells": self.max_cells,
+            "grows": self.grows,
+            "max_steps": self.max_steps,
+            "seed": self.seed,
+        }
 
-    def _sure(self):
-        """levels of what is known; of unknown pairs the worst known in the cell"""
-        known, t = self._walk_back.known, self._table
-        if known.all() or not self.sure: return t
-        low = np.where(known, t, np.inf).min(axis=1)
-        low = np.where(np.isfinite(low), low, t.min(axis=1))
-        return np.where(known, t, np.minimum(low[:, None], t))
+    def _arrays(self) -> dict[str, NDArray[Any]]:
+        remembered = {f"memory_{n}": a for n, a in self.memory.arrays().items()}
+        splits = np.array(self._splits)
+        return {"known": self._walk_back.known, "splits": splits, **remembered}
 
-    @property
-    def policy(self):
-        from acl_gym.policies import TablePolicy
-        return TablePolicy(self.partition, np.ascontiguousarray(self._sure()), self._ranks, self.first_action, self._signals)
+    def _restore(
+        self, header: dict[str, Any], arrays: Mapping[str, NDArray[Any]]
+    ) -> None:
+        super()._restore(header, arrays)
+        known, splits = arrays["known"], arrays["splits"]
+        if known.shape != self._table.shape or known.dtype.kind != "b":
+            raise ValueError("the array known does not fit the table")
+        self._walk_back.known[:] = known
+        if splits.shape != () or splits.dtype.kind not in "iu" or splits < 0:
+            raise ValueError("splits must be a number >= 0")
+        self._splits = int(splits)
+        names = [name for name in arrays if name.startswith("memory_")]
+        self.memory.restore({n.removeprefix("memory_"): arrays[n] for n in names})
+
+    def snapshot(self) -> Snapshot:
+        """See `SavedAgent.snapshot`; what is remembered is shared, not copied."""
+        more = (
+            self.partition,
+            self._ranks,
+            self._walk_back.known.copy(),
+            self._splits,
+            self.memory.copy(),
+        )
+        generators = [rng.bit_generator.state for rng in (self.rng, self._predict_rng)]
+        counts = self.num_timesteps, self.trials, self.seconds, len(self.history)
+        return Snapshot(self._table.copy(), {}, generators, counts, more)
+
+    def take_back(self, snapshot: Snapshot) -> None:
+        """See `SavedAgent.take_back`."""
+        partition, ranks, known, splits, memory = snapshot.more
+        self._set_partition(partition, snapshot.table.copy())
+        super().take_back(snapshot)
+        self._ranks, self._splits, self.memory = ranks, splits, memory.copy()
+        self._walk_back.known[:] = known
 
     def _explore(
         self, index: CellArray, degree: FloatArray, allowed: BoolArray | None

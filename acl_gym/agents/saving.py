@@ -61,6 +61,7 @@ class Snapshot(NamedTuple):
     arrays: dict[str, NDArray[Any]]
     generators: list[Any]
     counts: tuple[int, int, float, int]
+    more: Any = None
 
 
 class SavedAgent(PartitionPolicy):

@@ -13,9 +13,10 @@ from tqdm.auto import tqdm
 from acl_gym.agents.base import TabularAgent
 from acl_gym.callbacks.base import Callbacks, as_callbacks, is_stop
 from acl_gym.evaluation import reports_returns
+from acl_gym.partitions import locate_all
 from acl_gym.utils import validation
 from acl_gym.utils.serialization import check_row
-from acl_gym.utils.typing import Row
+from acl_gym.utils.typing import IntArray, Row
 
 DEFAULT_TRIALS = 100
 """K of Table 5.2."""
@@ -78,6 +79,7 @@ class Training:
         self._log_interval = log_interval
         self._stopped = False
         self._policy = agent.policy.best_actions()
+        self._partition = agent.partition
         in_trials = trials is not None
         self._bar: Any = tqdm(
             total=trials if in_trials else total_timesteps,
@@ -138,10 +140,10 @@ class Training:
             "seconds": agent.seconds,
             "ants_cost": float((rollout.cost if costs is None else costs).mean()),
             **self._outcomes(),
-            "policy_variation": float(np.mean(policy != self._policy)) if policy.shape == self._policy.shape else 1.0,
+            "policy_variation": float(np.mean(policy != self._before())),
             **agent.measures(policy),
         }
-        self._policy = policy
+        self._policy, self._partition = policy, agent.partition
         agent.in_trial = False
         agent.history.append(row)
         for callback in self._callbacks:
@@ -150,6 +152,16 @@ class Training:
             check_row(row)
         self._report(row, 1 if self._bar_counts_trials else steps)
         self._clock = time.perf_counter()
+
+    def _before(self) -> IntArray:
+        """The policy of the last trial, in the cells of the present partition."""
+        old, new = self._partition, self._agent.partition
+        if old is new:
+            return self._policy
+        index, degree = locate_all(old, new.cell_states(), old.n_cells)
+        foremost = degree.argmax(axis=1)
+        cells = index[np.arange(len(index)), foremost]
+        return np.asarray(self._policy[cells])
 
     def _outcomes(self) -> Row:
         """The measures of the ants that not every environment has."""

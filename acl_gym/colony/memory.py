@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import copy
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -81,6 +83,10 @@ class Walk:
         self._actions.append(actions)
         self._rewards.append(rewards)
         self._allowed.append(allowed)
+
+    def states(self) -> NDArray[Any]:
+        """All observations, in the order of time, `(n, ...)`."""
+        return np.concatenate(self._seen)
 
     def rows(self) -> tuple[IntArray, dict[str, NDArray[Any]]]:
         """All of it, ant by ant.
@@ -234,7 +240,11 @@ class Memory:
         return paths
 
     def set_partition(self, partition: Partition) -> None:
-        """Locate everything anew, in a partition of the same state variables."""
+        """Locate everything anew, in a partition of the same state variables.
+
+        Raises:
+            ValueError: an observation does not belong to it.
+        """
         self.partition = partition
         shape = len(self.action), partition.cells_per_state
         self._rows["index"] = np.zeros(shape, np.int32)
@@ -244,6 +254,89 @@ class Memory:
             rows = slice(int(self.first[0]), self._used)
             self._locate(self._rows["seen"][rows], rows)
             self._count(np.arange(self.n_paths), 1)
+
+    def copy(self) -> Memory:
+        """What is remembered now, to come back to; what is added later is not in it."""
+        copied = copy.copy(self)
+        # Rows are only ever added behind those in use, so that they may be shared.
+        copied._rows = dict(self._rows)
+        copied.evidence = self.evidence.copy()
+        return copied
+
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        """What a file holds of it, for `restore`."""
+        begin = int(self.first[0]) if self.n_paths else self._used
+        located = ("index", "degree") if "seen" in self._rows else ()
+        kept = {
+            name: rows[begin : self._used]
+            for name, rows in self._rows.items()
+            if name not in located
+        }
+        paths = {"first": self.first - begin, "last": self.last - begin}
+        return {**paths, "terminated": self.terminated, **kept}
+
+    def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
+        """Take over what `arrays` gave, perhaps from a stranger's file.
+
+        Raises:
+            KeyError: an array is missing.
+            ValueError: one is not what it should be.
+        """
+        first, last = (arrays[name].astype(np.int64) for name in ("first", "last"))
+        action, reward = arrays["action"], arrays["reward"].astype(np.float64)
+        size = len(action)
+        begins = np.append(first, size)
+        good = (
+            first.ndim == 1
+            and first.shape == last.shape == arrays["terminated"].shape
+            and action.shape == reward.shape == (size,)
+            and action.dtype.kind in "iu"
+            and arrays["terminated"].dtype.kind == "b"
+            and (first < last).all()
+            and (last < begins[1:]).all()
+            and (first.size == 0 or first[0] >= 0)
+            and np.isfinite(reward).all()
+            and (size == 0 or 0 <= action.min() <= action.max() < self.n_actions)
+        )
+        if not good:
+            raise ValueError("the paths of its memory do not fit together")
+        rows = {"action": action.astype(self.action.dtype), "reward": reward}
+        if "allowed" in arrays:
+            allowed = arrays["allowed"]
+            if allowed.shape != (size, self.n_actions) or allowed.dtype.kind != "b":
+                raise ValueError("the masks of its memory do not fit its paths")
+            rows["allowed"] = allowed.copy()
+        located = isinstance(self.partition, Grid)
+        for name in ("seen",) if located else ("index", "degree"):
+            if len(arrays[name]) != size or arrays[name].ndim != 2:
+                raise ValueError(
+                    f"the array {name} of its memory does not fit its paths"
+                )
+            rows[name] = np.ascontiguousarray(arrays[name])
+        if not located:
+            self._check_cells(rows["index"], rows["degree"])
+        self._rows, self._used = rows, size
+        self.first, self.last = first, last
+        self.terminated = arrays["terminated"].copy()
+        if located:
+            self.set_partition(self.partition)
+        else:
+            n_pairs = self.partition.n_cells * self.n_actions
+            self.evidence = np.zeros(n_pairs, np.int64)
+            self._count(np.arange(self.n_paths), 1)
+
+    def _check_cells(self, index: NDArray[Any], degree: NDArray[Any]) -> None:
+        k = self.partition.cells_per_state
+        good = (
+            index.shape == degree.shape == (len(index), k)
+            and index.dtype == np.int32
+            and degree.dtype == np.float64
+            and (index.size == 0 or index.min() >= 0)
+            and (index.size == 0 or index.max() < self.partition.n_cells)
+            and bool(((degree >= 0) & (degree <= 1)).all())
+        )
+        if not good:
+            raise ValueError("the cells of its memory are not those of its partition")
 
     def _locate(self, states: NDArray[Any], rows: slice) -> None:
         index, degree = self.index[rows], self.degree[rows]

@@ -1,4 +1,4 @@
-"""What a pair promises of which nothing is known yet."""
+"""What a pair promises that no ant has tried: so much that ants go and see."""
 
 from __future__ import annotations
 
@@ -7,39 +7,43 @@ import numpy as np
 from acl_gym.colony.greedy import best_value
 from acl_gym.colony.memory import Memory
 from acl_gym.utils.compiling import njit
-from acl_gym.utils.typing import BoolArray, CellArray, FloatArray, IntArray, ActionArray
+from acl_gym.utils.typing import BoolArray, CellArray, FloatArray, IntArray
+
+GOOD = 0.9
+"""The quantile of the values of remembered states that counts as good."""
+
+NEWEST = 20_000
+"""How many of the newest remembered states are looked at."""
 
 
-def promised_levels(
-    memory: Memory, levels: FloatArray, quantile: float, discount: float, sample: int
+def promised_level(
+    memory: Memory, levels: FloatArray, optimism: float, discount: float
 ) -> float:
-    sizes = np.cumsum((memory.last - memory.first)[::-1])
-    count = int(np.searchsorted(sizes, sample)) + 1
+    """What pairs promise of which nothing is known, from what has been seen so far.
+
+    It lies between the value of a good state, of which nine of ten are worse, and the
+    most that could be had: the best reward for ever, or the best reward at an end, or
+    an end that costs nothing.
+
+    Args:
+        memory: what the ants remember.
+        levels: what pairs promise now, `(n_cells, n_actions)`.
+        optimism: where between the two it lies, in [0, 1].
+        discount: gamma_rl, in [0, 1].
+    """
+    sizes = memory.last - memory.first
+    count = int(np.searchsorted(np.cumsum(sizes[::-1]), NEWEST)) + 1
     first, last = memory.first[-count:], memory.last[-count:]
     values = np.empty(int((last - first).sum()))
     _values(first, last, memory.index, memory.degree, memory.allowed, levels, values)
-    level = float(np.quantile(values, 0.9))
+    good = float(np.quantile(values, GOOD))
+    longest = int(sizes.max())
+    steps = longest if discount == 1.0 else (1 - discount**longest) / (1 - discount)
     going, ending = _best_rewards(
         memory.first, memory.last, memory.terminated, memory.reward
     )
-    bound = max(0.0, going / (1 - discount), ending)
-    return level + quantile * (bound - level)
-
-
-@njit
-def _best_rewards(
-    first: IntArray, last: IntArray, terminated: BoolArray, reward: FloatArray
-) -> tuple[float, float]:
-    """The best reward of a step after which the ant went on, and of one that ended."""
-    going = ending = -np.inf
-    for path in range(first.size):
-        for row in range(first[path], last[path] - 1):
-            going = max(going, reward[row])
-        if terminated[path]:
-            ending = max(ending, reward[last[path] - 1])
-        else:
-            going = max(going, reward[last[path] - 1])
-    return going, ending
+    most = max(0.0, going * steps, ending)
+    return good + optimism * (most - good)
 
 
 @njit
@@ -52,8 +56,26 @@ def _values(
     levels: FloatArray,
     values: FloatArray,
 ) -> None:
+    """The best that each state promises in which an ant took a step."""
     place = 0
     for path in range(first.size):
         for row in range(first[path], last[path]):
             values[place] = best_value(levels, index, degree, row, allowed)
             place += 1
+
+
+@njit
+def _best_rewards(
+    first: IntArray, last: IntArray, terminated: BoolArray, reward: FloatArray
+) -> tuple[float, float]:
+    """The best reward of a step after which an ant went on, and of one that ended."""
+    going = ending = -np.inf
+    for path in range(first.size):
+        final = last[path] - 1
+        for row in range(first[path], final):
+            going = max(going, reward[row])
+        if terminated[path]:
+            ending = max(ending, reward[final])
+        else:
+            going = max(going, reward[final])
+    return going, ending

@@ -20,7 +20,6 @@ import numpy as np
 
 from acl_gym.colony.greedy import best_value
 from acl_gym.colony.memory import UNITS, Memory
-from acl_gym.utils import validation
 from acl_gym.utils.compiling import njit
 from acl_gym.utils.typing import (
     ActionArray,

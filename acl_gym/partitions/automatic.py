@@ -14,7 +14,7 @@ from acl_gym.envs.control.lookup import system_of
 from acl_gym.envs.control.system import ControlSystem
 from acl_gym.envs.wrappers.perturbations import HiddenVariables
 from acl_gym.partitions.base import Partition
-from acl_gym.partitions.bounds import Env, complete_bounds, estimate_bounds, observation_space, real_box
+from acl_gym.partitions.bounds import Env, complete_bounds, observation_space, real_box
 from acl_gym.partitions.discrete import FINITE_SPACES, Discrete
 from acl_gym.partitions.grid import Fuzzy, Grid, checked_kind
 from acl_gym.utils import validation
@@ -216,30 +216,3 @@ def _span(
         axis in circular or (line[0] == box.low[axis] and line[-1] == box.high[axis])
         for axis, line in enumerate(centres)
     )
-
-
-COARSE = {1: 21, 2: 9, 3: 6, 4: 5, 5: 4, 6: 3}
-
-
-def coarse_partition(env: Env, ranging: bool = True) -> Partition:
-    """A partition for a colony that lets it grow."""
-    space = observation_space(env)
-    if isinstance(space, FINITE_SPACES):
-        return Discrete.from_space(space)
-    box = real_box(space)
-    system = system_of(env)
-    if system is not None and system.observation_space != space:
-        system = None
-    circular = () if system is None else system.circular
-    number = COARSE[box.low.size]
-    low, high = complete_bounds(env, box, None, circular, 2_000, 0)
-    if ranging:
-        l2, h2 = estimate_bounds(env, 1_000, 0)
-        for a in range(low.size):
-            if a not in circular and l2[a] < h2[a]:
-                low[a], high[a] = max(low[a], l2[a]), min(high[a], h2[a])
-    cells = [
-        number + (axis in circular) if low[axis] < high[axis] else 1
-        for axis in range(low.size)
-    ]
-    return Fuzzy.from_box(spaces.Box(low, high, dtype=np.float64), cells, circular)

@@ -12,9 +12,7 @@ and which actions are allowed in each state."""
 
 def value(levels: Array, beta: Array, allowed: Array) -> float:
     """V(x): the best of what is allowed."""
-    return max(
-        float(beta @ levels[:, u]) for u in range(levels.shape[1]) if allowed[u]
-    )
+    return max(float(beta @ levels[:, u]) for u in range(levels.shape[1]) if allowed[u])
 
 
 def laid(levels: Array, path: Path, discount: float, mix: float) -> list[float]:

@@ -49,7 +49,7 @@ class Colony:
             mask[~mask.any(axis=1), 0] = True
             mask[:] |= not self.masked
             for ant in range(ants):
-                if 0 < length[ant] and t <= length[ant]:
+                if length[ant] > 0 and t <= length[ant]:
                     index, degree = locate_all(self.partition, seen[[ant]], 10**6)
                     beta = np.zeros(self.partition.n_cells)
                     np.add.at(beta, index[0], degree[0])

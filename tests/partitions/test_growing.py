@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from acl_gym import Crisp, Fuzzy
 from acl_gym.partitions import locate_all
-from acl_gym.partitions.refinement import carried_over, refined
+from acl_gym.partitions.growing import carried_over, refined
 
 
 def value(table: Any, partition: Any, states: Any) -> Any:

@@ -1,0 +1,191 @@
+"""Partitions that grow (§7.3): wider and finer grids, and a coarse one to begin with."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TypeVar
+
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import ArrayLike
+
+from acl_gym.envs.control.lookup import system_of
+from acl_gym.partitions.base import Partition, locate_all
+from acl_gym.partitions.bounds import Env, observation_space, real_box
+from acl_gym.partitions.discrete import FINITE_SPACES, Discrete
+from acl_gym.partitions.grid import Fuzzy, Grid
+from acl_gym.utils import validation
+from acl_gym.utils.boxes import declared_bounds
+from acl_gym.utils.typing import BoolArray, FloatArray
+
+COARSE = {1: 21, 2: 9, 3: 6, 4: 5, 5: 4, 6: 3}
+"""Number of variables -> centres of each to begin with: at most about a thousand cells."""
+
+MARGIN = 0.1
+"""A range that has become too narrow is widened by this share of it beyond what was seen,
+so that it need not be widened again at once."""
+
+_ROWS = 65_536  # cells that are carried over at a time
+
+AnyGrid = TypeVar("AnyGrid", bound=Grid)
+
+
+def seed_partition(env: Env) -> Partition:
+    """Choose the partition from which that of a colony grows.
+
+    Observations that are cells already stay cells. Others get a fuzzy grid of few cells.
+    A circular variable of this package's systems has its whole range at once. Nothing is
+    assumed of the others: each begins with one centre, until `widened` gives it the range
+    that is seen, so that variables without bounds and those with bounds that are never
+    reached are treated alike.
+
+    Args:
+        env: a vector environment or a single one.
+
+    Raises:
+        TypeError: its observations have no cells, such as Dict, Tuple or Text.
+        ValueError: they have more than six variables or more than one axis.
+    """
+    space = observation_space(env)
+    if isinstance(space, FINITE_SPACES):
+        return Discrete.from_space(space)
+    box = real_box(space)
+    number = centres_for(box.low.size)
+    system = system_of(env)
+    whole = system is not None and system.observation_space == space
+    circular = system.circular if system is not None and whole else ()
+    centres: list[FloatArray] = []
+    periods: list[float | None] = []
+    for axis, (low, high) in enumerate(zip(*declared_bounds(box), strict=True)):
+        if axis in circular:
+            periods.append(float(high - low))
+            centres.append(np.linspace(low, high, number + 1, endpoint=False))
+        else:
+            periods.append(None)
+            centres.append(np.array([min(max(0.0, low), high)]))
+    return Fuzzy(centres, periods)
+
+
+def centres_for(dimensions: int) -> int:
+    """The number of centres with which each of so many variables begins.
+
+    Raises:
+        ValueError: there are too many variables for a grid.
+    """
+    if dimensions not in COARSE:
+        raise ValueError(
+            f"observations must have 1 to {max(COARSE)} variables for a grid that is "
+            f"chosen for you, got {dimensions}: cells grow as n^d; choose a few features "
+            "with gymnasium.wrappers.TransformObservation, or pass a partition."
+        )
+    return COARSE[dimensions]
+
+
+def widened(grid: AnyGrid, states: FloatArray, space: spaces.Box) -> AnyGrid | None:
+    """Return the grid over the range that is seen, where that is wider than its own.
+
+    The centres of a variable whose range changes are spread evenly over the new range,
+    as many as before; a variable with one centre that is seen to vary gets as many as
+    `centres_for` says.
+
+    Args:
+        grid: a crisp or a fuzzy partition.
+        states: what was seen, `(n, d)`.
+        space: the observations; no range becomes wider than its bounds.
+
+    Returns:
+        The wider grid, or None if nothing was seen beyond the outermost centres.
+    """
+    least, most = declared_bounds(space)
+    low, high = states.min(axis=0), states.max(axis=0)
+    axes, wider = list(grid.centres), False
+    for axis, line in enumerate(axes):
+        beyond = low[axis] < line[0] or high[axis] > line[-1]
+        if grid.periods[axis] is not None or not beyond:
+            continue
+        count = line.size
+        if count == 1:
+            count = centres_for(len(axes))
+            first, last = low[axis], high[axis]
+        else:
+            first, last = min(low[axis], line[0]), max(high[axis], line[-1])
+        margin = MARGIN * (last - first)
+        if low[axis] < line[0] or line.size == 1:
+            first = max(first - margin, least[axis])
+        if high[axis] > line[-1] or line.size == 1:
+            last = min(last + margin, most[axis])
+        if last > first and (first < line[0] or last > line[-1]):
+            axes[axis] = np.linspace(first, last, count)
+            wider = True
+    return type(grid)(axes, grid.periods) if wider else None
+
+
+def refined(
+    grid: AnyGrid, axis: int, intervals: Sequence[bool] | BoolArray | None = None
+) -> AnyGrid:
+    """Return the grid with a new centre in the middle of intervals of one axis.
+
+    All old centres stay, so that a fuzzy table can be carried over exactly. An axis with
+    one centre stays as it is: nothing is known of its range.
+
+    Args:
+        grid: a crisp or a fuzzy partition.
+        axis: the state variable, 0 .. d - 1.
+        intervals: which to halve, `(n,)`: those between neighbouring centres, on a
+            circular axis also the last one, which closes the circle. None halves all.
+
+    Raises:
+        ValueError: there is no such axis, `intervals` do not fit it, or there would be
+            2^31 cells or more.
+    """
+    dimensions = len(grid.centres)
+    axis = validation.integer("axis", axis, at_least=0, at_most=dimensions - 1)
+    axes = list(grid.centres)
+    edges, period = axes[axis], grid.periods[axis]
+    if period is not None and edges.size > 1:
+        edges = np.append(edges, edges[0] + period)
+    middles = edges[:-1] + np.diff(edges) / 2
+    if intervals is not None:
+        chosen = validation.as_array(intervals)
+        if chosen is None or chosen.shape != middles.shape or chosen.dtype.kind != "b":
+            raise ValueError(
+                f"intervals must be {middles.size} bools for axis {axis}, got "
+                f"{validation.shown(intervals)}."
+            )
+        middles = middles[chosen]
+    axes[axis] = np.sort(np.concatenate([axes[axis], middles]))
+    return type(grid)(axes, grid.periods)
+
+
+def carried_over(table: ArrayLike, old: Partition, new: Partition) -> FloatArray:
+    """Return the table of a new partition that says what one of an old one said.
+
+    Each new cell receives what the old table says of its centre: the sum of the old
+    entries weighted with the degrees, eq. (4.7). If `new` is a fuzzy grid that has all
+    centres of `old`, both tables agree in every state but for rounding, and so do their
+    policies. The cells of a crisp grid receive a copy of the cell that holds their
+    centre.
+
+    Args:
+        table: `(old.n_cells, n_actions)`.
+        old: the partition of `table`.
+        new: the partition to carry it over to, of the same state variables.
+
+    Returns:
+        `(new.n_cells, n_actions)`.
+
+    Raises:
+        ValueError: the table is not one of `old`.
+    """
+    values = validation.real_array("table", table, ndim=2)
+    if len(values) != old.n_cells:
+        raise ValueError(
+            f"table must have {old.n_cells} rows, one for each cell, got {len(values)}."
+        )
+    states = new.cell_states()
+    carried = np.empty((new.n_cells, values.shape[1]))
+    for first in range(0, new.n_cells, _ROWS):
+        rows = slice(first, first + _ROWS)
+        index, degree = locate_all(old, states[rows], old.n_cells)
+        carried[rows] = np.einsum("nk,nka->na", degree, values[index])
+    return carried

@@ -1,0 +1,280 @@
+"""The colony that remembers: the algorithm in one loop, resumed, masked, growing."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from gymnasium import spaces
+from gymnasium.vector import AutoresetMode, SyncVectorEnv
+
+from acl_gym import (
+    Crisp,
+    Discrete,
+    Fuzzy,
+    PolicyEvaluation,
+    ReturningACL,
+    WaitingVectorEnv,
+    evaluate_policy_cost,
+)
+from acl_gym.partitions import Partition
+
+J_STAR = 38.4  # of the pendulum, by value iteration on a fine grid
+
+
+def pendulum(ants: int = 5) -> Any:
+    return gym.make_vec("acl_gym/Pendulum-v0", num_envs=ants)
+
+
+def gymnasium_env(env_id: str, ants: int = 5, **kwargs: Any) -> Any:
+    return WaitingVectorEnv([lambda: gym.make(env_id, **kwargs)] * ants)
+
+
+def crisp() -> Partition:
+    return Crisp([np.linspace(0, 6, 7), np.linspace(-9, 9, 7)], [2 * np.pi, None])
+
+
+SETTINGS: dict[str, tuple[Callable[[], Any], dict[str, Any]]] = {
+    "pendulum": (pendulum, {}),
+    "crisp": (pendulum, {"partition": crisp()}),
+    "cart-pole": (lambda: gymnasium_env("CartPole-v1"), {}),
+    "taxi": (lambda: gymnasium_env("Taxi-v4"), {}),
+    "lake": (lambda: gymnasium_env("FrozenLake-v1"), {"trust": 0.5, "mix": 0.1}),
+    "small memory": (pendulum, {"memory_size": 700, "older_paths": 3}),
+}
+EACH = pytest.mark.parametrize("name", SETTINGS)
+
+
+def make(name: str, seed: int = 3, **more: Any) -> ReturningACL:
+    env, keywords = SETTINGS[name]
+    return ReturningACL(env(), seed=seed, **(keywords | more))
+
+
+def assert_same(one: ReturningACL, other: ReturningACL) -> None:
+    assert one.table.tobytes() == other.table.tobytes()
+    assert one.num_timesteps == other.num_timesteps
+    assert np.array_equal(one._ranks, other._ranks)
+    assert one.rng.bit_generator.state == other.rng.bit_generator.state
+    assert np.array_equal(one.memory.evidence, other.memory.evidence)
+    assert [{**row, "seconds": 0} for row in one.history] == [
+        {**row, "seconds": 0} for row in other.history
+    ]
+
+
+@EACH
+def test_the_same_seed_gives_the_same_bits(name: str) -> None:
+    assert_same(make(name).learn(trials=4), make(name).learn(trials=4))
+
+
+def test_another_seed_gives_another_run() -> None:
+    one, other = (make("pendulum", seed=seed).learn(trials=2) for seed in (3, 4))
+    assert one.table.shape != other.table.shape or (one.table != other.table).any()
+
+
+@EACH
+def test_two_parts_are_one_run_also_through_a_file(name: str, tmp_path: Path) -> None:
+    whole = make(name).learn(trials=5)
+    make(name).learn(trials=2).save(tmp_path / "part")
+    part = ReturningACL.load(tmp_path / "part", SETTINGS[name][0]())
+    assert_same(part.learn(trials=3), whole)
+
+
+@EACH
+def test_a_trial_can_be_taken_back(name: str) -> None:
+    colony = make(name).learn(trials=2)
+    kept = colony.snapshot()
+    colony.learn(trials=2)
+    for _ in range(2):  # twice from the same snapshot
+        colony.take_back(kept)
+        assert_same(colony.learn(trials=3), make(name).learn(trials=5))
+
+
+def test_a_second_call_goes_on_for_as_many_steps() -> None:
+    colony = make("pendulum").learn(total_timesteps=600)
+    first = colony.num_timesteps
+    colony.learn(total_timesteps=600)
+    assert first >= 600
+    assert colony.num_timesteps >= first + 600
+
+
+@pytest.mark.parametrize("mode", list(AutoresetMode))
+def test_every_autoreset_mode_teaches_the_same(mode: AutoresetMode) -> None:
+    """The single environments begin each trial with the same seeds."""
+    made = [lambda: gym.make("CliffWalking-v1", max_episode_steps=50)] * 3
+    env = SyncVectorEnv(made, autoreset_mode=mode)
+    colony = ReturningACL(env, seed=0, epsilon=0.0).learn(trials=1)
+    waiting = ReturningACL(WaitingVectorEnv(made), seed=0, epsilon=0.0).learn(trials=1)
+    assert colony.table.tobytes() == waiting.table.tobytes()
+
+
+def test_the_pendulum_is_near_the_optimum_after_three_thousand_steps() -> None:
+    """Six seeds have cost 43.3 to 55; the thesis's colony has not come near by then."""
+    colony = ReturningACL(pendulum(), seed=0).learn(total_timesteps=3_000)
+    assert evaluate_policy_cost(colony, pendulum(100)).cost < 1.5 * J_STAR
+    colony.learn(total_timesteps=7_000)
+    assert evaluate_policy_cost(colony, pendulum(100)).cost < 1.25 * J_STAR
+
+
+def test_the_slippery_lake_is_crossed() -> None:
+    """Where luck decides, levels are means: 0.74 is the best there is."""
+    colony = make("lake", trust=1.0, mix=0.0).learn(total_timesteps=8_000)
+    env = gymnasium_env("FrozenLake-v1", 200)
+    found = evaluate_policy_cost(colony, env, seed=1, max_steps=100)
+    assert found.mean_return > 0.6  # six seeds: 0.59 to 0.78
+
+
+def test_the_cliff_is_passed_on_the_shortest_way() -> None:
+    env = gymnasium_env("CliffWalking-v1", max_episode_steps=200)
+    colony = ReturningACL(env, seed=0).learn(total_timesteps=6_000)
+    one = gymnasium_env("CliffWalking-v1", 1, max_episode_steps=200)
+    assert evaluate_policy_cost(colony, one).mean_return == -13.0
+
+
+class Corridor(gym.Env):
+    """A walk of ten steps to the right; a forbidden action would pay at once."""
+
+    observation_space, action_space = spaces.Discrete(11), spaces.Discrete(3)
+
+    def _seen(self) -> tuple[int, dict[str, Any]]:
+        return self.place, {"action_mask": np.array([True, True, False])}
+
+    def reset(self, **kwargs: Any) -> Any:
+        super().reset(**{k: v for k, v in kwargs.items() if k == "seed"})
+        self.place = 0
+        return self._seen()
+
+    def step(self, action: int) -> Any:
+        assert action != 2, "forbidden"
+        self.place = max(0, self.place + (1 if action == 1 else -1))
+        seen, infos = self._seen()
+        return seen, -1.0, self.place == 10, False, infos
+
+
+def test_what_is_masked_is_neither_done_nor_promised() -> None:
+    env = WaitingVectorEnv([Corridor] * 3)
+    colony = ReturningACL(env, seed=0, max_steps=60, discount=1.0)
+    # So good that it would be taken, and count in V, wherever masks did not hold.
+    colony._table[:, 2] = 1_000.0
+    colony._walk_back.known[:, 2] = True
+    colony.learn(trials=30)
+    assert (colony.table[:, 2] == 1_000.0).all()
+    way = colony.table[:10, :2]
+    assert (way.argmax(axis=1) == 1).all()
+    assert np.allclose(way[:, 1], -np.arange(10.0, 0.0, -1.0), atol=0.5)
+
+
+def test_a_time_out_promises_what_the_last_state_promises() -> None:
+    """Ants that are stopped after two steps know the way of ten."""
+    env = WaitingVectorEnv([lambda: gym.make("FrozenLake-v1", is_slippery=False)] * 4)
+    colony = ReturningACL(env, seed=0, steps_per_walk=4).learn(total_timesteps=4_000)
+    one = WaitingVectorEnv([lambda: gym.make("FrozenLake-v1", is_slippery=False)])
+    result = evaluate_policy_cost(colony, one, max_steps=100)
+    assert (result.mean_return, result.lengths[0]) == (1.0, 6)
+
+
+def test_the_partition_grows_with_what_is_seen() -> None:
+    colony = make("cart-pole")
+    begun = colony.partition
+    assert begun.n_cells == 1
+    colony.learn(trials=1)
+    seen = colony.memory._rows["seen"][: int(colony.memory.last[-1]) + 1]
+    for axis, line in enumerate(colony.partition.centres):
+        assert line[0] <= seen[:, axis].min() <= seen[:, axis].max() <= line[-1]
+    before = colony.partition.n_cells
+    colony.learn(total_timesteps=15_000)
+    assert before < colony.partition.n_cells <= colony.max_cells
+    assert all(
+        row["cells"] <= later["cells"]
+        for row, later in zip(colony.history, colony.history[1:], strict=False)
+    )
+
+
+def test_the_limit_on_cells_is_kept() -> None:
+    colony = make("pendulum", max_cells=200, visits_to_grow=0.1)
+    assert colony.learn(total_timesteps=3_000).partition.n_cells <= 200
+
+
+def test_a_partition_that_is_given_stays() -> None:
+    partition = crisp()
+    colony = ReturningACL(pendulum(), partition, seed=0).learn(trials=3)
+    assert colony.partition is partition
+    grown = ReturningACL(pendulum(), crisp(), seed=0, grows=True, visits_to_grow=0.5)
+    assert grown.learn(trials=3).partition.n_cells > partition.n_cells
+
+
+def test_callbacks_evaluate_a_growing_policy() -> None:
+    colony = make("pendulum")
+    colony.learn(trials=3, callback=PolicyEvaluation(pendulum(100)))
+    assert all(row["policy_cost"] > 0 for row in colony.history)
+    assert all(0.0 <= row["policy_variation"] <= 1.0 for row in colony.history)
+
+
+@pytest.mark.parametrize(
+    ("keywords", "words"),
+    [
+        ({"discount": 1.5}, r"discount must lie in \[0, 1\]"),
+        ({"mix": -0.1}, r"mix must lie in"),
+        ({"learning_rate": 0}, r"learning_rate must lie in \(0, 1\]"),
+        ({"walks_back": 0}, "walks_back must be at least 1"),
+        ({"older_paths": -1}, "older_paths must be at least 0"),
+        ({"steps_per_walk": 0}, "steps_per_walk must be at least 1"),
+        ({"memory_size": 10**9}, "memory_size must be at most"),
+        ({"max_cells": 0}, "max_cells must be at least 1"),
+        ({"optimism": np.nan}, "optimism must"),
+    ],
+)
+def test_bad_parameters_are_refused(keywords: dict[str, Any], words: str) -> None:
+    with pytest.raises((TypeError, ValueError), match=words):
+        ReturningACL(pendulum(), **keywords)
+
+
+@pytest.mark.parametrize(
+    ("name", "change"),
+    [
+        ("memory_first", lambda a: a + 10**6),
+        ("memory_last", lambda a: -a),
+        ("memory_action", lambda a: a + 200),
+        ("memory_reward", lambda a: a * np.nan),
+        ("memory_seen", lambda a: a[1:]),
+        ("memory_seen", lambda a: a[:, :1]),
+        ("memory_seen", lambda a: a * np.inf),
+        ("memory_terminated", lambda a: a[1:]),
+        ("known", lambda a: a[1:]),
+        ("splits", lambda a: a - 10),
+    ],
+)
+def test_memories_from_strangers_are_checked(
+    name: str, change: Callable[[Any], Any], tmp_path: Path, monkeypatch: Any
+) -> None:
+    colony = make("pendulum").learn(trials=1)
+    arrays = colony._arrays()
+    with np.errstate(invalid="ignore"):
+        arrays[name] = change(arrays[name])
+    monkeypatch.setattr(colony, "_arrays", lambda: arrays)
+    colony.save(tmp_path / "strange")
+    with pytest.raises(ValueError, match="is damaged"):
+        ReturningACL.load(tmp_path / "strange")
+
+
+def test_cells_from_strangers_are_checked(tmp_path: Path, monkeypatch: Any) -> None:
+    colony = make("lake").learn(trials=1)
+    arrays = colony._arrays()
+    for change in (
+        {"memory_index": arrays["memory_index"] + 10**6},
+        {"memory_degree": arrays["memory_degree"] * 5},
+    ):
+        monkeypatch.setattr(colony, "_arrays", lambda change=change: arrays | change)
+        colony.save(tmp_path / "strange")
+        with pytest.raises(ValueError, match="is damaged"):
+            ReturningACL.load(tmp_path / "strange")
+
+
+def test_discrete_states_are_cells_from_the_start() -> None:
+    assert isinstance(make("taxi").partition, Discrete)
+    assert make("taxi").mix == 0.0
+    assert isinstance(make("pendulum").partition, Fuzzy)
+    assert make("pendulum").mix > 0.0

@@ -207,16 +207,16 @@ class SavedAgent(PartitionPolicy):
             ValueError: something is missing; the message says what is to be given.
         """
         try:
-            names = self.parameters()
+            parts = [getattr(self, name, None) for name in self.parameters()]
+            missing = [missing_in(part) for part in (self.partition, *parts)]
         except RecursionError as error:
             raise TypeError(
                 "cost must lie at most some hundred costs deep, or it cannot be saved; "
                 "multiply the factors first."
             ) from error
-        parts = (getattr(self, name, None) for name in names)
-        for part in (self.partition, *parts):
-            if (missing := missing_in(part)) is not None:
-                raise missing.error()
+        for each in missing:
+            if each is not None:
+                raise each.error()
 
     @classmethod
     def load(

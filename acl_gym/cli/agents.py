@@ -24,11 +24,14 @@ class AgentKind(NamedTuple):
         name: of its class.
         deposits: whether its ants deposit by the costs of solutions: it then needs a
             deposit that suits the environment, and learns nothing from equal costs.
+        grows: whether it chooses a partition for itself and lets it grow; it then
+            learns from few ants.
     """
 
     module: str
     name: str
     deposits: bool
+    grows: bool = False
 
     def load(self) -> Any:
         """Import the class."""
@@ -37,6 +40,9 @@ class AgentKind(NamedTuple):
 
 AGENTS = {
     "acl": AgentKind("acl_gym.agents.acl", "ACL", deposits=True),
+    "returning": AgentKind(
+        "acl_gym.agents.returning", "ReturningACL", deposits=False, grows=True
+    ),
     "q-learning": AgentKind("acl_gym.agents.q_learning", "QLearning", deposits=False),
 }
 """Value of `--agent` -> the agent. To add one, add an entry."""

@@ -31,6 +31,9 @@ from acl_gym.partitions.automatic import automatic_partition
 ANTS, FOREIGN_ANTS = 250, 200
 """Of the thesis's pendulum; in other packages' environments found on CartPole."""
 
+FEW_ANTS = 5
+"""Slots by default for agents that learn from few."""
+
 TRIALS = 100
 EVALUATE_EVERY = 10
 FOREIGN_EVALUATE_EVERY = 2
@@ -95,17 +98,21 @@ def begin(
     Raises:
         BadArgumentError: an argument does not suit the environment or the agent.
     """
-    if ants is None:
+    if ants is None and AGENTS[kind].grows:
+        ants = FEW_ANTS
+    elif ants is None:
         ants = ANTS if environment.is_own else FOREIGN_ANTS
     env = environment.vector(ants)
     steps = max_steps or default_steps(env)
     with bad_arguments():
-        grid = automatic_partition(
-            env,
-            kind=Crisp if partition == "crisp" else Fuzzy,
-            cells=cells[0] if cells and len(cells) == 1 else cells,
-            random_steps=max(RANDOM_STEPS, env.num_envs),
-        )
+        grid = None  # the agent chooses
+        if not AGENTS[kind].grows or cells or partition != "auto":
+            grid = automatic_partition(
+                env,
+                kind=Crisp if partition == "crisp" else Fuzzy,
+                cells=cells[0] if cells and len(cells) == 1 else cells,
+                random_steps=max(RANDOM_STEPS, env.num_envs),
+            )
     if AGENTS[kind].deposits and not {"deposit", "cost"} & settings.keys():
         settings = {**settings, **_deposit(environment, steps, seed)}
     with bad_arguments():

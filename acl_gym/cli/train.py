@@ -108,7 +108,8 @@ def train(
             min=1,
             metavar="M",
             help="Number of ants: slots of the vector environment.  [default: 250, or 200 "
-            "in environments of other packages; with --resume: as before]",
+            "in environments of other packages, or 5 of the returning colony; with "
+            "--resume: as before]",
             show_default=False,
         ),
     ] = None,

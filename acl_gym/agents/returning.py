@@ -14,8 +14,9 @@ from acl_gym.agents.saving import Snapshot
 from acl_gym.agents.training import Training
 from acl_gym.callbacks.base import Callbacks
 from acl_gym.colony.greedy import epsilon_greedy_actions, epsilon_greedy_unchecked
-from acl_gym.colony.memory import UNITS, Memory, Walk
+from acl_gym.colony.memory import UNITS, Memory
 from acl_gym.colony.optimism import promised_level
+from acl_gym.colony.walk import Walk
 from acl_gym.colony.walking_back import WalkBack
 from acl_gym.partitions import Discrete, Grid, Partition
 from acl_gym.partitions.growing import carried_over, refined, seed_partition, widened

@@ -105,6 +105,8 @@ def _bootstrapped(samples: tuple[ArrayLike, ...], statistic: Statistic) -> Estim
             # Anew for each estimate, so that none depends on which others are made.
             rng=np.random.default_rng(0),
         ).confidence_interval
+        # Where all runs are equal, rounding may exchange the two.
+        low, high = min(low, high), max(low, high)
     return Estimate(*map(_unclipped, (value, float(low), float(high))))
 
 

@@ -98,6 +98,8 @@ def widened(grid: AnyGrid, states: FloatArray, space: spaces.Box) -> AnyGrid | N
     """
     least, most = declared_bounds(space)
     low, high = states.min(axis=0), states.max(axis=0)
+    if not np.isfinite([low, high]).all():
+        return None  # whoever locates these states refuses them
     axes, wider = list(grid.centres), False
     for axis, line in enumerate(axes):
         beyond = low[axis] < line[0] or high[axis] > line[-1]

@@ -278,3 +278,25 @@ def test_discrete_states_are_cells_from_the_start() -> None:
     assert make("taxi").mix == 0.0
     assert isinstance(make("pendulum").partition, Fuzzy)
     assert make("pendulum").mix > 0.0
+
+
+class Broken(gym.Env):
+    """After some steps it shows what is no number."""
+
+    observation_space = spaces.Box(-np.inf, np.inf, (2,))
+    action_space = spaces.Discrete(2)
+
+    def reset(self, **kwargs: Any) -> Any:
+        self.steps = 0
+        return np.zeros(2, np.float32), {}
+
+    def step(self, action: int) -> Any:
+        self.steps += 1
+        shown = np.array([np.inf if self.steps > 5 else 1.0, 0.0], np.float32)
+        return shown, -1.0, self.steps > 5, False, {}
+
+
+def test_observations_that_are_no_numbers_are_refused() -> None:
+    colony = ReturningACL(WaitingVectorEnv([Broken] * 2), seed=0)
+    with pytest.raises(ValueError, match="states must be finite, got"):
+        colony.learn(trials=2)

@@ -10,7 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from acl_gym import Crisp, Fuzzy
-from acl_gym.colony.memory import Memory, Walk
+from acl_gym.colony.memory import Memory
+from acl_gym.colony.walk import Walk
 from acl_gym.colony.walking_back import WalkBack
 from acl_gym.partitions import locate_all
 from tests.colony import reference_walk_back as reference

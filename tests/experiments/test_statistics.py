@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
@@ -43,6 +43,7 @@ def test_the_interval_is_the_percentile_bootstrap(statistic) -> None:
 
 @settings(max_examples=30, deadline=None)
 @given(st.lists(st.floats(0.1, 100.0), min_size=2, max_size=12))
+@example([21.426984281791853] * 3)  # rounding once exchanged the two ends
 def test_the_interval_holds_the_range_of_the_runs(values: list[float]) -> None:
     found = estimate(values)
     assert min(values) - 1e-9 <= found.low <= found.high <= max(values) + 1e-9

@@ -4,14 +4,21 @@ from __future__ import annotations
 
 from typing import Any
 
+import gymnasium as gym
 import numpy as np
 import pytest
+from gymnasium import spaces
 from hypothesis import given
 from hypothesis import strategies as st
 
-from acl_gym import Crisp, Fuzzy
+from acl_gym import Crisp, Discrete, Fuzzy
 from acl_gym.partitions import locate_all
-from acl_gym.partitions.growing import carried_over, refined
+from acl_gym.partitions.growing import (
+    carried_over,
+    refined,
+    seed_partition,
+    widened,
+)
 
 
 def value(table: Any, partition: Any, states: Any) -> Any:
@@ -64,3 +71,60 @@ def test_a_table_of_another_partition_is_refused() -> None:
     coarse = Fuzzy([[0.0, 1.0]])
     with pytest.raises(ValueError, match="table must have 2 rows, one for each cell"):
         carried_over(np.zeros((3, 1)), coarse, refined(coarse, 0))
+
+
+BOX = spaces.Box(np.array([-np.inf, 0.0]), np.array([np.inf, 1.0]))
+
+
+def test_a_range_is_that_which_is_seen_with_a_margin_within_the_bounds() -> None:
+    start = Fuzzy([[0.0], [0.5]])
+    wide = widened(start, np.array([[-2.0, 0.1], [8.0, 0.9]]), BOX)
+    assert wide is not None
+    # A tenth of the range is added on either side: 1.0, and 0.08.
+    np.testing.assert_allclose(wide.centres[0], np.linspace(-3.0, 9.0, 9))
+    np.testing.assert_allclose(wide.centres[1], np.linspace(0.02, 0.98, 9))
+    assert widened(wide, np.array([[9.0, 0.5]]), BOX) is None
+    wider = widened(wide, np.array([[10.0, 1.0]]), BOX)
+    assert wider is not None
+    np.testing.assert_allclose(wider.centres[0], np.linspace(-3.0, 11.3, 9))
+    np.testing.assert_allclose(wider.centres[1][[0, -1]], [0.02, 1.0])
+
+
+def test_what_does_not_vary_or_is_circular_keeps_its_centres() -> None:
+    grid = Fuzzy([[0.0, 1.0, 2.0], [0.5]], [3.0, None])
+    assert widened(grid, np.array([[50.0, 0.7], [-9.0, 0.7]]), BOX) is None
+
+
+def test_states_that_are_not_finite_widen_nothing() -> None:
+    assert widened(Fuzzy([[0.0], [0.5]]), np.array([[np.inf, 0.1]]), BOX) is None
+    assert widened(Fuzzy([[0.0], [0.5]]), np.array([[np.nan, 0.1]]), BOX) is None
+
+
+def test_a_partition_to_begin_with() -> None:
+    pendulum = seed_partition(gym.make("acl_gym/Pendulum-v0"))
+    assert isinstance(pendulum, Fuzzy)
+    assert pendulum.periods == (pytest.approx(2 * np.pi), None)
+    assert [line.size for line in pendulum.centres] == [10, 1]
+    assert isinstance(seed_partition(gym.make("Taxi-v4")), Discrete)
+    with pytest.raises(ValueError, match=r"must have 1 to 6 variables .*, got 7"):
+        seed_partition(Many())
+
+
+class Many(gym.Env):
+    """An environment of seven variables."""
+
+    observation_space = spaces.Box(-1.0, 1.0, (7,))
+    action_space = spaces.Discrete(2)
+
+
+@pytest.mark.parametrize("intervals", [[True], [1, 0], [True, False, True], "ab"])
+def test_intervals_must_fit(intervals: Any) -> None:
+    with pytest.raises(ValueError, match="intervals must be 2 bools for axis 0"):
+        refined(Fuzzy([[0.0, 1.0, 3.0]]), 0, intervals)
+
+
+def test_single_intervals_are_halved() -> None:
+    fine = refined(Fuzzy([[0.0, 1.0, 3.0]]), 0, [False, True])
+    assert fine.centres[0].tolist() == [0.0, 1.0, 2.0, 3.0]
+    rounded = refined(Fuzzy([[0.0, 1.0]], [3.0]), 0, [False, True])
+    assert rounded.centres[0].tolist() == [0.0, 1.0, 2.0]

@@ -73,7 +73,7 @@ def test_a_table_of_another_partition_is_refused() -> None:
         carried_over(np.zeros((3, 1)), coarse, refined(coarse, 0))
 
 
-BOX = spaces.Box(np.array([-np.inf, 0.0]), np.array([np.inf, 1.0]))
+BOX = spaces.Box(np.array([-np.inf, 0.0]), np.array([np.inf, 1.0]), dtype=np.float64)
 
 
 def test_a_range_is_that_which_is_seen_with_a_margin_within_the_bounds() -> None:

@@ -48,8 +48,7 @@ class ReturningACL(TabularAgent):
 
     Args:
         env: a vector environment with `Discrete` actions; its slots are the M ants.
-        partition: turns observations into cells and degrees, and stays as it is. None:
-            it is chosen, and grows.
+        partition: turns observations into cells and degrees. None: it is chosen.
         discount: gamma_rl, in [0, 1], weight of what follows a step.
         mix: in [0, 1], how much an ant trusts its own continuation; the rest is the best
             that the levels promise. None takes 0.2, or 0 where states are cells already:
@@ -69,13 +68,12 @@ class ReturningACL(TabularAgent):
         visits_to_grow: how often the median pair of those tried must have been tried
             before the partition becomes finer along one variable, > 0.
         max_cells: the partition does not become finer than this, >= 1.
+        grows: whether the partition becomes wider and finer. None: if it was chosen for
+            you.
         max_steps: T, the most steps an ant may make, >= 1. None takes the time limit of
             the environment, or 300 if it has none.
         seed: the same seed gives the same run; None draws one from the system.
         n_actions: only needed without an environment.
-
-    Attributes:
-        memory: the paths that the colony remembers.
 
     Raises:
         TypeError: `env` or `partition` is of the wrong kind.
@@ -109,6 +107,25 @@ class ReturningACL(TabularAgent):
         at_least=0,
         at_most=1,
     )
+    mix = Parameter("Trust of an ant in its own continuation", at_least=0, at_most=1)
+    walks_back = Parameter(
+        "Walks back after each walk", whole=True, at_least=1, at_most=10_000
+    )
+    older_paths = Parameter(
+        "Older paths in each walk back", whole=True, at_least=0, at_most=1_000_000
+    )
+    steps_per_walk = Parameter(
+        "Steps of all ants before they walk back",
+        whole=True,
+        at_least=1,
+        at_most=1_000_000_000,
+    )
+    max_cells = Parameter(
+        "The most cells of a partition that grows",
+        whole=True,
+        at_least=1,
+        at_most=2_000_000_000,
+    )
     visits_to_grow = Parameter(
         "Tries of the median pair before cells are split", above=0
     )
@@ -123,7 +140,7 @@ class ReturningACL(TabularAgent):
         learning_rate: float = 0.9,
         trust: float = 1.0,
         epsilon: float = 0.1,
-        optimism: float = 0.5,
+        optimism: float = 1.0,
         walks_back: int = 10,
         older_paths: int = 50,
         steps_per_walk: int = 300,
@@ -141,12 +158,9 @@ class ReturningACL(TabularAgent):
         self.epsilon = epsilon
         self.optimism = optimism
         self.visits_to_grow = visits_to_grow
-        self.walks_back = validation.integer("walks_back", walks_back, at_least=1)
-        self.older_paths = validation.integer("older_paths", older_paths, at_least=0)
-        self.steps_per_walk = validation.integer(
-            "steps_per_walk", steps_per_walk, at_least=1
-        )
-        self.max_cells = validation.integer("max_cells", max_cells, at_least=1)
+        self.walks_back, self.older_paths = walks_back, older_paths
+        self.steps_per_walk = steps_per_walk
+        self.max_cells = max_cells
         self.grows = partition is None if grows is None else grows
         if partition is None and env is not None:
             partition = seed_partition(env)
@@ -155,14 +169,14 @@ class ReturningACL(TabularAgent):
         )
         if mix is None:
             mix = 0.0 if isinstance(self.partition, Discrete) else 0.2
-        self.mix = validation.number("mix", mix, at_least=0, at_most=1)
+        self.mix = mix
         self._splits = 0
         shape = self.partition.n_cells, self.n_actions
         self._walk_back = WalkBack(np.zeros(shape))
         memory_size = validation.integer(
             "memory_size", memory_size, at_least=1, at_most=2**25
         )
-        self.memory = Memory(memory_size, self.n_actions, self.partition)
+        self._memory = Memory(memory_size, self.n_actions, self.partition)
 
     def learn(
         self,
@@ -199,7 +213,7 @@ class ReturningACL(TabularAgent):
                 while self.rollout._ants.size:
                     walk, observation = self._walk(observation)
                     self._widen(walk)
-                    newest = self.memory.add(walk, self.rollout.terminated)
+                    newest = self._memory.add(walk, self.rollout.terminated)
                     self._promise()
                     for _ in range(self.walks_back):
                         self._return(newest)
@@ -235,17 +249,17 @@ class ReturningACL(TabularAgent):
 
     def _promise(self) -> None:
         """Set what pairs promise of which nothing is known yet."""
-        level = promised_level(self.memory, self._table, self.optimism, self.discount)
+        level = promised_level(self._memory, self._table, self.optimism, self.discount)
         self._table[~self._walk_back.known] = level
 
     def _return(self, newest: IntArray) -> None:
         """Let the ants walk the newest paths back, and some older ones."""
-        older = self.memory.n_paths - newest.size
+        older = self._memory.n_paths - newest.size
         drawn = np.arange(older)
         if older > self.older_paths:
             drawn = np.unique(self.rng.integers(older, size=self.older_paths))
         self._walk_back.walk(
-            self.memory,
+            self._memory,
             np.concatenate([drawn, newest]),
             discount=self.discount,
             mix=self.mix,
@@ -266,7 +280,7 @@ class ReturningACL(TabularAgent):
         grid = self.partition
         if not (self.grows and isinstance(grid, Grid)):
             return
-        tried = self.memory.evidence[self.memory.evidence > 0]
+        tried = self._memory.evidence[self._memory.evidence > 0]
         tries = float(np.median(tried)) / UNITS * grid.cells_per_state
         several = [axis for axis, line in enumerate(grid.centres) if line.size > 1]
         if tries <= self.visits_to_grow or not several:
@@ -283,7 +297,7 @@ class ReturningACL(TabularAgent):
         self._set_partition(partition, carried_over(walk_back.levels, old, partition))
         # A cell between one that is known and one that is not is not known.
         self._walk_back.known[:] = known > 1.0 - 1e-9
-        self.memory.set_partition(partition)
+        self._memory.set_partition(partition)
 
     def _set_partition(self, partition: Partition, levels: FloatArray) -> None:
         self.__dict__["partition"] = partition  # which nobody else may set
@@ -293,6 +307,24 @@ class ReturningACL(TabularAgent):
         self._ranks = random_ranks(partition.n_cells, self.n_actions, ties)
         if self._rollout is not None:
             self._make_room(self.num_envs, partition.cells_per_state)
+
+    @property
+    def grows(self) -> bool:
+        """Whether the partition becomes wider and finer."""
+        return self._grows
+
+    @grows.setter
+    def grows(self, value: bool) -> None:
+        if not isinstance(value, bool):
+            raise TypeError(
+                f"grows must be True or False, got {validation.shown(value)}."
+            )
+        self._grows = value
+
+    @property
+    def remembered_steps(self) -> int:
+        """How many steps the colony remembers."""
+        return self._memory.n_steps
 
     @property
     def _table(self) -> FloatArray:
@@ -311,7 +343,7 @@ class ReturningACL(TabularAgent):
         """How many cells the partition has, and how many steps are remembered."""
         return {
             "cells": self.partition.n_cells,
-            "remembered_steps": self.memory.n_steps,
+            "remembered_steps": self.remembered_steps,
         }
 
     def parameters(self) -> dict[str, Any]:
@@ -326,7 +358,7 @@ class ReturningACL(TabularAgent):
             "walks_back": self.walks_back,
             "older_paths": self.older_paths,
             "steps_per_walk": self.steps_per_walk,
-            "memory_size": self.memory.most,
+            "memory_size": self._memory.most,
             "visits_to_grow": self.visits_to_grow,
             "max_cells": self.max_cells,
             "grows": self.grows,
@@ -335,7 +367,7 @@ class ReturningACL(TabularAgent):
         }
 
     def _arrays(self) -> dict[str, NDArray[Any]]:
-        remembered = {f"memory_{n}": a for n, a in self.memory.arrays().items()}
+        remembered = {f"memory_{n}": a for n, a in self._memory.arrays().items()}
         splits = np.array(self._splits)
         return {"known": self._walk_back.known, "splits": splits, **remembered}
 
@@ -351,7 +383,7 @@ class ReturningACL(TabularAgent):
             raise ValueError("splits must be a number >= 0")
         self._splits = int(splits)
         names = [name for name in arrays if name.startswith("memory_")]
-        self.memory.restore({n.removeprefix("memory_"): arrays[n] for n in names})
+        self._memory.restore({n.removeprefix("memory_"): arrays[n] for n in names})
 
     def snapshot(self) -> Snapshot:
         """See `SavedAgent.snapshot`; what is remembered is shared, not copied."""
@@ -360,7 +392,7 @@ class ReturningACL(TabularAgent):
             self._ranks,
             self._walk_back.known.copy(),
             self._splits,
-            self.memory.copy(),
+            self._memory.copy(),
         )
         generators = [rng.bit_generator.state for rng in (self.rng, self._predict_rng)]
         counts = self.num_timesteps, self.trials, self.seconds, len(self.history)
@@ -371,7 +403,7 @@ class ReturningACL(TabularAgent):
         partition, ranks, known, splits, memory = snapshot.more
         self._set_partition(partition, snapshot.table.copy())
         super().take_back(snapshot)
-        self._ranks, self._splits, self.memory = ranks, splits, memory.copy()
+        self._ranks, self._splits, self._memory = ranks, splits, memory.copy()
         self._walk_back.known[:] = known
 
     def _explore(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import inspect
 from typing import Any, ClassVar
 
-from acl_gym.utils.validation import Range, number, shown
+from acl_gym.utils.validation import Range, integer, number, shown
 
 
 class Parameter:
@@ -24,6 +24,7 @@ class Parameter:
         scheduled: a function of the trial number k = 0, 1, ... may stand in for the
             number; what it returns is checked in each trial.
         fixed: it can be set only once, by the constructor.
+        whole: it is an integer >= 0, with inclusive bounds.
         **bounds: the range, the attributes of `Range`.
 
     Example:
@@ -40,9 +41,11 @@ class Parameter:
         unit: str = "",
         scheduled: bool = False,
         fixed: bool = False,
+        whole: bool = False,
         **bounds: float,
     ) -> None:
         self.meaning, self.symbol, self.unit = meaning, symbol, unit
+        self.whole = whole
         self.scheduled, self.fixed = scheduled, fixed
         self.range = Range(**bounds)
 
@@ -59,6 +62,8 @@ class Parameter:
     def kind(self) -> str:
         """Symbol, kind of number, unit and range in words."""
         kind = "a number or a schedule" if self.scheduled else "a number"
+        if self.whole:
+            kind = "an integer"
         parts = [self.symbol, f"{kind} {self.range.in_words()}"]
         if self.unit:
             parts.append(f"in {self.unit}")
@@ -75,7 +80,15 @@ class Parameter:
         if self.fixed and self.name in instance.__dict__:
             raise fixed(self.name, value)
         function = callable(value) and not isinstance(value, type)
-        if not (self.scheduled and function):
+        if self.whole:
+            low, high = self.range.at_least, self.range.at_most
+            value = integer(
+                self.name,
+                value,
+                at_least=int(low or 0),
+                at_most=None if high is None else int(high),
+            )
+        elif not (self.scheduled and function):
             value = number(self.name, value, self.range)
         instance.__dict__[self.name] = value
 

@@ -59,7 +59,7 @@ def assert_same(one: ReturningACL, other: ReturningACL) -> None:
     assert one.num_timesteps == other.num_timesteps
     assert np.array_equal(one._ranks, other._ranks)
     assert one.rng.bit_generator.state == other.rng.bit_generator.state
-    assert np.array_equal(one.memory.evidence, other.memory.evidence)
+    assert np.array_equal(one._memory.evidence, other._memory.evidence)
     assert [{**row, "seconds": 0} for row in one.history] == [
         {**row, "seconds": 0} for row in other.history
     ]
@@ -177,15 +177,15 @@ def test_a_time_out_promises_what_the_last_state_promises() -> None:
 
 
 def test_the_partition_grows_with_what_is_seen() -> None:
-    colony = make("cart-pole")
+    colony = make("cart-pole", visits_to_grow=1.0)
     begun = colony.partition
     assert begun.n_cells == 1
     colony.learn(trials=1)
-    seen = colony.memory._rows["seen"][: int(colony.memory.last[-1]) + 1]
+    seen = colony._memory._rows["seen"][: int(colony._memory.last[-1]) + 1]
     for axis, line in enumerate(colony.partition.centres):
         assert line[0] <= seen[:, axis].min() <= seen[:, axis].max() <= line[-1]
     before = colony.partition.n_cells
-    colony.learn(total_timesteps=15_000)
+    colony.learn(total_timesteps=5_000)
     assert before < colony.partition.n_cells <= colony.max_cells
     assert all(
         row["cells"] <= later["cells"]

@@ -13,7 +13,16 @@ from gymnasium import spaces
 from gymnasium.vector import AutoresetMode
 
 import acl_gym
-from acl_gym import ACL, Crisp, Discrete, Fuzzy, QLearning, SoftPolicy, theory
+from acl_gym import (
+    ACL,
+    Crisp,
+    Discrete,
+    Fuzzy,
+    QLearning,
+    ReturningACL,
+    SoftPolicy,
+    theory,
+)
 from acl_gym.callbacks import Checkpoint, CSVLog, EarlyStop, PolicyEvaluation
 from acl_gym.colony import costs, deposits, schedules, selection
 from acl_gym.envs.wrappers.perturbations import perturbed
@@ -123,6 +132,29 @@ CONSTRUCTORS: dict[str, Callable[[], tuple[Callable[..., Any], dict[str, Any]]]]
             "epsilon": 0.1,
             "trace_decay": 0.5,
             "traces": "replacing",
+            "max_steps": 3,
+            "seed": 0,
+            "n_actions": 3,
+        },
+    ),
+    "ReturningACL": lambda: (
+        _learn(ReturningACL),
+        {
+            "env": pendulum(),
+            "partition": grid(),
+            "discount": 0.9,
+            "mix": 0.2,
+            "learning_rate": 0.9,
+            "trust": 1.0,
+            "epsilon": 0.1,
+            "optimism": 1.0,
+            "walks_back": 2,
+            "older_paths": 3,
+            "steps_per_walk": 5,
+            "memory_size": 20,
+            "visits_to_grow": 5.0,
+            "max_cells": 100,
+            "grows": True,
             "max_steps": 3,
             "seed": 0,
             "n_actions": 3,
@@ -410,9 +442,8 @@ def _run(env: Any, kind: str, boxes: bool) -> Any:
         cost = costs.Steps() if boxes else None
         found = evaluate_policy_cost(liars.Model(), env, max_steps=9, seed=1, cost=cost)
         return found.costs.tolist(), found.returns.tolist(), found.lengths.tolist()
-    agent: Any = (QLearning if kind == "q" else ACL)(
-        env, partition, seed=0, max_steps=9
-    )
+    kinds: dict[str, Any] = {"q": QLearning, "returning": ReturningACL}
+    agent: Any = kinds.get(kind, ACL)(env, partition, seed=0, max_steps=9)
     agent.learn(trials=2)
     return agent.table.tolist(), agent.num_timesteps
 
@@ -424,7 +455,7 @@ def environments(rng: Rng) -> Call:
     """One thing that an environment returns is changed."""
     boxes, masked = bool(rng.integers(2)), bool(rng.integers(2))
     mode = choice(rng, list(AutoresetMode))
-    kind = choice(rng, ("crisp", "fuzzy", "q", "model"))
+    kind = choice(rng, ("crisp", "fuzzy", "q", "returning", "model"))
     what = choice(rng, ("observations", "rewards", "terminated", "truncated", "infos"))
     forms, outcome = values.WRONG, "refuse"
     if masked and rng.random() < 0.3:
@@ -507,7 +538,7 @@ def own_parts(rng: Rng) -> Call:
 
 def _own_partition(rng: Rng) -> Call:
     lie = choice(rng, liars.LIES_OF_CELLS)
-    kind = choice(rng, (ACL, QLearning))
+    kind = choice(rng, (ACL, QLearning, ReturningACL))
 
     def learn() -> Any:
         partition = liars.OwnPartition(liars.LIES_OF_CELLS[lie])
@@ -619,7 +650,12 @@ _PARTS: dict[str, Callable[[Rng], Call]] = {
 
 def replaced(rng: Rng) -> Call:
     """A public attribute is replaced, then the thing is used."""
-    agent = choice(rng, (colony, lambda: QLearning(pendulum(), grid(), max_steps=3)))()
+    makers = [
+        colony,
+        lambda: QLearning(pendulum(), grid(), max_steps=3),
+        lambda: ReturningACL(pendulum(), grid(), max_steps=3),
+    ]
+    agent = makers[rng.integers(3)]()
     things: list[Any] = [agent, agent.partition, agent.policy, agent.env, agent.rollout]
     if isinstance(agent, ACL):
         things += [agent.pheromone, agent.soft_policy(seed=0)]
@@ -670,7 +706,7 @@ def mischief(rng: Rng) -> Call:
     boxes = bool(rng.integers(2))
     env = liars.Liar(boxes, choice(rng, list(AutoresetMode)))
     partition: Any = Fuzzy([[-1, 0, 1], [-1, 1]]) if boxes else Discrete(7)
-    kind = choice(rng, (ACL, QLearning))
+    kind = choice(rng, (ACL, QLearning, ReturningACL))
     agent = kind(env, partition, seed=0, max_steps=9)
     larger = liars.Liar(boxes, AutoresetMode.DISABLED)
     larger.num_envs = choice(rng, (1, 9))

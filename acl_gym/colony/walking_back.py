@@ -18,8 +18,8 @@ import math
 
 import numpy as np
 
-from acl_gym.colony.greedy import best_value
 from acl_gym.colony.memory import UNITS, Memory
+from acl_gym.partitions.kernels import written_out
 from acl_gym.utils.compiling import njit
 from acl_gym.utils.typing import (
     ActionArray,
@@ -46,9 +46,7 @@ class WalkBack:
     def __init__(self, levels: FloatArray) -> None:
         self.levels = levels
         self.known: BoolArray = np.zeros(levels.shape, np.bool_)
-        self._sum: IntArray = np.zeros(levels.size, np.int64)
-        self._weight: IntArray = np.zeros(levels.size, np.int64)
-        self._largest: FloatArray = np.zeros(levels.size)
+        self._laid: IntArray = np.zeros((levels.size, 4), np.int64)
         self._touched: IntArray = np.zeros(levels.size, np.int64)
 
     def walk(
@@ -90,22 +88,21 @@ class WalkBack:
             memory.reward,
             memory.allowed,
             self.levels,
+            written_out(memory.index.shape[1]),
+            written_out(memory.n_actions),
             discount,
             mix,
             scale,
             float(UNITS),
-            self._sum,
-            self._weight,
-            self._largest,
+            self._laid,
             self._touched,
         )
         _merge(
             self._touched[:count],
-            self._sum,
-            self._weight,
-            self._largest,
+            self._laid,
             memory.evidence,
-            UNITS / scale,
+            scale,
+            float(UNITS),
             rate,
             trust,
             self.levels.reshape(-1),
@@ -134,7 +131,31 @@ class WalkBack:
         return math.ldexp(1.0, _BITS - max(math.frexp(bound)[1], -900))
 
 
-@njit
+@njit(inline="always", error_model="numpy")
+def _value(
+    levels: FloatArray,
+    index: CellArray,
+    degree: FloatArray,
+    row: int,
+    allowed: BoolArray,
+    corners: tuple[int, ...],
+    choices: tuple[int, ...],
+) -> float:
+    """V of a state: `best_value`, with the short loops written out."""
+    best = -np.inf
+    place = np.uint64(row)  # unsigned: no check for indices from the end
+    for u in range(len(choices) or levels.shape[1]):
+        if allowed.size > 0 and not allowed[row, u]:
+            continue
+        value = 0.0
+        for c in range(len(corners) or index.shape[1]):
+            cell = np.uint64(index[place, np.uint64(c)])
+            value += degree[place, np.uint64(c)] * levels[cell, np.uint64(u)]
+        best = max(best, value)
+    return best
+
+
+@njit(error_model="numpy")
 def _walk_back(
     first: IntArray,
     last: IntArray,
@@ -145,52 +166,77 @@ def _walk_back(
     reward: FloatArray,
     allowed: BoolArray,
     levels: FloatArray,
+    corners: tuple[int, ...],
+    choices: tuple[int, ...],
     discount: float,
     mix: float,
     scale: float,
     units: float,
-    total: IntArray,
-    weight: IntArray,
-    largest: FloatArray,
+    laid: IntArray,
     touched: IntArray,
 ) -> int:
-    """Add what ants lay to `total`, in units of 1 / scale, and its weights.
+    """Add up what ants lay on each pair.
 
-    Returns how many pairs were touched.
+    Args:
+        first: row of the first state of each path.
+        last: row of its last state.
+        terminated: whether that is a terminal state.
+        index: cells of the states, `(rows, k)`.
+        degree: their degrees, `(rows, k)`.
+        action: what was done, `(rows,)`.
+        reward: what that gave, `(rows,)`.
+        allowed: U_q, `(rows, n_actions)`, or empty.
+        levels: `(n_cells, n_actions)`.
+        corners: a tuple as long as k, or empty, see `written_out`.
+        choices: a tuple as long as n_actions, or empty.
+        discount: gamma_rl.
+        mix: weight of an ant's own continuation.
+        scale: of the sums of deposits.
+        units: of the sums of degrees.
+        laid: for each pair the sum of the deposits times their degrees, the sum of the
+            degrees, and the largest degree, all integers, `(n_pairs, 4)`; side by side,
+            since most of the time goes into fetching them. Zeros before.
+        touched: receives the pairs that were visited, `(>= n_pairs,)`.
+
+    Returns:
+        How many pairs were visited.
     """
-    n_actions, count = levels.shape[1], 0
+    n_actions, count = np.uint64(levels.shape[1]), 0
     own, promised = discount * mix, discount * (1.0 - mix)
     for path in range(first.size):
         end = last[path]
         value = 0.0
         if not terminated[path]:
-            value = best_value(levels, index, degree, end, allowed)
-        laid = value
+            value = _value(levels, index, degree, end, allowed, corners, choices)
+        deposit = value
         for row in range(end - 1, first[path] - 1, -1):
-            laid = reward[row] + own * laid + promised * value
-            for c in range(index.shape[1]):
-                share = degree[row, c]
+            deposit = reward[row] + own * deposit + promised * value
+            place = np.uint64(row)
+            taken = np.uint64(action[place])
+            for c in range(len(corners) or index.shape[1]):
+                share = degree[place, np.uint64(c)]
                 if share > 0.0:
-                    pair = np.int64(index[row, c]) * n_actions + np.int64(action[row])
-                    if weight[pair] == 0:
-                        touched[count] = pair
+                    cell = np.uint64(index[place, np.uint64(c)])
+                    pair = cell * n_actions + taken
+                    weight = max(np.int64(np.rint(share * units)), 1)
+                    if laid[pair, 1] == 0:
+                        touched[count] = np.int64(pair)
                         count += 1
-                    total[pair] += np.int64(np.rint(share * laid * scale))
-                    weight[pair] += max(np.int64(np.rint(share * units)), 1)
-                    largest[pair] = max(largest[pair], share)
+                    laid[pair, 0] += np.int64(np.rint(share * deposit * scale))
+                    laid[pair, 1] += weight
+                    laid[pair, 2] = max(laid[pair, 2], weight)
             if row > first[path]:
-                value = best_value(levels, index, degree, row, allowed)
+                value = _value(levels, index, degree, row, allowed, corners, choices)
     return count
 
 
 @njit
 def _merge(
     touched: IntArray,
-    total: IntArray,
-    weight: IntArray,
-    largest: FloatArray,
+    laid: IntArray,
     evidence: IntArray,
-    unit: float,
+    scale: float,
+    units: float,
     rate: float,
     trust: float,
     levels: FloatArray,
@@ -199,13 +245,11 @@ def _merge(
     """Move the level of each touched pair towards its mean, and clear the sums."""
     for j in range(touched.size):
         pair = touched[j]
-        mean = total[pair] / weight[pair] * unit
-        share = min(1.0, weight[pair] / max(evidence[pair], 1))
-        step = rate * largest[pair]
+        weight = laid[pair, 1]
+        mean = laid[pair, 0] / weight * (units / scale)
+        step = rate * laid[pair, 2] / units
         if trust > 0.0:
-            step *= share**trust
+            step *= min(1.0, weight / max(evidence[pair], 1)) ** trust
         levels[pair] += step * (mean - levels[pair])
         known[pair] = True
-        total[pair] = 0
-        weight[pair] = 0
-        largest[pair] = 0.0
+        laid[pair] = 0

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from acl_gym.agents.base import TabularAgent
 from acl_gym.agents.bounds import PheromoneBoundWarning, warn_if_tau0_is_high
+from acl_gym.agents.saving import with_prefix
 from acl_gym.agents.training import Training
 from acl_gym.callbacks.base import Callbacks
 from acl_gym.colony.costs import Cost, as_cost, cost_from_settings, solution_costs
@@ -397,7 +398,7 @@ class ACL(TabularAgent):
         self, header: dict[str, Any], arrays: Mapping[str, NDArray[Any]]
     ) -> None:
         super()._restore(header, arrays)
-        memory = _memory_of_rule(arrays)
+        memory = with_prefix("update_", arrays)
         if memory:
             saved = update_from_settings(header["parameters"]["update"])
             if type(saved) is type(self.update):
@@ -410,7 +411,7 @@ class ACL(TabularAgent):
         )
 
     def _set_arrays(self, arrays: Mapping[str, NDArray[Any]]) -> None:
-        memory = _memory_of_rule(arrays)
+        memory = with_prefix("update_", arrays)
         if memory:
             self.update.restore(memory)
 
@@ -501,12 +502,3 @@ class ACL(TabularAgent):
             self._solutions = kept
         kept.clear()
         return kept
-
-
-def _memory_of_rule(arrays: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
-    """What an update rule remembered, from the arrays of an agent's file."""
-    return {
-        name.removeprefix("update_"): arrays[name]
-        for name in arrays
-        if name.startswith("update_")
-    }

@@ -18,7 +18,6 @@ from acl_gym.colony.greedy import (
     epsilon_greedy_unchecked,
     mark_greedy,
 )
-from acl_gym.evaluation.rollout import Rollout, Step
 from acl_gym.partitions import Partition, locate_all
 from acl_gym.utils import validation
 from acl_gym.utils.compiling import njit
@@ -162,6 +161,7 @@ class QLearning(TabularAgent):
                     step = rollout._step(actions)
                     next_index, next_degree = self._locate(step.observation, step.ants)
                     next_allowed = rollout.allowed()
+                    after = rollout.allowed_after(step.ants)
                     transition = (
                         self._table,
                         index,
@@ -171,7 +171,7 @@ class QLearning(TabularAgent):
                         step.terminated,
                         next_index,
                         next_degree,
-                        _next_allowed(rollout, step),
+                        ALL if after is None else after,
                         self.learning_rate,
                         self.discount,
                     )
@@ -309,19 +309,6 @@ class _Traces:
             wider = np.empty((len(array), width), dtype=array.dtype)
             wider[:, : array.shape[1]] = array
             setattr(self, name, wider)
-
-
-def _next_allowed(rollout: Rollout, step: Step) -> BoolArray:
-    """U_q of the states that a step led to, `(m, n_actions)`; `ALL` if all is allowed.
-
-    `rollout.allowed()` is for the slots that walk on; these are all that took the step.
-    """
-    if rollout.action_mask is None:
-        return ALL
-    allowed = rollout.action_mask[step.ants]
-    # Where an episode ends, an environment may allow nothing any more.
-    allowed[~allowed.any(axis=1)] = True
-    return allowed
 
 
 @njit(inline="always")

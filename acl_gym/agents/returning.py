@@ -10,7 +10,7 @@ from gymnasium.vector import VectorEnv
 from numpy.typing import ArrayLike, NDArray
 
 from acl_gym.agents.base import TabularAgent
-from acl_gym.agents.saving import Snapshot
+from acl_gym.agents.saving import with_prefix
 from acl_gym.agents.training import Training
 from acl_gym.callbacks.base import Callbacks
 from acl_gym.colony.greedy import epsilon_greedy_actions, epsilon_greedy_unchecked
@@ -19,7 +19,7 @@ from acl_gym.colony.optimism import promised_level
 from acl_gym.colony.walk import Walk
 from acl_gym.colony.walking_back import WalkBack
 from acl_gym.partitions import Discrete, Grid, Partition
-from acl_gym.partitions.growing import carried_over, refined, seed_partition, widened
+from acl_gym.partitions.growing import carried_over, initial_partition, refined, widened
 from acl_gym.policies import random_ranks
 from acl_gym.utils import validation
 from acl_gym.utils.parameters import Parameter
@@ -163,7 +163,7 @@ class ReturningACL(TabularAgent):
         self.max_cells = max_cells
         self.grows = partition is None if grows is None else grows
         if partition is None and env is not None:
-            partition = seed_partition(env)
+            partition = initial_partition(env)
         super().__init__(
             env, partition, max_steps=max_steps, seed=seed, n_actions=n_actions
         )
@@ -234,18 +234,12 @@ class ReturningACL(TabularAgent):
             walk.append(ants, observation, actions, -step.cost, allowed)
             observation = step.observation
             if step.finished.any():
-                self._stop(walk, ants[step.finished], observation)
+                done = ants[step.finished]
+                walk.stop(done, observation, rollout.allowed_after(done))
         if rollout._ants.size:
-            self._stop(walk, rollout._ants, observation)
+            ants = rollout._ants
+            walk.stop(ants, observation, rollout.allowed_after(ants))
         return walk, observation
-
-    def _stop(self, walk: Walk, ants: IntArray, observation: Any) -> None:
-        allowed = self.rollout.action_mask
-        if allowed is not None:
-            allowed = allowed[ants]
-            # Where an episode ends, an environment may allow nothing any more.
-            allowed[~allowed.any(axis=1)] = True
-        walk.stop(ants, observation, allowed)
 
     def _promise(self) -> None:
         """Set what pairs promise of which nothing is known yet."""
@@ -292,15 +286,15 @@ class ReturningACL(TabularAgent):
 
     def _grow_to(self, partition: Grid) -> None:
         """Take over another partition; levels and what is known are carried over."""
-        old, walk_back = self.partition, self._walk_back
-        known = carried_over(walk_back.known.astype(np.float64), old, partition)
-        self._set_partition(partition, carried_over(walk_back.levels, old, partition))
+        levels, known = self._walk_back.levels, self._walk_back.known
+        both = carried_over(np.hstack([levels, known]), self.partition, partition)
+        self._set_partition(partition, both[:, : self.n_actions].copy())
         # A cell between one that is known and one that is not is not known.
-        self._walk_back.known[:] = known > 1.0 - 1e-9
+        self._walk_back.known[:] = both[:, self.n_actions :] > 1.0 - 1e-9
         self._memory.set_partition(partition)
 
     def _set_partition(self, partition: Partition, levels: FloatArray) -> None:
-        self.__dict__["partition"] = partition  # which nobody else may set
+        self.__dict__["partition"] = partition  # fixed for everyone else
         self._walk_back = WalkBack(levels)
         # A function of the size, so that a run that is resumed breaks ties alike.
         ties = np.random.default_rng(partition.n_cells)
@@ -382,28 +376,22 @@ class ReturningACL(TabularAgent):
         if splits.shape != () or splits.dtype.kind not in "iu" or splits < 0:
             raise ValueError("splits must be a number >= 0")
         self._splits = int(splits)
-        names = [name for name in arrays if name.startswith("memory_")]
-        self._memory.restore({n.removeprefix("memory_"): arrays[n] for n in names})
+        self._memory.restore(with_prefix("memory_", arrays))
 
-    def snapshot(self) -> Snapshot:
-        """See `SavedAgent.snapshot`; what is remembered is shared, not copied."""
-        more = (
+    def _state(self) -> Any:
+        # What is remembered is shared with the colony, not copied.
+        return (
             self.partition,
             self._ranks,
             self._walk_back.known.copy(),
             self._splits,
             self._memory.copy(),
         )
-        generators = [rng.bit_generator.state for rng in (self.rng, self._predict_rng)]
-        counts = self.num_timesteps, self.trials, self.seconds, len(self.history)
-        return Snapshot(self._table.copy(), {}, generators, counts, more)
 
-    def take_back(self, snapshot: Snapshot) -> None:
-        """See `SavedAgent.take_back`."""
-        partition, ranks, known, splits, memory = snapshot.more
-        self._set_partition(partition, snapshot.table.copy())
-        super().take_back(snapshot)
-        self._ranks, self._splits, self._memory = ranks, splits, memory.copy()
+    def _take_over(self, table: FloatArray, state: Any) -> None:
+        partition, ranks, known, self._splits, memory = state
+        self._set_partition(partition, table.copy())
+        self._ranks, self._memory = ranks, memory.copy()
         self._walk_back.known[:] = known
 
     def _explore(

@@ -58,10 +58,9 @@ class Snapshot(NamedTuple):
     """What `SavedAgent.snapshot` keeps, for `take_back`."""
 
     table: FloatArray
-    arrays: dict[str, NDArray[Any]]
+    state: Any
     generators: list[Any]
     counts: tuple[int, int, float, int]
-    more: Any = None
 
 
 class SavedAgent(PartitionPolicy):
@@ -105,6 +104,15 @@ class SavedAgent(PartitionPolicy):
     def _set_arrays(self, arrays: Mapping[str, NDArray[Any]]) -> None:
         """Take over what `_arrays` gave."""
 
+    def _state(self) -> Any:
+        """What learning changes beside the table, for `_take_over`; copied."""
+        return {name: array.copy() for name, array in self._arrays().items()}
+
+    def _take_over(self, table: FloatArray, state: Any) -> None:
+        """Take over a table, and what `_state` gave with it."""
+        self.set_table(table)
+        self._set_arrays(state)
+
     def snapshot(self) -> Snapshot:
         """All that learning changes, as it is now, for `take_back`.
 
@@ -112,7 +120,7 @@ class SavedAgent(PartitionPolicy):
         """
         return Snapshot(
             self._table.copy(),
-            {name: array.copy() for name, array in self._arrays().items()},
+            self._state(),
             [rng.bit_generator.state for rng in (self.rng, self._predict_rng)],
             (self.num_timesteps, self.trials, self.seconds, len(self.history)),
         )
@@ -124,8 +132,7 @@ class SavedAgent(PartitionPolicy):
             snapshot: of this agent. Learning then goes on, bit for bit, as it did
                 after it.
         """
-        self.set_table(snapshot.table)
-        self._set_arrays(snapshot.arrays)
+        self._take_over(snapshot.table, snapshot.state)
         for rng, state in zip(
             (self.rng, self._predict_rng), snapshot.generators, strict=True
         ):
@@ -330,6 +337,17 @@ class SavedAgent(PartitionPolicy):
         generators = (self.rng, self._predict_rng)
         for rng, state in zip(generators, header["generators"], strict=True):
             rng.bit_generator.state = state
+
+
+def with_prefix(
+    prefix: str, arrays: Mapping[str, NDArray[Any]]
+) -> dict[str, NDArray[Any]]:
+    """The arrays whose names begin so, without the prefix."""
+    return {
+        name.removeprefix(prefix): arrays[name]
+        for name in arrays
+        if name.startswith(prefix)
+    }
 
 
 def _is_row(row: Any) -> bool:

@@ -390,6 +390,21 @@ class Rollout:
             )
         return allowed
 
+    def allowed_after(self, ants: IntArray) -> BoolArray | None:
+        """U_q where ants stand after a step, `(m, n_actions)`; None: all actions.
+
+        `allowed` is for those that walk on. These may have finished: where an episode
+        ends, an environment may allow nothing any more, and then all is allowed.
+
+        Args:
+            ants: slots, `(m,)`.
+        """
+        if self._mask is None:
+            return None
+        allowed = self._mask[ants]
+        allowed[~allowed.any(axis=1)] = True
+        return allowed
+
     def _note_success(self, infos: Any, ants: IntArray) -> None:
         """Take over what the infos of a step say of the ants that took it."""
         # Where slots are reset in the same step, the infos of their ends come last.

@@ -155,7 +155,7 @@ def automatic_partition(
         if centres is not None and _span(centres, system.circular, box):
             return thesis_partition(env, kind=kind)
     circular = () if system is None else system.circular
-    number = _centres(box.low.size) if cells is None else 0
+    number = centres_for(CENTRES, box.low.size) if cells is None else 0
     low, high = complete_bounds(env, box, bounds, circular, random_steps, seed)
     if cells is None:
         # One centre is enough for a variable that cannot change.
@@ -166,16 +166,25 @@ def automatic_partition(
     return kind.from_box(spaces.Box(low, high, dtype=np.float64), cells, circular)
 
 
-def _centres(dimensions: int) -> int:
-    if dimensions not in CENTRES:
+def centres_for(table: Mapping[int, int], dimensions: int) -> int:
+    """The number of centres of each variable.
+
+    Args:
+        table: number of variables -> number of centres.
+        dimensions: how many variables there are.
+
+    Raises:
+        ValueError: there are more than in the table.
+    """
+    if dimensions not in table:
         raise ValueError(
-            f"observations must have 1 to {max(CENTRES)} variables for an automatic "
+            f"observations must have 1 to {max(table)} variables for an automatic "
             f"partition, got {dimensions}: cells grow as n^d, and a fuzzy state "
             f"belongs to 2^d = {2**dimensions} of them; choose a few features with "
             "gymnasium.wrappers.TransformObservation, or give cells, such as 1 for "
             "each variable that does not matter."
         )
-    return CENTRES[dimensions]
+    return table[dimensions]
 
 
 def _shown_variables(env: Any, system: ControlSystem) -> list[int]:

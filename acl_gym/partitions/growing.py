@@ -10,6 +10,7 @@ from gymnasium import spaces
 from numpy.typing import ArrayLike
 
 from acl_gym.envs.control.lookup import system_of
+from acl_gym.partitions.automatic import centres_for
 from acl_gym.partitions.base import Partition, locate_all
 from acl_gym.partitions.bounds import Env, observation_space, real_box
 from acl_gym.partitions.discrete import FINITE_SPACES, Discrete
@@ -30,7 +31,7 @@ _ROWS = 65_536  # cells that are carried over at a time
 AnyGrid = TypeVar("AnyGrid", bound=Grid)
 
 
-def seed_partition(env: Env) -> Partition:
+def initial_partition(env: Env) -> Partition:
     """Choose the partition from which that of a colony grows.
 
     Observations that are cells already stay cells. Others get a fuzzy grid of few cells.
@@ -50,7 +51,7 @@ def seed_partition(env: Env) -> Partition:
     if isinstance(space, FINITE_SPACES):
         return Discrete.from_space(space)
     box = real_box(space)
-    number = centres_for(box.low.size)
+    number = centres_for(COARSE, box.low.size)
     system = system_of(env)
     whole = system is not None and system.observation_space == space
     circular = system.circular if system is not None and whole else ()
@@ -66,27 +67,12 @@ def seed_partition(env: Env) -> Partition:
     return Fuzzy(centres, periods)
 
 
-def centres_for(dimensions: int) -> int:
-    """The number of centres with which each of so many variables begins.
-
-    Raises:
-        ValueError: there are too many variables for a grid.
-    """
-    if dimensions not in COARSE:
-        raise ValueError(
-            f"observations must have 1 to {max(COARSE)} variables for a grid that is "
-            f"chosen for you, got {dimensions}: cells grow as n^d; choose a few features "
-            "with gymnasium.wrappers.TransformObservation, or pass a partition."
-        )
-    return COARSE[dimensions]
-
-
 def widened(grid: AnyGrid, states: FloatArray, space: spaces.Box) -> AnyGrid | None:
     """Return the grid over the range that is seen, where that is wider than its own.
 
     The centres of a variable whose range changes are spread evenly over the new range,
     as many as before; a variable with one centre that is seen to vary gets as many as
-    `centres_for` says.
+    `COARSE` says.
 
     Args:
         grid: a crisp or a fuzzy partition.
@@ -107,7 +93,7 @@ def widened(grid: AnyGrid, states: FloatArray, space: spaces.Box) -> AnyGrid | N
             continue
         count = line.size
         if count == 1:
-            count = centres_for(len(axes))
+            count = centres_for(COARSE, len(axes))
             first, last = low[axis], high[axis]
         else:
             first, last = min(low[axis], line[0]), max(high[axis], line[-1])

@@ -15,8 +15,8 @@ from acl_gym import Crisp, Discrete, Fuzzy
 from acl_gym.partitions import locate_all
 from acl_gym.partitions.growing import (
     carried_over,
+    initial_partition,
     refined,
-    seed_partition,
     widened,
 )
 
@@ -101,13 +101,13 @@ def test_states_that_are_not_finite_widen_nothing() -> None:
 
 
 def test_a_partition_to_begin_with() -> None:
-    pendulum = seed_partition(gym.make("acl_gym/Pendulum-v0"))
+    pendulum = initial_partition(gym.make("acl_gym/Pendulum-v0"))
     assert isinstance(pendulum, Fuzzy)
     assert pendulum.periods == (pytest.approx(2 * np.pi), None)
     assert [line.size for line in pendulum.centres] == [10, 1]
-    assert isinstance(seed_partition(gym.make("Taxi-v4")), Discrete)
+    assert isinstance(initial_partition(gym.make("Taxi-v4")), Discrete)
     with pytest.raises(ValueError, match=r"must have 1 to 6 variables .*, got 7"):
-        seed_partition(Many())
+        initial_partition(Many())
 
 
 class Many(gym.Env):

@@ -13,6 +13,7 @@ from acl_gym.agents.training import Training
 from acl_gym.callbacks.base import Callbacks
 from acl_gym.colony.greedy import (
     ALL,
+    LOOP,
     best_value,
     epsilon_greedy_actions,
     epsilon_greedy_unchecked,
@@ -328,7 +329,7 @@ def _error(
     """The temporal-difference error of slot j: by how much the value of its pair is off."""
     best = 0.0
     if not terminated:
-        best = best_value(values, next_index, next_degree, j, next_allowed)
+        best = best_value(values, next_index, next_degree, j, next_allowed, LOOP, LOOP)
     error = -cost + discount * best
     for c in range(index.shape[1]):
         error -= degree[j, c] * values[index[j, c], u]

@@ -16,6 +16,9 @@ _CELL, _FLOAT, _BOOL = np.dtype(np.int32), np.dtype(np.float64), np.dtype(np.boo
 ALL: BoolArray = np.empty((0, 0), dtype=np.bool_)
 """What kernels take as `allowed` where every action is allowed."""
 
+LOOP: tuple[int, ...] = ()
+"""What kernels take where loops over cells and actions are not written out."""
+
 NUMBERS_PER_ACTION = 2
 """How many random numbers the choice of an action takes: a coin and a choice."""
 
@@ -178,12 +181,18 @@ def greedy_actions(
 
 @njit(inline="always")
 def best_value(
-    table: FloatArray, index: CellArray, degree: FloatArray, j: int, allowed: BoolArray
+    table: FloatArray,
+    index: CellArray,
+    degree: FloatArray,
+    j: int,
+    allowed: BoolArray,
+    corners: tuple[int, ...],
+    choices: tuple[int, ...],
 ) -> float:
     """The largest degree-weighted value that state j offers, over U_q.
 
     For kernels: the maximum in the Bellman equation (3.40), in Q-learning, eq. (3.44),
-    and in the policy, eq. (4.16).
+    what a returning ant expects, and the policy, eq. (4.16).
 
     Args:
         table: `(n_cells, n_actions)`.
@@ -191,14 +200,19 @@ def best_value(
         degree: `(n, k)`.
         j: which of the n states.
         allowed: U_q, `(n, n_actions)`; an empty array if every action is allowed.
+        corners: a tuple as long as k, for which the loop is written out (see
+            `written_out`), or `LOOP`.
+        choices: a tuple as long as n_actions, or `LOOP`.
     """
     best = -np.inf
-    for u in range(table.shape[1]):
-        if allowed.size > 0 and not allowed[j, u]:
+    state = np.uint64(j)  # unsigned: no check for indices from the end
+    for u in range(len(choices) or table.shape[1]):
+        if allowed.size > 0 and not allowed[state, np.uint64(u)]:
             continue
         value = 0.0
-        for c in range(index.shape[1]):
-            value += degree[j, c] * table[index[j, c], u]
+        for c in range(len(corners) or index.shape[1]):
+            cell = np.uint64(index[state, np.uint64(c)])
+            value += degree[state, np.uint64(c)] * table[cell, np.uint64(u)]
         best = max(best, value)
     return best
 
@@ -218,7 +232,7 @@ def mark_greedy(
     """
     for j in range(actions.size):
         value = _value(table, index[j], degree[j], actions[j])
-        greedy[j] = value >= best_value(table, index, degree, j, allowed)
+        greedy[j] = value >= best_value(table, index, degree, j, allowed, LOOP, LOOP)
 
 
 @njit(inline="always")

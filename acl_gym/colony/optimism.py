@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from acl_gym.colony.greedy import best_value
+from acl_gym.colony.greedy import LOOP, best_value
 from acl_gym.colony.memory import Memory
 from acl_gym.utils.compiling import njit
 from acl_gym.utils.typing import BoolArray, CellArray, FloatArray, IntArray
@@ -32,17 +32,19 @@ def promised_level(
         discount: gamma_rl, in [0, 1].
     """
     sizes = memory.last - memory.first
-    count = int(np.searchsorted(np.cumsum(sizes[::-1]), NEWEST)) + 1
-    first, last = memory.first[-count:], memory.last[-count:]
-    values = np.empty(int((last - first).sum()))
-    _values(first, last, memory.index, memory.degree, memory.allowed, levels, values)
-    good = float(np.quantile(values, GOOD))
     longest = int(sizes.max())
     steps = longest if discount == 1.0 else (1 - discount**longest) / (1 - discount)
     going, ending = _best_rewards(
         memory.first, memory.last, memory.terminated, memory.reward
     )
     most = max(0.0, going * steps, ending)
+    if optimism == 1.0:
+        return most
+    count = int(np.searchsorted(np.cumsum(sizes[::-1]), NEWEST)) + 1
+    first, last = memory.first[-count:], memory.last[-count:]
+    values = np.empty(int((last - first).sum()))
+    _values(first, last, memory.index, memory.degree, memory.allowed, levels, values)
+    good = float(np.quantile(values, GOOD))
     return good + optimism * (most - good)
 
 
@@ -60,7 +62,7 @@ def _values(
     place = 0
     for path in range(first.size):
         for row in range(first[path], last[path]):
-            values[place] = best_value(levels, index, degree, row, allowed)
+            values[place] = best_value(levels, index, degree, row, allowed, LOOP, LOOP)
             place += 1
 
 

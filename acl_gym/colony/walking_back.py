@@ -18,6 +18,7 @@ import math
 
 import numpy as np
 
+from acl_gym.colony.greedy import best_value
 from acl_gym.colony.memory import UNITS, Memory
 from acl_gym.partitions.kernels import written_out
 from acl_gym.utils.compiling import njit
@@ -131,30 +132,6 @@ class WalkBack:
         return math.ldexp(1.0, _BITS - max(math.frexp(bound)[1], -900))
 
 
-@njit(inline="always", error_model="numpy")
-def _value(
-    levels: FloatArray,
-    index: CellArray,
-    degree: FloatArray,
-    row: int,
-    allowed: BoolArray,
-    corners: tuple[int, ...],
-    choices: tuple[int, ...],
-) -> float:
-    """V of a state: `best_value`, with the short loops written out."""
-    best = -np.inf
-    place = np.uint64(row)  # unsigned: no check for indices from the end
-    for u in range(len(choices) or levels.shape[1]):
-        if allowed.size > 0 and not allowed[row, u]:
-            continue
-        value = 0.0
-        for c in range(len(corners) or index.shape[1]):
-            cell = np.uint64(index[place, np.uint64(c)])
-            value += degree[place, np.uint64(c)] * levels[cell, np.uint64(u)]
-        best = max(best, value)
-    return best
-
-
 @njit(error_model="numpy")
 def _walk_back(
     first: IntArray,
@@ -207,7 +184,7 @@ def _walk_back(
         end = last[path]
         value = 0.0
         if not terminated[path]:
-            value = _value(levels, index, degree, end, allowed, corners, choices)
+            value = best_value(levels, index, degree, end, allowed, corners, choices)
         deposit = value
         for row in range(end - 1, first[path] - 1, -1):
             deposit = reward[row] + own * deposit + promised * value
@@ -226,7 +203,9 @@ def _walk_back(
                     laid[pair, 1] += weight
                     laid[pair, 2] = max(laid[pair, 2], weight)
             if row > first[path]:
-                value = _value(levels, index, degree, row, allowed, corners, choices)
+                value = best_value(
+                    levels, index, degree, row, allowed, corners, choices
+                )
     return count
 
 

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from gymnasium.vector import VectorEnv
 
-from acl_gym.colony.greedy import ALL, best_value
+from acl_gym.colony.greedy import ALL, LOOP, best_value
 from acl_gym.envs.control.environments import ControlVectorEnv
 from acl_gym.partitions import Partition, checked_partition, locate_all
 from acl_gym.planning.sweeps import checked_settings, sweep_until_converged
@@ -155,7 +155,7 @@ def _sweep(
         for u in range(n_actions):
             best = 0.0
             if not terminated[cell, u]:
-                best = best_value(values, index[cell], degree[cell], u, ALL)
+                best = best_value(values, index[cell], degree[cell], u, ALL, LOOP, LOOP)
             new = reward[cell, u] + discount * best
             change = max(change, abs(new - values[cell, u]))
             values[cell, u] = new

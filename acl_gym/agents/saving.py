@@ -256,7 +256,8 @@ class SavedAgent(PartitionPolicy):
         header, arrays, name = archive.header, archive.arrays, archive.name
         if header.get("agent") != cls.__name__:
             raise ValueError(
-                f"{name} must hold an agent of class {cls.__name__}, got {header.get('agent')!r:.80}; "
+                f"{name} must hold an agent of class {cls.__name__}, got "
+                f"{header.get('agent')!r:.80}; "
                 "load it with that class."
             )
         if unknown := given.keys() - _keywords(cls) - {"partition"}:

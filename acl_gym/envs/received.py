@@ -116,6 +116,14 @@ def rewards(value: Any, n_slots: int) -> FloatArray:
     return array
 
 
+def not_finite(rewards: FloatArray, slot: int) -> ValueError:
+    """The error for a reward that is NaN or infinite."""
+    return ValueError(
+        f"rewards must be finite, got {rewards[slot]} in slot {slot}; check the "
+        "environment's reward function."
+    )
+
+
 def flags(name: str, value: Any, n_slots: int) -> BoolArray:
     """Return `terminated` or `truncated` as bool `(n_slots,)`; 0 and 1 are taken.
 

@@ -307,10 +307,7 @@ class Rollout:
             left,
         )
         if bad >= 0:
-            raise ValueError(
-                f"rewards must be finite, got {reward[bad]} in slot {bad}; check the "
-                "environment's reward function."
-            )
+            raise received.not_finite(reward, bad)
         if not self._asks_to_wait:
             self._note_success(infos, ants)
         if self._mode is AutoresetMode.DISABLED and not self._waits:
@@ -511,7 +508,6 @@ def _require_array(observation: Any) -> None:
     if not isinstance(observation, np.ndarray):
         raise ValueError(
             "a cost of complete solutions needs observations that are arrays, got "
-            ""
             f"{validation.shown(observation)}; leave the cost out, or flatten them with "
             "gymnasium.wrappers.vector.FlattenObservation."
         )

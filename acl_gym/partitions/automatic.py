@@ -143,7 +143,8 @@ def automatic_partition(
             raise ValueError(
                 "cells and bounds must be None where observations are cells already, "
                 "got cells="
-                f"{validation.shown(cells)} and bounds={validation.shown(bounds)} for {space}."
+                f"{validation.shown(cells)} and bounds={validation.shown(bounds)} "
+                f"for {space}."
             )
         return Discrete.from_space(space)
     box = real_box(space)

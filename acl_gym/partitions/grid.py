@@ -177,8 +177,8 @@ class Grid(FixedPartition):
         if not isinstance(space, spaces.Box) or space.shape != (dimensions,):
             raise ValueError(
                 f"{self!r} takes observations from a Box of shape ({dimensions},), "
-                "got "
-                f"{validation.shown(space)}; build the partition from env.single_observation_space, "
+                f"got {validation.shown(space)}; build the partition from "
+                "env.single_observation_space, "
                 "or let automatic_partition(env) do it."
             )
 

@@ -162,11 +162,7 @@ class VectorEnvAdapter(VecEnv):
         check_observations(observations, self.observation_space, n)
         rewards = received.rewards(rewards, n)
         if not np.isfinite(rewards).all():
-            slot = int(np.argmin(np.isfinite(rewards)))
-            raise ValueError(
-                f"rewards must be finite, got {rewards[slot]} in slot {slot}; check the "
-                "environment's reward function."
-            )
+            raise received.not_finite(rewards, int(np.argmin(np.isfinite(rewards))))
         terminated = received.flags("terminated", terminated, n)
         truncated = received.flags("truncated", truncated, n)
         dones = np.logical_or(terminated, truncated)

@@ -246,7 +246,8 @@ def _is_file(doing: str, target: Any, method: str) -> bool:
     if not hasattr(target, method) or isinstance(target, io.TextIOBase):
         raise TypeError(
             f"the place to {doing} must be a path or a file open in binary mode, got "
-            f"{validation.shown(target)}; pass a path, io.BytesIO(), or a file opened in binary mode."
+            f"{validation.shown(target)}; pass a path, io.BytesIO(), or a file opened "
+            "in binary mode."
         )
     return True
 

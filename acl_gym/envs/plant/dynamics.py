@@ -173,8 +173,8 @@ def _evaluated(dynamics: Any, x: FloatArray, u: FloatArray) -> FloatArray:
     """f(x, u) as an array.
 
     Raises:
-        ValueError: it writes to read-only arguments, or does not give a row of real numbers for each
-            variable.
+        ValueError: it writes to read-only arguments, or does not give a row of real
+            numbers for each variable.
     """
     try:
         given = dynamics(x, u)
@@ -200,7 +200,7 @@ def _evaluated(dynamics: Any, x: FloatArray, u: FloatArray) -> FloatArray:
                 raise TypeError(f"got a row of {entries.dtype}")
             row[...] = entries
     except (TypeError, ValueError) as error:
-        got = f"{validation.shown(given)}"
+        got = validation.shown(given)
         if isinstance(given, np.ndarray):
             got = f"shape {given.shape} of {given.dtype}"
         elif isinstance(given, list | tuple):
@@ -283,7 +283,7 @@ def _tried(dynamics: Any, x: FloatArray, u: FloatArray) -> FloatArray:
         stacked = np.stack([np.broadcast_to(row, (count,)) for row in rows])
     except (TypeError, ValueError) as error:
         shape = getattr(given, "shape", None)
-        got = f"shape {shape}" if shape is not None else f"{validation.shown(given)}"
+        got = f"shape {shape}" if shape is not None else validation.shown(given)
         raise ValueError(f"{expects}, got {got} for {count} states.") from error
     if len(stacked) != size or stacked.dtype.kind not in "iuf":
         raise ValueError(

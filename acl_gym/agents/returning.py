@@ -10,17 +10,17 @@ from gymnasium.vector import VectorEnv
 from numpy.typing import ArrayLike, NDArray
 
 from acl_gym.agents.base import TabularAgent
+from acl_gym.agents.growth import Growth, carried_with_known
 from acl_gym.agents.saving import with_prefix
 from acl_gym.agents.training import Training
 from acl_gym.callbacks.base import Callbacks
 from acl_gym.colony.greedy import epsilon_greedy_actions, epsilon_greedy_unchecked
-from acl_gym.colony.memory import UNITS, Memory
+from acl_gym.colony.memory import Memory
 from acl_gym.colony.optimism import promised_level
 from acl_gym.colony.walk import Walk
 from acl_gym.colony.walking_back import WalkBack
 from acl_gym.partitions import Discrete, Grid, Partition
-from acl_gym.partitions.growing import carried_over, initial_partition, refined, widened
-from acl_gym.policies import random_ranks
+from acl_gym.partitions.growing import initial_partition
 from acl_gym.utils import validation
 from acl_gym.utils.parameters import Parameter
 from acl_gym.utils.typing import BoolArray, CellArray, FloatArray, IntArray, Row
@@ -161,7 +161,7 @@ class ReturningACL(TabularAgent):
         self.walks_back, self.older_paths = walks_back, older_paths
         self.steps_per_walk = steps_per_walk
         self.max_cells = max_cells
-        self.grows = partition is None if grows is None else grows
+        self._growth = Growth(partition is None if grows is None else grows)
         if partition is None and env is not None:
             partition = initial_partition(env)
         super().__init__(
@@ -170,7 +170,6 @@ class ReturningACL(TabularAgent):
         if mix is None:
             mix = 0.0 if isinstance(self.partition, Discrete) else 0.2
         self.mix = mix
-        self._splits = 0
         shape = self.partition.n_cells, self.n_actions
         self._walk_back = WalkBack(np.zeros(shape))
         memory_size = validation.integer(
@@ -263,57 +262,40 @@ class ReturningACL(TabularAgent):
 
     def _widen(self, walk: Walk) -> None:
         """Widen the partition if the ants have come beyond its range."""
-        if self.grows and isinstance(self.partition, Grid):
+        if self.grows:
             space: Any = self.rollout.env.single_observation_space
-            wider = widened(self.partition, walk.states(), space)
-            if wider is not None:
-                self._grow_to(wider)
+            self._grow_to(self._growth.wider(self.partition, walk.states(), space))
 
     def _split(self) -> None:
         """Halve the cells along the next variable if there is evidence for finer ones."""
-        grid = self.partition
-        if not (self.grows and isinstance(grid, Grid)):
-            return
-        tried = self._memory.evidence[self._memory.evidence > 0]
-        tries = float(np.median(tried)) / UNITS * grid.cells_per_state
-        several = [axis for axis, line in enumerate(grid.centres) if line.size > 1]
-        if tries <= self.visits_to_grow or not several:
-            return
-        finer = refined(grid, several[self._splits % len(several)])
-        if finer.n_cells <= self.max_cells:
-            self._splits += 1
-            self._grow_to(finer)
+        finer = self._growth.finer(
+            self.partition, self._memory.evidence, self.visits_to_grow, self.max_cells
+        )
+        self._grow_to(finer)
 
-    def _grow_to(self, partition: Grid) -> None:
+    def _grow_to(self, partition: Grid | None) -> None:
         """Take over another partition; levels and what is known are carried over."""
-        levels, known = self._walk_back.levels, self._walk_back.known
-        both = carried_over(np.hstack([levels, known]), self.partition, partition)
-        self._set_partition(partition, both[:, : self.n_actions].copy())
-        # A cell between one that is known and one that is not is not known.
-        self._walk_back.known[:] = both[:, self.n_actions :] > 1.0 - 1e-9
+        if partition is None:
+            return
+        levels, known = carried_with_known(
+            self._walk_back.levels, self._walk_back.known, self.partition, partition
+        )
+        self._set_partition(partition, levels)
+        self._walk_back.known[:] = known
         self._memory.set_partition(partition)
 
     def _set_partition(self, partition: Partition, levels: FloatArray) -> None:
-        self.__dict__["partition"] = partition  # fixed for everyone else
+        self._replace_partition(partition)
         self._walk_back = WalkBack(levels)
-        # A function of the size, so that a run that is resumed breaks ties alike.
-        ties = np.random.default_rng(partition.n_cells)
-        self._ranks = random_ranks(partition.n_cells, self.n_actions, ties)
-        if self._rollout is not None:
-            self._make_room(self.num_envs, partition.cells_per_state)
 
     @property
     def grows(self) -> bool:
         """Whether the partition becomes wider and finer."""
-        return self._grows
+        return self._growth.on
 
     @grows.setter
     def grows(self, value: bool) -> None:
-        if not isinstance(value, bool):
-            raise TypeError(
-                f"grows must be True or False, got {validation.shown(value)}."
-            )
-        self._grows = value
+        self._growth.on = value
 
     @property
     def remembered_steps(self) -> int:
@@ -362,20 +344,18 @@ class ReturningACL(TabularAgent):
 
     def _arrays(self) -> dict[str, NDArray[Any]]:
         remembered = {f"memory_{n}": a for n, a in self._memory.arrays().items()}
-        splits = np.array(self._splits)
+        splits = np.array(self._growth.splits)
         return {"known": self._walk_back.known, "splits": splits, **remembered}
 
     def _restore(
         self, header: dict[str, Any], arrays: Mapping[str, NDArray[Any]]
     ) -> None:
         super()._restore(header, arrays)
-        known, splits = arrays["known"], arrays["splits"]
+        known = arrays["known"]
         if known.shape != self._table.shape or known.dtype.kind != "b":
             raise ValueError("the array known does not fit the table")
         self._walk_back.known[:] = known
-        if splits.shape != () or splits.dtype.kind not in "iu" or splits < 0:
-            raise ValueError("splits must be a number >= 0")
-        self._splits = int(splits)
+        self._growth.restore(arrays["splits"])
         self._memory.restore(with_prefix("memory_", arrays))
 
     def _state(self) -> Any:
@@ -384,12 +364,12 @@ class ReturningACL(TabularAgent):
             self.partition,
             self._ranks,
             self._walk_back.known.copy(),
-            self._splits,
+            self._growth.splits,
             self._memory.copy(),
         )
 
     def _take_over(self, table: FloatArray, state: Any) -> None:
-        partition, ranks, known, self._splits, memory = state
+        partition, ranks, known, self._growth.splits, memory = state
         self._set_partition(partition, table.copy())
         self._ranks, self._memory = ranks, memory.copy()
         self._walk_back.known[:] = known

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from acl_gym.colony.memory import UNITS
 from acl_gym.partitions import Grid, Partition
-from acl_gym.partitions.growing import carried_over, refined, widened
+from acl_gym.partitions.growing import carried_over, widened
 from acl_gym.utils import validation
 from acl_gym.utils.typing import BoolArray, FloatArray, IntArray
 
@@ -88,7 +88,7 @@ class Growth:
         several = [i for i, line in enumerate(partition.centres) if line.size > 1]
         if tries <= visits_to_grow or not several:
             return None
-        finer = refined(partition, several[self.splits % len(several)])
+        finer = partition.refined(several[self.splits % len(several)])
         if finer.n_cells > max_cells:
             return None
         self.splits += 1

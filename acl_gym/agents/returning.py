@@ -2,31 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any, Self
 
 import numpy as np
 from gymnasium.vector import VectorEnv
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from acl_gym.agents.base import TabularAgent
-from acl_gym.agents.growth import Growth, carried_with_known
-from acl_gym.agents.saving import with_prefix
+from acl_gym.agents.remembering import RememberingAgent
 from acl_gym.agents.training import Training
 from acl_gym.callbacks.base import Callbacks
 from acl_gym.colony.greedy import epsilon_greedy_actions, epsilon_greedy_unchecked
-from acl_gym.colony.memory import Memory
-from acl_gym.colony.optimism import promised_level
 from acl_gym.colony.walk import Walk
 from acl_gym.colony.walking_back import WalkBack
-from acl_gym.partitions import Discrete, Grid, Partition
-from acl_gym.partitions.growing import initial_partition
-from acl_gym.utils import validation
+from acl_gym.partitions import Discrete, Partition
 from acl_gym.utils.parameters import Parameter
-from acl_gym.utils.typing import BoolArray, CellArray, FloatArray, IntArray, Row
+from acl_gym.utils.typing import BoolArray, CellArray, FloatArray, IntArray
 
 
-class ReturningACL(TabularAgent):
+class ReturningACL(RememberingAgent):
     """A colony whose ants walk back from where they end, and which remembers.
 
     Each slot of the environment is an ant, as in `ACL`, and all share one table of
@@ -161,21 +154,20 @@ class ReturningACL(TabularAgent):
         self.walks_back, self.older_paths = walks_back, older_paths
         self.steps_per_walk = steps_per_walk
         self.max_cells = max_cells
-        self._growth = Growth(partition is None if grows is None else grows)
-        if partition is None and env is not None:
-            partition = initial_partition(env)
         super().__init__(
-            env, partition, max_steps=max_steps, seed=seed, n_actions=n_actions
+            env,
+            partition,
+            grows=partition is None if grows is None else grows,
+            memory_size=memory_size,
+            max_steps=max_steps,
+            seed=seed,
+            n_actions=n_actions,
         )
         if mix is None:
             mix = 0.0 if isinstance(self.partition, Discrete) else 0.2
         self.mix = mix
         shape = self.partition.n_cells, self.n_actions
         self._walk_back = WalkBack(np.zeros(shape))
-        memory_size = validation.integer(
-            "memory_size", memory_size, at_least=1, at_most=2**25
-        )
-        self._memory = Memory(memory_size, self.n_actions, self.partition)
 
     def learn(
         self,
@@ -211,9 +203,8 @@ class ReturningACL(TabularAgent):
                 observation = self.rollout.start(seed=self._next_seed())
                 while self.rollout._ants.size:
                     walk, observation = self._walk(observation)
-                    self._widen(walk)
-                    newest = self._memory.add(walk, self.rollout.terminated)
-                    self._promise()
+                    newest = self._remember(walk)
+                    self._promise(self.optimism)
                     for _ in range(self.walks_back):
                         self._return(newest)
                     self._split()
@@ -240,71 +231,35 @@ class ReturningACL(TabularAgent):
             walk.stop(ants, observation, rollout.allowed_after(ants))
         return walk, observation
 
-    def _promise(self) -> None:
-        """Set what pairs promise of which nothing is known yet."""
-        level = promised_level(self._memory, self._table, self.optimism, self.discount)
-        self._table[~self._walk_back.known] = level
-
     def _return(self, newest: IntArray) -> None:
         """Let the ants walk the newest paths back, and some older ones."""
-        older = self._memory.n_paths - newest.size
-        drawn = np.arange(older)
-        if older > self.older_paths:
-            drawn = np.unique(self.rng.integers(older, size=self.older_paths))
         self._walk_back.walk(
             self._memory,
-            np.concatenate([drawn, newest]),
+            self._memory.with_older(newest, self.older_paths, self.rng),
             discount=self.discount,
             mix=self.mix,
             rate=self.learning_rate,
             trust=self.trust,
         )
 
-    def _widen(self, walk: Walk) -> None:
-        """Widen the partition if the ants have come beyond its range."""
-        if self.grows:
-            space: Any = self.rollout.env.single_observation_space
-            self._grow_to(self._growth.wider(self.partition, walk.states(), space))
-
-    def _split(self) -> None:
-        """Halve the cells along the next variable if there is evidence for finer ones."""
-        finer = self._growth.finer(
-            self.partition, self._memory.evidence, self.visits_to_grow, self.max_cells
-        )
-        self._grow_to(finer)
-
-    def _grow_to(self, partition: Grid | None) -> None:
-        """Take over another partition; levels and what is known are carried over."""
-        if partition is None:
-            return
-        levels, known = carried_with_known(
-            self._walk_back.levels, self._walk_back.known, self.partition, partition
-        )
-        self._set_partition(partition, levels)
+    def _set_partition(
+        self, partition: Partition, table: FloatArray, known: BoolArray
+    ) -> None:
+        super()._set_partition(partition, table, known)
+        self._walk_back = WalkBack(table)
         self._walk_back.known[:] = known
-        self._memory.set_partition(partition)
-
-    def _set_partition(self, partition: Partition, levels: FloatArray) -> None:
-        self._replace_partition(partition)
-        self._walk_back = WalkBack(levels)
-
-    @property
-    def grows(self) -> bool:
-        """Whether the partition becomes wider and finer."""
-        return self._growth.on
-
-    @grows.setter
-    def grows(self, value: bool) -> None:
-        self._growth.on = value
-
-    @property
-    def remembered_steps(self) -> int:
-        """How many steps the colony remembers."""
-        return self._memory.n_steps
 
     @property
     def _table(self) -> FloatArray:
         return self._walk_back.levels
+
+    @property
+    def _remembers(self) -> bool:
+        return True
+
+    @property
+    def _known(self) -> BoolArray:
+        return self._walk_back.known
 
     def set_table(self, table: ArrayLike) -> None:
         """Replace all levels; all pairs then count as known.
@@ -314,13 +269,6 @@ class ReturningACL(TabularAgent):
         """
         self._table[:] = self._checked_table(table)
         self._walk_back.known[:] = True
-
-    def measures(self, policy: IntArray) -> Row:
-        """How many cells the partition has, and how many steps are remembered."""
-        return {
-            "cells": self.partition.n_cells,
-            "remembered_steps": self.remembered_steps,
-        }
 
     def parameters(self) -> dict[str, Any]:
         """The keyword arguments of the constructor."""
@@ -334,45 +282,13 @@ class ReturningACL(TabularAgent):
             "walks_back": self.walks_back,
             "older_paths": self.older_paths,
             "steps_per_walk": self.steps_per_walk,
-            "memory_size": self._memory.most,
+            "memory_size": self._memory_size,
             "visits_to_grow": self.visits_to_grow,
             "max_cells": self.max_cells,
             "grows": self.grows,
             "max_steps": self.max_steps,
             "seed": self.seed,
         }
-
-    def _arrays(self) -> dict[str, NDArray[Any]]:
-        remembered = {f"memory_{n}": a for n, a in self._memory.arrays().items()}
-        splits = np.array(self._growth.splits)
-        return {"known": self._walk_back.known, "splits": splits, **remembered}
-
-    def _restore(
-        self, header: dict[str, Any], arrays: Mapping[str, NDArray[Any]]
-    ) -> None:
-        super()._restore(header, arrays)
-        known = arrays["known"]
-        if known.shape != self._table.shape or known.dtype.kind != "b":
-            raise ValueError("the array known does not fit the table")
-        self._walk_back.known[:] = known
-        self._growth.restore(arrays["splits"])
-        self._memory.restore(with_prefix("memory_", arrays))
-
-    def _state(self) -> Any:
-        # What is remembered is shared with the colony, not copied.
-        return (
-            self.partition,
-            self._ranks,
-            self._walk_back.known.copy(),
-            self._growth.splits,
-            self._memory.copy(),
-        )
-
-    def _take_over(self, table: FloatArray, state: Any) -> None:
-        partition, ranks, known, self._growth.splits, memory = state
-        self._set_partition(partition, table.copy())
-        self._ranks, self._memory = ranks, memory.copy()
-        self._walk_back.known[:] = known
 
     def _explore(
         self, index: CellArray, degree: FloatArray, allowed: BoolArray | None

@@ -136,6 +136,26 @@ class Memory:
         self._count(paths, 1)
         return paths
 
+    def with_older(
+        self, newest: IntArray, most: int, rng: np.random.Generator
+    ) -> IntArray:
+        """Paths to be walked again: the newest, and before them older ones.
+
+        Args:
+            newest: the numbers of the newest paths, as `add` gave them.
+            most: how many older ones are drawn where there are more, with replacement;
+                each is walked once.
+            rng: draws them.
+
+        Returns:
+            Their numbers, in the order of time.
+        """
+        older = self.n_paths - newest.size
+        drawn = np.arange(older)
+        if older > most:
+            drawn = np.unique(rng.integers(older, size=most))
+        return np.concatenate([drawn, newest])
+
     def set_partition(self, partition: Partition) -> None:
         """Locate everything anew, in a partition of the same state variables.
 

@@ -68,10 +68,9 @@ class QLearning(RememberingAgent):
         replay: how often paths are learned from again after `steps_per_replay` steps,
             in [0, 10000]; 0: never.
         older_paths: how many older paths are replayed beside the newest each time, in
-            [0, 1000000].
-        steps_per_replay: after how many steps of all slots together, in
-            [1, 1000000000], or at the end of the trial, paths are replayed and the
-            partition may grow.
+            [0, 1e6].
+        steps_per_replay: after how many steps of all slots together, in [1, 1e9], or at
+            the end of the trial, paths are replayed and the partition may grow.
         memory_size: how many states are remembered, >= 1, where `replay`, `grows` or
             `optimism` needs it.
         optimism: in [0, 1], what pairs promise that were never tried: with 0 the value
@@ -79,7 +78,7 @@ class QLearning(RememberingAgent):
         grows: whether the partition becomes wider and finer.
         visits_to_grow: how often the median pair of those tried must have been tried
             before the partition becomes finer along one variable, > 0.
-        max_cells: the partition does not become finer than this, in [1, 2000000000].
+        max_cells: the partition does not become finer than this, in [1, 2e9].
         max_steps: the longest an episode may last, >= 1. None takes the time limit of
             the environment, or 300 if it has none.
         seed: the same seed gives the same run; None draws one from the system.

@@ -81,6 +81,7 @@ def test_ranges_in_words() -> None:
     assert Range(at_least=0, below=1).in_words() == "in [0, 1)"
     assert Range(above=0).in_words() == "> 0"
     assert Range(at_least=-1).in_words() == ">= -1"
+    assert Range(at_least=1, at_most=2_000_000_000).in_words() == "in [1, 2e9]"
     assert Range().in_words() == "in (-inf, inf)"
     assert 0.0 in Range(at_least=0)
     assert np.inf not in Range()

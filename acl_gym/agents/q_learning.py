@@ -236,6 +236,7 @@ class QLearning(RememberingAgent):
             actions = epsilon_greedy_unchecked(
                 self._table, index, degree, self.epsilon, self.rng, allowed
             )
+            seen = observation if walk is None else observation[rollout._ants]
             step = rollout._step(actions)
             next_index, next_degree = self._locate(step.observation, step.ants)
             next_allowed = rollout.allowed()
@@ -262,7 +263,7 @@ class QLearning(RememberingAgent):
                 accumulate = self._kind == "accumulating"
                 traces.update(transition, step.ants, fading, accumulate)
             if walk is not None:
-                walk.append(step.ants, observation, actions, -step.cost, allowed)
+                walk.append(step.ants, seen, actions, -step.cost, allowed)
                 observation = step.observation
                 done = step.ants[step.finished]
                 if done.size:

@@ -216,12 +216,13 @@ class ReturningACL(RememberingAgent):
         rollout, walk = self.rollout, Walk(self.num_envs)
         while rollout._ants.size and walk.steps < self.steps_per_walk:
             ants, allowed = rollout._ants, rollout.allowed()
+            seen = observation[ants]
             index, degree = self._locate(observation, ants)
             actions = epsilon_greedy_unchecked(
                 self._table, index, degree, self.epsilon, self.rng, allowed
             )
             step = rollout._step(actions)
-            walk.append(ants, observation, actions, -step.cost, allowed)
+            walk.append(ants, seen, actions, -step.cost, allowed)
             observation = step.observation
             if step.finished.any():
                 done = ants[step.finished]

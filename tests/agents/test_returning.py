@@ -111,6 +111,19 @@ def test_every_autoreset_mode_teaches_the_same(mode: AutoresetMode) -> None:
     assert colony.table.tobytes() == waiting.table.tobytes()
 
 
+@pytest.mark.parametrize("mode", list(AutoresetMode))
+def test_what_was_seen_is_remembered_where_arrays_are_used_again(
+    mode: AutoresetMode,
+) -> None:
+    """Some environments write each observation over the one before."""
+    tables = []
+    for fresh in (True, False):
+        made = [lambda: gym.make("MountainCar-v0", max_episode_steps=40)] * 3
+        env = SyncVectorEnv(made, copy=fresh, autoreset_mode=mode)
+        tables.append(ReturningACL(env, seed=0).learn(trials=2).table.tobytes())
+    assert tables[0] == tables[1]
+
+
 def test_the_pendulum_is_near_the_optimum_after_ten_thousand_steps() -> None:
     """Eight seeds took 1,870 to 4,810 steps; the thesis's colony takes a million."""
     colony = ReturningACL(pendulum(), seed=0)

@@ -63,7 +63,7 @@ class Colony:
                 for ant, u, r in zip(walking, actions, rewards, strict=True):
                     own[ant][-1] += [int(u), float(r)]
                 masks = mask[walking] if self.masked else None
-                walk.append(walking, seen, actions, rewards, masks)
+                walk.append(walking, seen[walking], actions, rewards, masks)
             if ending.size:
                 walk.stop(ending, seen, mask[ending] if self.masked else None)
         self.memory.add(walk, terminated)

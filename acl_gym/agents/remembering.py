@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from gymnasium.vector import VectorEnv
@@ -38,6 +38,9 @@ class RememberingAgent(TabularAgent):
         seed: see `TabularAgent`.
         n_actions: see `TabularAgent`.
     """
+
+    always_remembers: ClassVar[bool] = False
+    """Whether it has a memory whatever its parameters are."""
 
     discount: Parameter
     """gamma_rl, weight of what follows a step."""
@@ -85,7 +88,7 @@ class RememberingAgent(TabularAgent):
     @property
     def _remembers(self) -> bool:
         """Whether it has a memory, or is to have one."""
-        return self._kept_memory is not None
+        return self.always_remembers
 
     @property
     def _memory(self) -> Memory:
@@ -156,8 +159,8 @@ class RememberingAgent(TabularAgent):
         self, header: dict[str, Any], arrays: Mapping[str, NDArray[Any]]
     ) -> None:
         super()._restore(header, arrays)
-        if not self._remembers and "known" not in arrays:
-            return
+        if not self.always_remembers and "known" not in arrays:
+            return  # the agent that was saved remembered nothing
         known = arrays["known"]
         if known.shape != self._table.shape or known.dtype.kind != "b":
             raise ValueError("the array known does not fit the table")

@@ -82,6 +82,7 @@ class ReturningACL(RememberingAgent):
     """
 
     slots_are = "ants"
+    always_remembers = True
 
     discount = Parameter(
         "Weight of what follows a step", "gamma_rl", at_least=0, at_most=1
@@ -253,10 +254,6 @@ class ReturningACL(RememberingAgent):
     @property
     def _table(self) -> FloatArray:
         return self._walk_back.levels
-
-    @property
-    def _remembers(self) -> bool:
-        return True
 
     @property
     def _known(self) -> BoolArray:

@@ -361,7 +361,7 @@ class QLearning(RememberingAgent):
             "replay": self.replay,
             "older_paths": self.older_paths,
             "steps_per_replay": self.steps_per_replay,
-            "memory_size": self._memory_size,
+            "memory_size": self.memory_size,
             "optimism": self.optimism,
             "grows": self.grows,
             "visits_to_grow": self.visits_to_grow,

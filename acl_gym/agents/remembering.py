@@ -63,10 +63,8 @@ class RememberingAgent(TabularAgent):
         n_actions: int | None,
     ) -> None:
         self._growth = Growth(grows)
-        self._memory_size = validation.integer(
-            "memory_size", memory_size, at_least=1, at_most=2**25
-        )
         self._kept_memory: Memory | None = None
+        self.memory_size = memory_size
         if partition is None and self.grows and env is not None:
             partition = initial_partition(env)
         super().__init__(
@@ -93,10 +91,21 @@ class RememberingAgent(TabularAgent):
     @property
     def _memory(self) -> Memory:
         if self._kept_memory is None:
-            self._kept_memory = Memory(
-                self._memory_size, self.n_actions, self.partition
-            )
+            self._kept_memory = Memory(self.memory_size, self.n_actions, self.partition)
         return self._kept_memory
+
+    @property
+    def memory_size(self) -> int:
+        """How many states are remembered; what is too much goes with the next walk."""
+        return self._memory_size
+
+    @memory_size.setter
+    def memory_size(self, value: int) -> None:
+        self._memory_size = validation.integer(
+            "memory_size", value, at_least=1, at_most=2**25
+        )
+        if self._kept_memory is not None:
+            self._kept_memory.most = self._memory_size
 
     @property
     def grows(self) -> bool:
@@ -185,4 +194,7 @@ class RememberingAgent(TabularAgent):
             self._set_partition(partition, table.copy(), known.copy())
         self._table[:], self._known[:] = table, known
         self._ranks = ranks
-        self._kept_memory = None if memory is None else memory.copy()
+        self._kept_memory = None
+        if memory is not None:
+            self._kept_memory = memory.copy()
+            self._kept_memory.most = self.memory_size  # parameters are not taken back

@@ -280,7 +280,7 @@ class ReturningACL(RememberingAgent):
             "walks_back": self.walks_back,
             "older_paths": self.older_paths,
             "steps_per_walk": self.steps_per_walk,
-            "memory_size": self._memory_size,
+            "memory_size": self.memory_size,
             "visits_to_grow": self.visits_to_grow,
             "max_cells": self.max_cells,
             "grows": self.grows,

@@ -274,6 +274,17 @@ def test_who_remembers_nothing_has_nothing_to_save(tmp_path: Path) -> None:
     assert QLearning.load(tmp_path / "plain").remembered_steps == 0
 
 
+def test_the_size_of_the_memory_may_change() -> None:
+    agent = make("pendulum").learn(trials=2)
+    kept = agent.snapshot()
+    assert agent.remembered_steps > 500
+    agent.memory_size = 500
+    assert agent.learn(trials=1).remembered_steps <= 500
+    agent.take_back(kept)
+    assert agent.remembered_steps > 500
+    assert agent.learn(trials=1).remembered_steps <= 500
+
+
 def test_another_number_of_slots() -> None:
     agent = make("traces").learn(trials=2)
     agent.set_env(pendulum(9))
@@ -300,10 +311,9 @@ BAD: list[tuple[str, Any, type[Exception]]] = [
 def test_bad_parameters(name: str, value: Any, error: type[Exception]) -> None:
     with pytest.raises(error, match=f"{name} must"):
         QLearning(chains(2), ROW, **{name: value})
-    if name != "memory_size":
-        agent = QLearning(chains(2), ROW)
-        with pytest.raises(error, match=f"{name} must"):
-            setattr(agent, name, value)
+    agent = QLearning(chains(2), ROW)
+    with pytest.raises(error, match=f"{name} must"):
+        setattr(agent, name, value)
 
 
 def test_values_that_overflow_in_memory_are_refused() -> None:

@@ -119,6 +119,9 @@ def carried_over(table: ArrayLike, old: Partition, new: Partition) -> FloatArray
     policies. The cells of a crisp grid receive a copy of the cell that holds their
     centre.
 
+    Any agent goes on on finer cells so: a new one with `coarse.refined(0)`, whose
+    `set_table` takes what was carried over.
+
     Args:
         table: `(old.n_cells, n_actions)`.
         old: the partition of `table`.
@@ -129,6 +132,12 @@ def carried_over(table: ArrayLike, old: Partition, new: Partition) -> FloatArray
 
     Raises:
         ValueError: the table is not one of `old`.
+
+    Example:
+        >>> from acl_gym import Fuzzy
+        >>> coarse = Fuzzy([[0.0, 1.0]])
+        >>> carried_over([[1.0], [3.0]], coarse, coarse.refined(0)).ravel().tolist()
+        [1.0, 2.0, 3.0]
     """
     values = validation.real_array("table", table, ndim=2)
     if len(values) != old.n_cells:

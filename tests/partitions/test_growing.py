@@ -11,7 +11,7 @@ from gymnasium import spaces
 from hypothesis import given
 from hypothesis import strategies as st
 
-from acl_gym import Crisp, Discrete, Fuzzy
+from acl_gym import ACL, Crisp, Discrete, Fuzzy
 from acl_gym.partitions import locate_all
 from acl_gym.partitions.growing import (
     carried_over,
@@ -64,6 +64,19 @@ def test_cells_of_a_crisp_grid_are_copied() -> None:
     table = np.array([[1.0], [2.0], [4.0]])
     # A centre on the border of two cells belongs to the upper one, as a state does.
     assert carried_over(table, coarse, fine).ravel().tolist() == [1, 2, 2, 4, 4]
+
+
+def test_a_colony_goes_on_on_finer_cells() -> None:
+    env = gym.make_vec("acl_gym/Pendulum-v0", num_envs=20)
+    coarse = Fuzzy.from_box(env.single_observation_space, (8, 9), circular=[0])
+    colony = ACL(env, coarse, seed=0, max_steps=100).learn(trials=3)
+    finer = ACL(env, coarse.refined(1), seed=0, max_steps=100)
+    finer.set_table(carried_over(colony.table, coarse, finer.partition))
+    states = env.reset(seed=2)[0]
+    chosen = colony.predict(states)[0]
+    # Where levels tie, either action may be taken; here few do.
+    assert np.mean(finer.predict(states)[0] == chosen) > 0.8
+    assert finer.learn(trials=1).partition.n_cells == 8 * 17
 
 
 def test_only_grids_can_be_refined_and_stay_of_their_kind() -> None:

@@ -43,6 +43,17 @@ class Step(NamedTuple):
     """Whether the episode is over: a terminal state, the environment's limit or T."""
 
 
+class Outcome(NamedTuple):
+    """What the episodes of a trial came to."""
+
+    costs: FloatArray
+    """J of each finished episode, the sum of its stage costs."""
+    success: BoolArray | None
+    """Whether each was a success; None where nothing is known of success."""
+    n_steps: int
+    """Steps of all slots together."""
+
+
 class _Record:
     """Observations, actions and stage costs of all slots, step by step.
 
@@ -90,6 +101,8 @@ class Rollout:
         cost: J of each slot so far, the sum of its stage costs.
         length: steps of each slot so far.
         terminated: whether the episode of each slot has ended in a terminal state.
+        returned: the ants that are back, all of them once the last has finished; None as
+            long as one of them walks.
         action_mask: which actions each slot may take now, `(num_envs, n_actions)`, the
             set U_q of the selection rule (3.4). None if the environment gives no
             `infos["action_mask"]`.
@@ -198,6 +211,7 @@ class Rollout:
         self._totals = self.cost, self.length, self.terminated
         self.steps = 0
         self._stale = None
+        self.returned: IntArray | None = None
         if record:
             _require_array(observation)
         self._record = _Record(observation, self._fresh) if record else None
@@ -250,9 +264,28 @@ class Rollout:
             reached: `(>= m,)`, receives whether they are in a terminal state.
             stopped: `(>= m,)`, receives whether their episodes are over.
         """
+        ants, m = self._ants, self._ants.size
+        given = self._act(actions)
+        left = self._count(given, cost, reached, stopped)
+        observation, reward, _, _, infos = given
+        if left.size < m:
+            self._ants = left
+            if self._mode is AutoresetMode.SAME_STEP and not self._waits:
+                observation = self._last_seen(ants[stopped[:m]], observation, infos)
+        if self.steps >= self.max_steps:
+            self._ants = ants[:0]
+            stopped.fill(True)
+        if not self._ants.size:
+            self.returned = self._all
+        if self._record is not None:
+            self._record.append(observation, self._actions - self.first_action, reward)
+        return observation
+
+    def _act(self, actions: IntArray) -> Any:
+        """Let the walking ants act; return what the environment gave, checked."""
         if self._stepping:
             self._check_idle("step")
-        ants, native = self._ants, self._native
+        ants = self._ants
         m = ants.size
         passed: Any = actions
         if type(actions) is not np.ndarray:
@@ -277,6 +310,11 @@ class Rollout:
                 f"actions must lie in 0..{self.n_actions - 1}, got {actions[bad]} in "
                 f"slot {ants[bad]}."
             )
+        return self._advance()
+
+    def _advance(self) -> Any:
+        """Step the environment with the actions of all slots as they stand."""
+        native = self._native
         # A copy, because an environment or a wrapper may keep its actions.
         self._stepping = True
         try:
@@ -291,10 +329,16 @@ class Rollout:
             self._read_mask(given[4])
         else:
             self._mask = given[4].get("action_mask")
-        observation, reward, terminated, truncated, infos = given
-        self.steps += 1
+        return given
 
-        left = np.empty(m, np.int64)
+    def _count(
+        self, given: Any, cost: FloatArray, reached: BoolArray, stopped: BoolArray
+    ) -> IntArray:
+        """Count a step, see `_take`; return the ants whose episodes are not over."""
+        ants = self._ants
+        _, reward, terminated, truncated, infos = given
+        self.steps += 1
+        left = np.empty(ants.size, np.int64)
         n_left, bad = _account(
             ants,
             reward,
@@ -314,16 +358,28 @@ class Rollout:
             # Idle slots that finish another episode are reset with the others.
             done = np.logical_or(terminated, truncated)
             self._stale = done if done.any() else None
-        if n_left < m:
-            self._ants = left[:n_left]
-            if self._mode is AutoresetMode.SAME_STEP and not self._waits:
-                observation = self._last_seen(ants[stopped[:m]], observation, infos)
-        if self.steps >= self.max_steps:
-            self._ants = ants[:0]
-            stopped.fill(True)
-        if self._record is not None:
-            self._record.append(observation, self._actions - self.first_action, reward)
+        return left[:n_left]
+
+    def set_out(self, observation: Any) -> Any:
+        """Let the ants that are `returned` set out again, where they do not wait.
+
+        Here they wait for the next `start`; see `Stream`.
+
+        Args:
+            observation: of all slots after the step.
+
+        Returns:
+            Those from which the next step is made, `(num_envs, ...)`.
+        """
         return observation
+
+    def outcome(self) -> Outcome:
+        """What the episodes since `start` came to."""
+        return Outcome(self.cost, self.success, int(self.length.sum()))
+
+    def returned_episodes(self) -> Episodes:
+        """The steps of the ants that are `returned`; see `episodes`."""
+        return self.episodes()
 
     def episodes(self) -> Episodes:
         """The steps of every slot since `start(record=True)`.
@@ -331,6 +387,18 @@ class Rollout:
         Raises:
             ValueError: nothing was recorded.
         """
+        record = self._recorded()
+        # Read-only, because a cost or an update rule of a user's own sees them.
+        return Episodes(
+            _fixed(np.stack(record.observations)),
+            _fixed(np.stack(record.actions)),
+            _fixed(np.stack(record.costs)),
+            validation.read_only(self.length),
+            validation.read_only(self.terminated),
+        )
+
+    def _recorded(self) -> _Record:
+        """What was recorded, checked."""
         record = self._record
         if record is None or not record.actions:
             raise ValueError(
@@ -342,14 +410,7 @@ class Rollout:
                 "observations must have the same shape and type in every step, got "
                 f"shapes {', '.join(shapes)}; check the environment's step and reset."
             )
-        # Read-only, because a cost or an update rule of a user's own sees them.
-        return Episodes(
-            _fixed(np.stack(record.observations)),
-            _fixed(np.stack(record.actions)),
-            _fixed(np.stack(record.costs)),
-            validation.read_only(self.length),
-            validation.read_only(self.terminated),
-        )
+        return record
 
     @property
     def success(self) -> BoolArray | None:

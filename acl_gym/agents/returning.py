@@ -9,7 +9,7 @@ import numpy as np
 from gymnasium.vector import VectorEnv
 from numpy.typing import ArrayLike, NDArray
 
-from acl_gym.agents.base import TabularAgent
+from acl_gym.agents.colony import ColonyAgent
 from acl_gym.agents.saving import with_prefix
 from acl_gym.agents.training import Training
 from acl_gym.callbacks.base import Callbacks
@@ -26,7 +26,7 @@ from acl_gym.utils.parameters import Parameter
 from acl_gym.utils.typing import BoolArray, CellArray, FloatArray, IntArray, Row
 
 
-class ReturningACL(TabularAgent):
+class ReturningACL(ColonyAgent):
     """A colony whose ants walk back from where they end, and which remembers.
 
     Each slot of the environment is an ant, as in `ACL`, and all share one table of
@@ -70,6 +70,12 @@ class ReturningACL(TabularAgent):
         max_cells: the partition does not become finer than this, >= 1.
         grows: whether the partition becomes wider and finer. None: if it was chosen for
             you.
+        schedule: `"synchronous"`: an ant that has finished waits until all have.
+            `"asynchronous"` (§7.3): it sets out again at once, until the last ant is back
+            from its first way of the trial; the trial then ends for all, and paths that
+            end there are remembered as far as they go. No ant ever waits. A trial is then
+            M episodes or more. Not every environment can do it, see
+            `acl_gym.evaluation.stream.Stream`.
         max_steps: T, the most steps an ant may make, >= 1. None takes the time limit of
             the environment, or 300 if it has none.
         seed: the same seed gives the same run; None draws one from the system.
@@ -88,7 +94,7 @@ class ReturningACL(TabularAgent):
         True
     """
 
-    slots_are = "ants"
+    completes = False  # what an ant has done until then is remembered in any case
 
     discount = Parameter(
         "Weight of what follows a step", "gamma_rl", at_least=0, at_most=1
@@ -148,6 +154,7 @@ class ReturningACL(TabularAgent):
         visits_to_grow: float = 5.0,
         max_cells: int = 20_000,
         grows: bool | None = None,
+        schedule: str = "synchronous",
         max_steps: int | None = None,
         seed: int | None = None,
         n_actions: int | None = None,
@@ -165,7 +172,12 @@ class ReturningACL(TabularAgent):
         if partition is None and env is not None:
             partition = initial_partition(env)
         super().__init__(
-            env, partition, max_steps=max_steps, seed=seed, n_actions=n_actions
+            env,
+            partition,
+            schedule=schedule,
+            max_steps=max_steps,
+            seed=seed,
+            n_actions=n_actions,
         )
         if mix is None:
             mix = 0.0 if isinstance(self.partition, Discrete) else 0.2
@@ -188,7 +200,7 @@ class ReturningACL(TabularAgent):
     ) -> Self:
         """Let the ants walk, remember, walk back and, where it may, the partition grow.
 
-        A trial is one episode in every slot. Called again, it continues from the levels
+        A trial is one episode in every slot, or more, see `schedule`. Called again, it continues from the levels
         and the memory as they are.
 
         Args:
@@ -213,7 +225,7 @@ class ReturningACL(TabularAgent):
                 while self.rollout._ants.size:
                     walk, observation = self._walk(observation)
                     self._widen(walk)
-                    newest = self._memory.add(walk, self.rollout.terminated)
+                    newest = self._memory.add(walk)
                     self._promise()
                     for _ in range(self.walks_back):
                         self._return(newest)
@@ -224,6 +236,7 @@ class ReturningACL(TabularAgent):
     def _walk(self, observation: Any) -> tuple[Walk, Any]:
         """Let the ants that still walk make some steps; return these and where they are."""
         rollout, walk = self.rollout, Walk(self.num_envs)
+        going = rollout._ants
         while rollout._ants.size and walk.steps < self.steps_per_walk:
             ants, allowed = rollout._ants, rollout.allowed()
             index, degree = self._locate(observation, ants)
@@ -232,13 +245,14 @@ class ReturningACL(TabularAgent):
             )
             step = rollout._step(actions)
             walk.append(ants, observation, actions, -step.cost, allowed)
-            observation = step.observation
-            if step.finished.any():
-                done = ants[step.finished]
-                walk.stop(done, observation, rollout.allowed_after(done))
-        if rollout._ants.size:
-            ants = rollout._ants
-            walk.stop(ants, observation, rollout.allowed_after(ants))
+            observation, going = step.observation, ants[~step.finished]
+            if going.size < ants.size:
+                done, goal = ants[step.finished], step.terminated[step.finished]
+                walk.stop(done, observation, goal, rollout.allowed_after(done))
+                observation = rollout.set_out(observation)
+        if going.size:  # others may have set out, but made no step yet
+            on_the_way = np.zeros(going.size, np.bool_)
+            walk.stop(going, observation, on_the_way, rollout.allowed_after(going))
         return walk, observation
 
     def _promise(self) -> None:
@@ -356,6 +370,7 @@ class ReturningACL(TabularAgent):
             "visits_to_grow": self.visits_to_grow,
             "max_cells": self.max_cells,
             "grows": self.grows,
+            "schedule": self.schedule,
             "max_steps": self.max_steps,
             "seed": self.seed,
         }

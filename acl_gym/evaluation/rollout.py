@@ -142,7 +142,8 @@ class Rollout:
         self._scratch = np.empty(n), np.empty(n, np.bool_), np.empty(n, np.bool_)
         self._stale: BoolArray | None = None  # slots to reset before the next step
         self._mask: BoolArray | None = None
-        self._ants, self._shown_ants = self._all, validation.read_only(self._all)
+        self._ants = self._all
+        self._shown_of: IntArray | None = None  # what `_shown_ants` shows
         self._reported_success: BoolArray | None = None
         self._stepping = False
         # The environment, in trials in which what it returns need not be checked.
@@ -157,7 +158,8 @@ class Rollout:
     def ants(self) -> IntArray:
         """The slots that are still walking, `(m,)`, read-only."""
         # Kernels take `_ants`: the call of one with a read-only array is slower.
-        if self._shown_ants.size != self._ants.size:
+        if self._shown_of is not self._ants:
+            self._shown_of = self._ants
             self._shown_ants = validation.read_only(self._ants)
         return self._shown_ants
 
@@ -202,7 +204,7 @@ class Rollout:
         )
         observation = received.observations(observation, n)
         self._read_mask(received.infos(infos, n))
-        self._ants, self._shown_ants = self._all, validation.read_only(self._all)
+        self._ants = self._all
         self.cost = np.zeros(n)
         self.length = np.zeros(n, dtype=np.int64)
         self.terminated = np.zeros(n, dtype=np.bool_)

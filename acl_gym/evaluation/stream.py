@@ -145,9 +145,10 @@ class Stream(Rollout):
             back = ants[stopped[: ants.size]]
             if self._mode is AutoresetMode.SAME_STEP and not self._waits:
                 reset = np.logical_or(terminated, truncated)
-                mask = None if self._mask is None else self._mask.copy()
-                self._anew = _Anew(reset, observation, mask)
-                observation = self._last_seen(back[reset[back]], observation, infos)
+                if reset[back].any():  # the others are timed out
+                    mask = None if self._mask is None else self._mask.copy()
+                    self._anew = _Anew(reset, observation, mask)
+                    observation = self._last_seen(back[reset[back]], observation, infos)
             self._come_back(back)
             self._ants = left
         if resting.size:
@@ -232,7 +233,6 @@ class Stream(Rollout):
         mask = np.zeros(self.num_envs, dtype=np.bool_)
         mask[slots] = True
         if anew is not None:
-            # The others were timed out.
             done = mask & anew.slots
             observation = _with_rows(observation, anew.observation, done)
             self._set_mask(anew.action_mask, done)

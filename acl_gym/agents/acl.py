@@ -247,6 +247,7 @@ class ACL(ColonyAgent):
                 observation = rollout.start(seed=self._next_seed(), record=record)
                 rule.start_trial(pheromone, self.trials)
                 costs: list[FloatArray] = []
+                n_back = 0
                 while rollout._ants.size:  # 7, 17: repeat until t = T or C is empty
                     ants = rollout._ants
                     # 8: fuzzify the states
@@ -266,8 +267,8 @@ class ACL(ColonyAgent):
                     # solutions once the last ant is back, or with each at once
                     ants_back = rollout.returned
                     if ants_back is not None:
-                        before = sum(map(len, costs))
-                        result = self._result(rollout, ants_back, solutions, before)
+                        result = self._result(rollout, ants_back, solutions, n_back)
+                        n_back += ants_back.size
                         rule.global_update(
                             pheromone, result, self.local_decay, self.global_decay
                         )

@@ -293,16 +293,19 @@ class Stream(Rollout):
         begun = np.concatenate([each.begun for each in back])
         ended = np.concatenate([np.full(b.ants.size, b.ended) for b in back])
         lengths = ended - begun
-        longest = int(lengths.max())
-        seen, after = np.stack(self._stood), np.stack(record.observations[1:])
-        # Rows beyond the end repeat the last one.
-        times = np.minimum(begun + np.arange(longest)[:, None], ended - 1)
+        during = slice(begun.min(), ended.max())
+        seen = np.stack(self._stood[during])
+        after = np.stack(record.observations[1:][during])
+        # Rows beyond the end of an episode repeat its last one.
+        times = begun + np.arange(lengths.max())[:, None]
+        times = np.minimum(times, ended - 1) - during.start
         observations = np.concatenate([seen[times, ants], after[None, -1, ants]])
-        observations[lengths, np.arange(ants.size)] = after[ended - 1, ants]
+        last = after[ended - 1 - during.start, ants]
+        observations[lengths, np.arange(ants.size)] = last
         return Episodes(
             _fixed(observations),
-            _fixed(np.stack(record.actions)[times, ants]),
-            _fixed(np.stack(record.costs)[times, ants]),
+            _fixed(np.stack(record.actions[during])[times, ants]),
+            _fixed(np.stack(record.costs[during])[times, ants]),
             _fixed(lengths),
             _fixed(np.concatenate([each.terminated for each in back])),
         )

@@ -136,9 +136,7 @@ def run(case: str, colony: str, schedule: str, seed: int, best: float) -> dict:
     agent = colony_for(case, colony, schedule, seed, ants)
     reached = Reached({f"{p}%": (1 + p / 100) * best for p in (25, 10)})
     evaluation = PolicyEvaluation(environment(case, 1))
-    agent.learn(
-        total_timesteps=settings.steps[colony], callback=[evaluation, reached]
-    )
+    agent.learn(total_timesteps=settings.steps[colony], callback=[evaluation, reached])
     return {
         "case": case,
         "colony": colony,

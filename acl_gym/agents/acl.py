@@ -428,7 +428,9 @@ class ACL(ColonyAgent):
     ) -> None:
         super()._restore(header, arrays)
         if self.is_asynchronous and "latest_costs" in arrays:
-            latest = validation.real_array("latest_costs", arrays["latest_costs"], ndim=1)
+            latest = validation.real_array(
+                "latest_costs", arrays["latest_costs"], ndim=1
+            )
             self._latest_costs = latest
         memory = with_prefix("update_", arrays)
         if memory:

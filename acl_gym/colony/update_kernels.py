@@ -135,9 +135,9 @@ def reinforce(
     touched: IntArray,
     summed: FloatArray,
     global_decay: float,
-    evaporated: FloatArray | None,
     levels: FloatArray,
     stale: BoolArray,
+    evaporated: FloatArray | None = None,
 ) -> None:
     """Global update, eq. (4.15), of the touched pairs.
 

@@ -120,9 +120,9 @@ class Reinforcement:
             touched,
             self._summed,
             global_decay,
-            self._evaporated_in(batch),
             pheromone.levels,
             pheromone.stale,
+            self._evaporated_in(batch),
         )
         self._interrupted = False
 

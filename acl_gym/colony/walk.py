@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from acl_gym.utils.compiling import njit
 from acl_gym.utils.typing import BoolArray, FloatArray, IntArray
 
-
 _STEP, _END, _GOAL = 0, 1, 2  # what a row is: a step, or where a path ends, and how
 
 

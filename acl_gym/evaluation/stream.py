@@ -16,7 +16,6 @@ from acl_gym.colony.episodes import Episodes
 from acl_gym.envs import received
 from acl_gym.envs.wrappers.partial_reset import reset_slots
 from acl_gym.evaluation.rollout import Outcome, Rollout, _fixed
-from acl_gym.utils import validation
 from acl_gym.utils.typing import BoolArray, FloatArray, IntArray
 
 
@@ -226,9 +225,7 @@ class Stream(Rollout):
             self._standing = observation if self._fresh else observation.copy()
         return observation
 
-    def _reset(
-        self, slots: IntArray, observation: Any, anew: _Anew | None
-    ) -> Any:
+    def _reset(self, slots: IntArray, observation: Any, anew: _Anew | None) -> Any:
         """Start episodes in some slots; return the observations of all."""
         mask = np.zeros(self.num_envs, dtype=np.bool_)
         mask[slots] = True

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -247,7 +248,9 @@ LENGTHS = (60, 3, 4, 3)
 
 def ways(log: list[Any], mode: str | None = None) -> Any:
     makers = [lambda n=n: Way(n, log) for n in LENGTHS]
-    return SyncVectorEnv(makers, autoreset_mode=mode) if mode else WaitingVectorEnv(makers)
+    return (
+        SyncVectorEnv(makers, autoreset_mode=mode) if mode else WaitingVectorEnv(makers)
+    )
 
 
 @dataclass
@@ -333,7 +336,7 @@ def test_what_is_remembered_is_what_was_done(
         assert last > first
         assert (np.diff(path) == 1).all()
         assert not terminated or path[-1] in LENGTHS
-        done += zip(path[:-1], path[1:], strict=True)
+        done += pairwise(path)
     assert sorted(done) == sorted(log)
     assert memory.terminated.sum() == 2 * (1 + 2 * 20 + 15)
 
@@ -425,7 +428,9 @@ def test_the_schedule_is_checked_fixed_and_saved(kind: Any, tmp_path: Path) -> N
         kind(pendulum(), grid(), schedule="sync")
     colony = kind(pendulum(), grid(), max_steps=5)
     assert colony.schedule == colony.parameters()["schedule"] == "synchronous"
-    with pytest.raises(AttributeError, match="schedule is fixed once the agent is made"):
+    with pytest.raises(
+        AttributeError, match="schedule is fixed once the agent is made"
+    ):
         colony.schedule = "asynchronous"
     colony.learn(trials=1).save(tmp_path / "a")
     other = kind.load(tmp_path / "a", pendulum(), schedule="asynchronous")

@@ -258,7 +258,9 @@ def test_success_is_that_of_each_episode(mode: str) -> None:
     outcome = stream.outcome()
     assert outcome.success is not None
     np.testing.assert_array_equal(outcome.success, outcome.costs == 3.0)
-    assert outcome.success.sum() == 3  # the last one is completed after the first is back
+    assert (
+        outcome.success.sum() == 3
+    )  # the last one is completed after the first is back
 
 
 @pytest.mark.parametrize("mode", ["NextStep", "SameStep"])
@@ -339,9 +341,7 @@ def test_recorded_episodes_are_those_that_finished(mode: str) -> None:
         )
         assert episode.terminated == outcome.success[number]
         single.reset(options={"state": episode.observations[0]})
-        for action, seen in zip(
-            episode.actions, episode.observations[1:], strict=True
-        ):
+        for action, seen in zip(episode.actions, episode.observations[1:], strict=True):
             observation, *_ = single.step(int(action))
             np.testing.assert_allclose(observation, seen, rtol=1e-7, atol=1e-9)
 

@@ -60,7 +60,7 @@ class TabularAgent(SavedAgent):
         trials: trials finished, k.
         seconds: wall-clock time spent learning, without callbacks.
         history: one row per trial: `trial`, `env_steps`, `seconds` (all three
-            cumulated), `ants_cost` (mean J of the ants), `policy_variation` (§3.6.1),
+            cumulated), `ants_cost` (mean J of the episodes), `policy_variation` (§3.6.1),
             what the agent adds in `measures`, and, where a `PolicyEvaluation` ran,
             `policy_cost` (3.47). In environments of other packages also the undiscounted
             `ants_return` and `policy_return`. Where success is known, in environments

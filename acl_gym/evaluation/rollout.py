@@ -20,6 +20,7 @@ from acl_gym.envs import received
 from acl_gym.envs.control.environments import ControlVectorEnv, is_native
 from acl_gym.envs.wrappers.partial_reset import reset_slots
 from acl_gym.envs.wrappers.waiting import WaitingVectorEnv
+from acl_gym.evaluation.rows import fixed, require_array, set_row
 from acl_gym.utils import validation
 from acl_gym.utils.compiling import njit
 from acl_gym.utils.typing import BoolArray, FloatArray, IntArray
@@ -215,7 +216,7 @@ class Rollout:
         self._stale = None
         self.returned: IntArray | None = None
         if record:
-            _require_array(observation)
+            require_array(observation)
         self._record = _Record(observation, self._fresh) if record else None
         return observation
 
@@ -392,9 +393,9 @@ class Rollout:
         record = self._recorded()
         # Read-only, because a cost or an update rule of a user's own sees them.
         return Episodes(
-            _fixed(np.stack(record.observations)),
-            _fixed(np.stack(record.actions)),
-            _fixed(np.stack(record.costs)),
+            fixed(np.stack(record.observations)),
+            fixed(np.stack(record.actions)),
+            fixed(np.stack(record.costs)),
             validation.read_only(self.length),
             validation.read_only(self.terminated),
         )
@@ -519,67 +520,13 @@ class Rollout:
         else:
             shown = observation.copy()
         for slot in stopped:
-            _set_row(shown, int(slot), final[slot])
+            set_row(shown, int(slot), final[slot])
         if self.action_mask is not None:
             # The mask already belongs to the next episode.
             last = received.infos(infos.get("final_info"), self.num_envs)
             allowed = received.action_mask(last, self.num_envs, self.n_actions)
             self.action_mask[stopped] = True if allowed is None else allowed[stopped]
         return shown
-
-
-def rows_of(observation: Any, slots: IntArray) -> Any:
-    """The observations of some slots, copied; of dicts and tuples part by part."""
-    if isinstance(observation, dict):
-        return {key: rows_of(part, slots) for key, part in observation.items()}
-    if isinstance(observation, tuple):
-        return tuple(rows_of(part, slots) for part in observation)
-    return observation[slots]
-
-
-def _set_row(observation: Any, slot: int, row: Any) -> None:
-    """Replace the observation of one slot.
-
-    Raises:
-        ValueError: `row` is not an observation of the same shape and kind.
-    """
-    if isinstance(observation, dict):
-        if not isinstance(row, dict) or set(row) != set(observation):
-            raise _not_final(slot, f"the keys {sorted(observation)}", row)
-        for key, part in observation.items():
-            _set_row(part, slot, row[key])
-        return
-    array = validation.as_array(row)
-    shape = observation.shape[1:]
-    if (
-        array is None
-        or array.shape != shape
-        or not np.can_cast(array.dtype, observation.dtype, "same_kind")
-    ):
-        raise _not_final(slot, f"shape {shape} and type {observation.dtype}", row)
-    observation[slot] = array
-
-
-def _not_final(slot: int, expected: str, row: Any) -> ValueError:
-    return ValueError(
-        f"infos['final_obs'] must have {expected} in slot {slot}, got "
-        f"{validation.shown(row)}; check the environment's step."
-    )
-
-
-def _require_array(observation: Any) -> None:
-    if not isinstance(observation, np.ndarray):
-        raise ValueError(
-            "a cost of complete solutions needs observations that are arrays, got "
-            f"{validation.shown(observation)}; leave the cost out, or flatten them with "
-            "gymnasium.wrappers.vector.FlattenObservation."
-        )
-
-
-def _fixed(array: NDArray[Any]) -> NDArray[Any]:
-    """The same new array, which from now on cannot be written to."""
-    array.setflags(write=False)
-    return array
 
 
 @njit

@@ -10,12 +10,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from gymnasium.vector import AsyncVectorEnv, AutoresetMode, SyncVectorEnv, VectorEnv
-from numpy.typing import NDArray
 
 from acl_gym.colony.episodes import Episodes
 from acl_gym.envs import received
 from acl_gym.envs.wrappers.partial_reset import reset_slots
-from acl_gym.evaluation.rollout import Outcome, Rollout, _fixed
+from acl_gym.evaluation.rollout import Outcome, Rollout
+from acl_gym.evaluation.rows import fixed, with_rows
 from acl_gym.utils.typing import BoolArray, FloatArray, IntArray
 
 
@@ -231,7 +231,7 @@ class Stream(Rollout):
         mask[slots] = True
         if anew is not None:
             done = mask & anew.slots
-            observation = _with_rows(observation, anew.observation, done)
+            observation = with_rows(observation, anew.observation, done)
             self._set_mask(anew.action_mask, done)
             mask &= ~done
         if not mask.any():
@@ -244,7 +244,7 @@ class Stream(Rollout):
         self._set_mask(
             received.action_mask(received.infos(infos, n), n, self.n_actions), mask
         )
-        return _with_rows(observation, received.observations(begun, n), mask)
+        return with_rows(observation, received.observations(begun, n), mask)
 
     def _wait_for_resets(self) -> Any:
         """Make the step that resets all resting slots, where no ant walks."""
@@ -300,30 +300,14 @@ class Stream(Rollout):
         last = after[ended - 1 - during.start, ants]
         observations[lengths, np.arange(ants.size)] = last
         return Episodes(
-            _fixed(observations),
-            _fixed(np.stack(record.actions[during])[times, ants]),
-            _fixed(np.stack(record.costs[during])[times, ants]),
-            _fixed(lengths),
-            _fixed(np.concatenate([each.terminated for each in back])),
+            fixed(observations),
+            fixed(np.stack(record.actions[during])[times, ants]),
+            fixed(np.stack(record.costs[during])[times, ants]),
+            fixed(lengths),
+            fixed(np.concatenate([each.terminated for each in back])),
         )
 
 
 def _joined(some: IntArray, others: IntArray) -> IntArray:
     """Slots of both, in ascending order."""
     return np.sort(np.concatenate([some, others]))
-
-
-def _with_rows(observation: NDArray[Any], rows: NDArray[Any], mask: BoolArray) -> Any:
-    """Observations in which some slots have those of `rows`.
-
-    Raises:
-        ValueError: they are of different shapes.
-    """
-    if rows.shape != observation.shape:
-        raise ValueError(
-            "observations must have the same shape in reset and step, got "
-            f"{rows.shape[1:]} and {observation.shape[1:]}; check the environment."
-        )
-    merged = observation.astype(np.result_type(observation, rows))
-    merged[mask] = rows[mask]
-    return merged

@@ -65,8 +65,9 @@ class Colony:
                 masks = mask[walking] if self.masked else None
                 walk.append(walking, seen[walking], actions, rewards, masks)
             if ending.size:
-                walk.stop(ending, seen, mask[ending] if self.masked else None)
-        self.memory.add(walk, terminated)
+                masks = mask[ending] if self.masked else None
+                walk.stop(ending, seen, terminated[ending], masks)
+        self.memory.add(walk)
         self.paths += [
             (
                 [state[0] for state in states],

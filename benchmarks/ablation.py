@@ -155,7 +155,7 @@ def alone(task: Task, seed: int) -> QLearning:
 
 VARIANTS: dict[str, Callable[[Task, int], TabularAgent | None]] = {
     "returning": colony,
-    "no memory": lambda task, seed: colony(task, seed, older_paths=0, walks_back=1),
+    "no memory": lambda task, seed: colony(task, seed, older_steps=0, walks_back=1),
     "no growth": on_fixed_cells,
     "no ants": without_ants,
     "none": alone,

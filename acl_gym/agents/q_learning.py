@@ -67,8 +67,8 @@ class QLearning(RememberingAgent):
             then the value moves further than the error.
         replay: how often paths are learned from again after `steps_per_replay` steps,
             in [0, 10000]; 0: never.
-        older_paths: how many older paths are replayed beside the newest each time, in
-            [0, 1e6].
+        older_steps: how many steps of older paths are replayed beside the newest paths
+            each time, in [0, 1e9].
         steps_per_replay: after how many steps of all slots together, in [1, 1e9], or at
             the end of the trial, paths are replayed and the partition may grow.
         memory_size: how many states are remembered, >= 1, where `replay`, `grows` or
@@ -113,8 +113,11 @@ class QLearning(RememberingAgent):
         at_least=0,
         at_most=10_000,
     )
-    older_paths = Parameter(
-        "Older paths in each replay", whole=True, at_least=0, at_most=1_000_000
+    older_steps = Parameter(
+        "Steps of older paths in each replay",
+        whole=True,
+        at_least=0,
+        at_most=1_000_000_000,
     )
     steps_per_replay = Parameter(
         "Steps of all slots before paths are replayed",
@@ -143,12 +146,12 @@ class QLearning(RememberingAgent):
         trace_decay: float = 0.0,
         traces: str = "replacing",
         replay: int = 0,
-        older_paths: int = 50,
+        older_steps: int = 10_000,
         steps_per_replay: int = 300,
         memory_size: int = 100_000,
         optimism: float | None = None,
         grows: bool = False,
-        visits_to_grow: float = 5.0,
+        visits_to_grow: float = 20.0,
         max_cells: int = 20_000,
         max_steps: int | None = None,
         seed: int | None = None,
@@ -160,7 +163,7 @@ class QLearning(RememberingAgent):
         self.trace_decay = trace_decay
         self._kind = validation.one_of("traces", traces, TRACES)
         self._traces: Traces | None = None
-        self.replay, self.older_paths = replay, older_paths
+        self.replay, self.older_steps = replay, older_steps
         self.steps_per_replay = steps_per_replay
         self.optimism = optimism
         self.visits_to_grow, self.max_cells = visits_to_grow, max_cells
@@ -287,7 +290,7 @@ class QLearning(RememberingAgent):
         for _ in range(self.replay):
             replay(
                 memory,
-                memory.with_older(newest, self.older_paths, self.rng),
+                memory.with_older(newest, self.older_steps, self.rng),
                 self._values,
                 rate=self.learning_rate,
                 discount=self.discount,
@@ -360,7 +363,7 @@ class QLearning(RememberingAgent):
             "trace_decay": self.trace_decay,
             "traces": self.traces,
             "replay": self.replay,
-            "older_paths": self.older_paths,
+            "older_steps": self.older_steps,
             "steps_per_replay": self.steps_per_replay,
             "memory_size": self.memory_size,
             "optimism": self.optimism,

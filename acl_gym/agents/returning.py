@@ -2,21 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any, Self
 
 import numpy as np
 from gymnasium.vector import VectorEnv
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from acl_gym.agents.colony import ColonyAgent
 from acl_gym.agents.remembering import RememberingAgent
+from acl_gym.agents.saving import with_prefix
 from acl_gym.agents.training import Training
 from acl_gym.callbacks.base import Callbacks
 from acl_gym.colony.greedy import epsilon_greedy_actions, epsilon_greedy_unchecked
+from acl_gym.colony.optimism import possible_levels
+from acl_gym.colony.starts import Starts
 from acl_gym.colony.walk import Walk
 from acl_gym.colony.walking_back import WalkBack
 from acl_gym.envs.wrappers.workers import spread_over_workers
 from acl_gym.partitions import Discrete, Partition
+from acl_gym.utils import validation
 from acl_gym.utils.parameters import Parameter
 from acl_gym.utils.typing import BoolArray, CellArray, FloatArray, IntArray
 
@@ -56,7 +61,8 @@ class ReturningACL(RememberingAgent, ColonyAgent):
         optimism: in [0, 1], what pairs promise that were never tried: with 0 the value
             of a good state, with 1 the most that could be had.
         walks_back: how often the ants walk back after each walk, >= 1.
-        older_paths: how many older paths they walk back beside the newest each time.
+        older_steps: how many steps of older paths they walk back beside the newest paths
+            each time, >= 0.
         steps_per_walk: after how many steps of all ants together they walk back, >= 1.
             Ants that have not finished go on from where they are.
         memory_size: how many states are remembered, >= 1.
@@ -65,6 +71,9 @@ class ReturningACL(RememberingAgent, ColonyAgent):
         max_cells: the partition does not become finer than this, >= 1.
         grows: whether the partition becomes wider and finer. None: if it was chosen for
             you.
+        restart_after: after how many steps all ants set out anew, though they have not
+            finished, >= 1. None takes 60 where they start anywhere, and never does so
+            where all start in the same place, see `acl_gym.colony.starts`.
         schedule: `"synchronous"`: an ant that has finished waits until all have.
             `"asynchronous"` (§7.3): it sets out again at once, until the last ant is back
             from its first way of the trial; the trial then ends for all, and paths that
@@ -118,8 +127,11 @@ class ReturningACL(RememberingAgent, ColonyAgent):
     walks_back = Parameter(
         "Walks back after each walk", whole=True, at_least=1, at_most=10_000
     )
-    older_paths = Parameter(
-        "Older paths in each walk back", whole=True, at_least=0, at_most=1_000_000
+    older_steps = Parameter(
+        "Steps of older paths in each walk back",
+        whole=True,
+        at_least=0,
+        at_most=1_000_000_000,
     )
     steps_per_walk = Parameter(
         "Steps of all ants before they walk back",
@@ -149,12 +161,13 @@ class ReturningACL(RememberingAgent, ColonyAgent):
         epsilon: float = 0.1,
         optimism: float = 1.0,
         walks_back: int = 10,
-        older_paths: int = 50,
+        older_steps: int = 10_000,
         steps_per_walk: int = 300,
         memory_size: int = 100_000,
-        visits_to_grow: float = 5.0,
+        visits_to_grow: float = 20.0,
         max_cells: int = 20_000,
         grows: bool | None = None,
+        restart_after: int | None = None,
         schedule: str = "synchronous",
         max_steps: int | None = None,
         seed: int | None = None,
@@ -170,9 +183,10 @@ class ReturningACL(RememberingAgent, ColonyAgent):
         self.epsilon = epsilon
         self.optimism = optimism
         self.visits_to_grow = visits_to_grow
-        self.walks_back, self.older_paths = walks_back, older_paths
+        self.walks_back, self.older_steps = walks_back, older_steps
         self.steps_per_walk = steps_per_walk
         self.max_cells = max_cells
+        self.restart_after = restart_after
         super().__init__(
             env,
             partition,
@@ -188,6 +202,7 @@ class ReturningACL(RememberingAgent, ColonyAgent):
         self.mix = mix
         shape = self.partition.n_cells, self.n_actions
         self._walk_back = WalkBack(np.zeros(shape))
+        self._starts = Starts()
 
     def learn(
         self,
@@ -221,21 +236,39 @@ class ReturningACL(RememberingAgent, ColonyAgent):
         with Training(self, *budget) as training:
             while training.next_trial():
                 observation = self.rollout.start(seed=self._next_seed())
-                while self.rollout._ants.size:
-                    walk, observation = self._walk(observation)
+                limit = self._steps_of_trial(observation)
+                while self.rollout._ants.size and self.rollout.steps < limit:
+                    walk, observation = self._walk(observation, limit)
                     newest = self._remember(walk)
                     self._promise(self.optimism)
+                    bounds = possible_levels(self._memory, self.discount)
                     for _ in range(self.walks_back):
-                        self._return(newest)
+                        self._return(newest, bounds)
                     self._split()
                 training.end_trial()
         return self
 
-    def _walk(self, observation: Any) -> tuple[Walk, Any]:
-        """Let the ants that still walk make some steps; return these and where they are."""
+    def _steps_of_trial(self, observation: NDArray[Any]) -> int:
+        """After how many steps all ants set out anew."""
+        self._starts.add(observation, self._memory)
+        if self.restart_after is not None:
+            return min(self.restart_after, self.max_steps)
+        return self._starts.steps(self.max_steps)
+
+    def _walk(self, observation: Any, limit: int) -> tuple[Walk, Any]:
+        """Let the ants that still walk make some steps; return these and where they are.
+
+        Args:
+            observation: where they are, of all slots.
+            limit: after how many steps of the trial they stop in any case.
+        """
         rollout, walk = self.rollout, Walk(self.num_envs)
         going = rollout._ants
-        while rollout._ants.size and walk.steps < self.steps_per_walk:
+        while (
+            rollout._ants.size
+            and walk.steps < self.steps_per_walk
+            and rollout.steps < limit
+        ):
             ants, allowed = rollout._ants, rollout.allowed()
             seen = observation[ants]
             index, degree = self._locate(observation, ants)
@@ -254,15 +287,16 @@ class ReturningACL(RememberingAgent, ColonyAgent):
             walk.stop(going, observation, on_the_way, rollout.allowed_after(going))
         return walk, observation
 
-    def _return(self, newest: IntArray) -> None:
+    def _return(self, newest: IntArray, bounds: tuple[float, float]) -> None:
         """Let the ants walk the newest paths back, and some older ones."""
         self._walk_back.walk(
             self._memory,
-            self._memory.with_older(newest, self.older_paths, self.rng),
+            self._memory.with_older(newest, self.older_steps, self.rng),
             discount=self.discount,
             mix=self.mix,
             rate=self.learning_rate,
             trust=self.trust,
+            bounds=bounds,
         )
 
     def _set_partition(
@@ -279,6 +313,17 @@ class ReturningACL(RememberingAgent, ColonyAgent):
     @property
     def _known(self) -> BoolArray:
         return self._walk_back.known
+
+    @property
+    def restart_after(self) -> int | None:
+        """After how many steps all ants set out anew; None: it depends on the starts."""
+        return self._restart_after
+
+    @restart_after.setter
+    def restart_after(self, value: int | None) -> None:
+        if value is not None:
+            value = validation.integer("restart_after", value, at_least=1)
+        self._restart_after = value
 
     def set_table(self, table: ArrayLike) -> None:
         """Replace all levels; all pairs then count as known.
@@ -299,16 +344,35 @@ class ReturningACL(RememberingAgent, ColonyAgent):
             "epsilon": self.epsilon,
             "optimism": self.optimism,
             "walks_back": self.walks_back,
-            "older_paths": self.older_paths,
+            "older_steps": self.older_steps,
             "steps_per_walk": self.steps_per_walk,
             "memory_size": self.memory_size,
             "visits_to_grow": self.visits_to_grow,
             "max_cells": self.max_cells,
             "grows": self.grows,
+            "restart_after": self.restart_after,
             "schedule": self.schedule,
             "max_steps": self.max_steps,
             "seed": self.seed,
         }
+
+    def _arrays(self) -> dict[str, NDArray[Any]]:
+        starts = {f"starts_{name}": a for name, a in self._starts.arrays().items()}
+        return {**super()._arrays(), **starts}
+
+    def _restore(
+        self, header: dict[str, Any], arrays: Mapping[str, NDArray[Any]]
+    ) -> None:
+        super()._restore(header, arrays)
+        self._starts.restore(with_prefix("starts_", arrays), self._memory)
+
+    def _state(self) -> Any:
+        return super()._state(), self._starts.copy()
+
+    def _take_over(self, table: FloatArray, state: Any) -> None:
+        remembered, starts = state
+        super()._take_over(table, remembered)
+        self._starts = starts.copy()
 
     def _explore(
         self, index: CellArray, degree: FloatArray, allowed: BoolArray | None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -133,6 +134,11 @@ class Memory:
         self._count(paths, 1)
         return paths
 
+    def live_rows(self) -> IntArray:
+        """The rows of all states that are remembered, in the order of time."""
+        begin = int(self.first[0]) if self.n_paths else self._used
+        return np.arange(begin, self._used)
+
     def with_older(
         self, newest: IntArray, most: int, rng: np.random.Generator
     ) -> IntArray:
@@ -140,8 +146,8 @@ class Memory:
 
         Args:
             newest: the numbers of the newest paths, as `add` gave them.
-            most: how many older ones are drawn where there are more, with replacement;
-                each is walked once.
+            most: how many steps the older ones have together, at most, but for one of
+                them.
             rng: draws them.
 
         Returns:
@@ -149,8 +155,10 @@ class Memory:
         """
         older = self.n_paths - newest.size
         drawn = np.arange(older)
-        if older > most:
-            drawn = np.unique(rng.integers(older, size=most))
+        steps = int((self.last[:older] - self.first[:older]).sum())
+        if steps > most:
+            share = math.ceil(older * most / steps)
+            drawn = np.sort(rng.choice(older, share, replace=False))
         return np.concatenate([drawn, newest])
 
     def set_partition(self, partition: Partition) -> None:

@@ -40,7 +40,7 @@ SETTINGS: dict[str, tuple[Callable[[], Any], dict[str, Any]]] = {
     "crisp": (pendulum, {"partition": crisp(), "replay": 3, "grows": True}),
     "taxi": (lambda: gymnasium_env("Taxi-v4"), {"replay": 3, "optimism": 1.0}),
     "lake": (lambda: gymnasium_env("FrozenLake-v1"), {"replay": 3, "optimism": 0.5}),
-    "small memory": (pendulum, {"replay": 2, "memory_size": 700, "older_paths": 3}),
+    "small memory": (pendulum, {"replay": 2, "memory_size": 700, "older_steps": 3}),
 }
 EACH = pytest.mark.parametrize("name", SETTINGS)
 
@@ -294,9 +294,9 @@ def test_another_number_of_slots() -> None:
 
 
 BAD: list[tuple[str, Any, type[Exception]]] = [
-    *[("replay", value, ValueError) for value in (-1, 10**9)],
+    *[("replay", value, ValueError) for value in (-1, 10**10)],
     *[("replay", value, TypeError) for value in (1.5, "3", True, None)],
-    *[("older_paths", value, ValueError) for value in (-1, 10**9)],
+    *[("older_steps", value, ValueError) for value in (-1, 10**10)],
     ("steps_per_replay", 0, ValueError),
     *[("memory_size", value, ValueError) for value in (0, 10**9)],
     *[("optimism", value, ValueError) for value in (-0.1, 1.1, np.nan)],

@@ -44,7 +44,7 @@ SETTINGS: dict[str, tuple[Callable[[], Any], dict[str, Any]]] = {
     "cart-pole": (lambda: gymnasium_env("CartPole-v1"), {}),
     "taxi": (lambda: gymnasium_env("Taxi-v4"), {}),
     "lake": (lambda: gymnasium_env("FrozenLake-v1"), {"trust": 0.5, "mix": 0.1}),
-    "small memory": (pendulum, {"memory_size": 700, "older_paths": 3}),
+    "small memory": (pendulum, {"memory_size": 700, "older_steps": 3}),
 }
 EACH = pytest.mark.parametrize("name", SETTINGS)
 
@@ -234,7 +234,7 @@ def test_callbacks_evaluate_a_growing_policy() -> None:
         ({"mix": -0.1}, r"mix must lie in"),
         ({"learning_rate": 0}, r"learning_rate must lie in \(0, 1\]"),
         ({"walks_back": 0}, "walks_back must be at least 1"),
-        ({"older_paths": -1}, "older_paths must be at least 0"),
+        ({"older_steps": -1}, "older_steps must be at least 0"),
         ({"steps_per_walk": 0}, "steps_per_walk must be at least 1"),
         ({"memory_size": 10**9}, "memory_size must be at most"),
         ({"max_cells": 0}, "max_cells must be at least 1"),

@@ -157,9 +157,14 @@ def test_older_paths_are_drawn_before_the_newest() -> None:
     colony = some_colony(np.random.default_rng(1), SHAPES[0], masked=False)
     memory, rng = colony.memory, np.random.default_rng(2)
     newest = np.arange(memory.n_paths - 2, memory.n_paths)
-    every = memory.with_older(newest, 100, rng)
+    older = memory.n_paths - 2
+    steps = int((memory.last - memory.first)[:older].sum())
+    every = memory.with_older(newest, steps, rng)
     assert every.tolist() == list(range(memory.n_paths))
-    some = memory.with_older(newest, 1, rng)
+    some = memory.with_older(newest, 1, rng)  # one path may exceed what was asked
     assert some[-2:].tolist() == newest.tolist()
     assert some.size == 3
     assert memory.with_older(newest, 0, rng).tolist() == newest.tolist()
+    half = memory.with_older(newest, steps // 2, rng)
+    assert half.size == 2 + -(-older * (steps // 2) // steps)
+    assert (np.diff(half) > 0).all()

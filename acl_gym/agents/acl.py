@@ -9,8 +9,8 @@ import numpy as np
 from gymnasium.vector import VectorEnv
 from numpy.typing import ArrayLike, NDArray
 
-from acl_gym.agents.base import TabularAgent
 from acl_gym.agents.bounds import PheromoneBoundWarning, warn_if_tau0_is_high
+from acl_gym.agents.colony import ColonyAgent
 from acl_gym.agents.saving import with_prefix
 from acl_gym.agents.training import Training
 from acl_gym.callbacks.base import Callbacks
@@ -44,7 +44,7 @@ from acl_gym.utils.typing import BoolArray, CellArray, FloatArray, IntArray, Row
 __all__ = ["ACL", "PheromoneBoundWarning"]
 
 
-class ACL(TabularAgent):
+class ACL(ColonyAgent):
     """A colony of ants that learns a control policy (van Ast, 2010).
 
     Each slot of the environment is an ant. Through a `Crisp` partition the agent is
@@ -89,6 +89,15 @@ class ACL(TabularAgent):
             trial, once for each ant that visited it, eq. (3.13). `"once_per_trial"`:
             once, however many ants visited it. Or an `UpdateRule`, of which the colony
             takes a copy.
+        schedule: `"synchronous"`: all ants of a trial wait for the last one, then deposit,
+            as in Algorithm 4.2. `"asynchronous"` (§7.3): an ant deposits as soon as it is
+            back, and sets out again as long as an ant is on its first way of the trial;
+            those on their way then walk to their end, and the trial is over. A trial is
+            then M episodes or more. Ants that come back in the same step deposit
+            together. Evaporation per M ants is that of a synchronous trial, see
+            `acl_gym.colony.update_rules.Reinforcement`; a `deposit` sees the costs of the
+            last M ants that came back. Not every environment can do it, see
+            `acl_gym.evaluation.stream.Stream`.
         tabu: forbid an ant to choose an action twice in the same cell in one trial
             (§3.4.2). For partitions with one cell per state.
         max_steps: T, the most steps an ant may make, >= 1. None takes the time limit of
@@ -110,7 +119,7 @@ class ACL(TabularAgent):
         3
     """
 
-    slots_are = "ants"
+    completes = True  # only complete solutions have a cost
 
     tau0 = Parameter("Initial pheromone level", "tau_0", fixed=True, above=0)
     local_decay = Parameter(
@@ -145,6 +154,7 @@ class ACL(TabularAgent):
         cost: Cost | Callable[[Episode], float] | None = None,
         deposit: str | Deposit | Callable[[FloatArray], FloatArray] = "inverse_cost",
         update: str | UpdateRule = "each_visit",
+        schedule: str = "synchronous",
         tabu: bool = False,
         max_steps: int | None = None,
         seed: int | None = None,
@@ -160,7 +170,12 @@ class ACL(TabularAgent):
         self.deposit = deposit
         self._update = as_update(update)
         super().__init__(
-            env, partition, max_steps=max_steps, seed=seed, n_actions=n_actions
+            env,
+            partition,
+            schedule=schedule,
+            max_steps=max_steps,
+            seed=seed,
+            n_actions=n_actions,
         )
         if not isinstance(tabu, bool):
             raise TypeError(
@@ -182,6 +197,8 @@ class ACL(TabularAgent):
         )
         self._solutions: Solutions | None = None
         self._rule = self._update  # of the trial under way; see `watched`
+        # Of the last ants that came back, at most M; kept by an asynchronous colony only.
+        self._latest_costs: FloatArray = np.empty(0)
         self._check_tau0()
 
     def learn(
@@ -229,6 +246,8 @@ class ACL(TabularAgent):
                 epsilon = self._set_exponents()
                 observation = rollout.start(seed=self._next_seed(), record=record)
                 rule.start_trial(pheromone, self.trials)
+                costs: list[FloatArray] = []
+                n_back = 0
                 while rollout._ants.size:  # 7, 17: repeat until t = T or C is empty
                     ants = rollout._ants
                     # 8: fuzzify the states
@@ -244,13 +263,20 @@ class ACL(TabularAgent):
                     rule.local_update(
                         pheromone, index, degree, actions, self.local_decay
                     )
-                # 18-20: global pheromone update with all solutions, in general (4.15)
-                result = self._result(rollout, solutions)
-                rule.global_update(
-                    pheromone, result, self.local_decay, self.global_decay
-                )
+                    # 18-20: global pheromone update, in general (4.15): with all
+                    # solutions once the last ant is back, or with each at once
+                    ants_back = rollout.returned
+                    if ants_back is not None:
+                        result = self._result(rollout, ants_back, solutions, n_back)
+                        n_back += ants_back.size
+                        rule.global_update(
+                            pheromone, result, self.local_decay, self.global_decay
+                        )
+                        costs.append(result.costs)
+                        solutions.clear(ants_back)
+                        observation = rollout.set_out(observation)
                 pheromone.check_levels()
-                training.end_trial(result.costs)  # 21: k <- k + 1
+                training.end_trial(np.concatenate(costs))  # 21: k <- k + 1
         return self
 
     @property
@@ -367,6 +393,7 @@ class ACL(TabularAgent):
             "cost": to_settings(self.cost),
             "deposit": to_settings(self.deposit),
             "update": to_settings(self.update),
+            "schedule": self.schedule,
             "tabu": self.tabu,
             "max_steps": self.max_steps,
             "seed": self.seed,
@@ -392,12 +419,19 @@ class ACL(TabularAgent):
         arrays = {f"update_{name}": a for name, a in self.update.memory().items()}
         if self.heuristic is not None:
             arrays["heuristic"] = self.heuristic
+        if self.is_asynchronous:
+            arrays["latest_costs"] = self._latest_costs
         return arrays
 
     def _restore(
         self, header: dict[str, Any], arrays: Mapping[str, NDArray[Any]]
     ) -> None:
         super()._restore(header, arrays)
+        if self.is_asynchronous and "latest_costs" in arrays:
+            latest = validation.real_array(
+                "latest_costs", arrays["latest_costs"], ndim=1
+            )
+            self._latest_costs = latest
         memory = with_prefix("update_", arrays)
         if memory:
             saved = update_from_settings(header["parameters"]["update"])
@@ -414,6 +448,8 @@ class ACL(TabularAgent):
         memory = with_prefix("update_", arrays)
         if memory:
             self.update.restore(memory)
+        if self.is_asynchronous:
+            self._latest_costs = arrays["latest_costs"]
 
     def measures(self, policy: IntArray) -> Row:
         """The mean sensitivity of the policy (3.48) over the cells, in [0, 1]."""
@@ -440,14 +476,35 @@ class ACL(TabularAgent):
         """Whether the cost or the update rule looks at every step of a solution."""
         return self.cost is not None or self.update.needs_episodes
 
-    def _result(self, rollout: Rollout, solutions: Solutions) -> TrialResult:
-        """The solutions of a trial, what they cost, and what is deposited for them."""
-        episodes = rollout.episodes() if self._needs_episodes() else None
-        costs = rollout.cost
+    def _result(
+        self, rollout: Rollout, ants: IntArray, solutions: Solutions, before: int
+    ) -> TrialResult:
+        """The solutions of the ants that are back, what they cost, and what they deposit.
+
+        Args:
+            rollout: where they walked.
+            ants: who is back, `(m,)`.
+            solutions: of all ants.
+            before: how many have come back in this trial before.
+        """
+        episodes = rollout.returned_episodes() if self._needs_episodes() else None
+        costs = rollout.cost[ants]
         if self.cost is not None and episodes is not None:
             costs = solution_costs(self.cost, episodes)
-        deposits = checked_deposits(self._deposit(costs, self.tau0), costs.size)
-        return TrialResult(solutions, costs, deposits, rollout.terminated, episodes)
+        compared, batch = costs, None
+        if self.is_asynchronous:
+            batch = before // self.num_envs
+            compared = np.concatenate([self._latest_costs, costs])[-self.num_envs :]
+            self._latest_costs = compared
+        deposits = checked_deposits(self._deposit(compared, self.tau0), compared.size)
+        return TrialResult(
+            solutions.of(ants),
+            costs,
+            deposits[-ants.size :],
+            rollout.terminated[ants],
+            episodes,
+            batch,
+        )
 
     def _allowed(
         self, rollout: Rollout, solutions: Solutions, index: CellArray

@@ -60,7 +60,7 @@ class TabularAgent(SavedAgent):
         trials: trials finished, k.
         seconds: wall-clock time spent learning, without callbacks.
         history: one row per trial: `trial`, `env_steps`, `seconds` (all three
-            cumulated), `ants_cost` (mean J of the ants), `policy_variation` (§3.6.1),
+            cumulated), `ants_cost` (mean J of the episodes), `policy_variation` (§3.6.1),
             what the agent adds in `measures`, and, where a `PolicyEvaluation` ran,
             `policy_cost` (3.47). In environments of other packages also the undiscounted
             `ants_return` and `policy_return`. Where success is known, in environments
@@ -110,7 +110,7 @@ class TabularAgent(SavedAgent):
             )
         self._n_actions = n_actions
         if env is not None:
-            self._attach(Rollout(env, self.max_steps))
+            self._attach(self._new_rollout(env))
         n_cells = self.partition.n_cells
         validation.check_memory(
             f"the tables of {n_cells} cells and {self.n_actions} actions",
@@ -241,13 +241,17 @@ class TabularAgent(SavedAgent):
                 "set_env must not be called while a trial is under way; call it between "
                 "trials, such as in a callback's on_trial_end, or after learn."
             )
-        rollout = Rollout(env, self.max_steps)
+        rollout = self._new_rollout(env)
         if rollout.first_action != self.first_action:
             raise ValueError(
                 f"env's actions must begin at {self.first_action} as the table's do, "
                 f"got {rollout.first_action}."
             )
         self._attach(rollout)
+
+    def _new_rollout(self, env: VectorEnv[Any, Any, Any]) -> Rollout:
+        """How the slots of an environment walk."""
+        return Rollout(env, self.max_steps)
 
     def _attach(self, rollout: Rollout) -> None:
         if self._n_actions not in (None, rollout.n_actions):

@@ -267,14 +267,15 @@ class QLearning(RememberingAgent):
                 observation = step.observation
                 done = step.ants[step.finished]
                 if done.size:
-                    walk.stop(done, observation, rollout.allowed_after(done))
+                    goal = step.terminated[step.finished]
+                    walk.stop(done, observation, goal, rollout.allowed_after(done))
                 if walk.steps >= self.steps_per_replay:
                     break
             allowed, stays = next_allowed, ~step.finished
             index, degree = next_index[stays], next_degree[stays]
         if walk is not None and rollout._ants.size:
-            ants = rollout._ants
-            walk.stop(ants, observation, rollout.allowed_after(ants))
+            ants, on_the_way = rollout._ants, np.zeros(rollout._ants.size, np.bool_)
+            walk.stop(ants, observation, on_the_way, rollout.allowed_after(ants))
         return walk, observation
 
     def _learn_again(self, walk: Walk) -> None:

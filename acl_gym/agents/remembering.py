@@ -37,6 +37,7 @@ class RememberingAgent(TabularAgent):
         max_steps: see `TabularAgent`.
         seed: see `TabularAgent`.
         n_actions: see `TabularAgent`.
+        of_other_bases: what the next base takes, where there is another.
     """
 
     always_remembers: ClassVar[bool] = False
@@ -61,6 +62,7 @@ class RememberingAgent(TabularAgent):
         max_steps: int | None,
         seed: int | None,
         n_actions: int | None,
+        **of_other_bases: Any,
     ) -> None:
         self._growth = Growth(grows)
         self._kept_memory: Memory | None = None
@@ -68,7 +70,12 @@ class RememberingAgent(TabularAgent):
         if partition is None and self.grows and env is not None:
             partition = initial_partition(env)
         super().__init__(
-            env, partition, max_steps=max_steps, seed=seed, n_actions=n_actions
+            env,
+            partition,
+            max_steps=max_steps,
+            seed=seed,
+            n_actions=n_actions,
+            **of_other_bases,
         )
 
     @property
@@ -126,7 +133,7 @@ class RememberingAgent(TabularAgent):
         if self.grows and isinstance(self.partition, Grid):
             space: Any = self.rollout.env.single_observation_space
             self._grow_to(self._growth.wider(self.partition, walk.states(), space))
-        return self._memory.add(walk, self.rollout.terminated)
+        return self._memory.add(walk)
 
     def _promise(self, optimism: float) -> None:
         """Set what pairs promise of which nothing is known yet."""

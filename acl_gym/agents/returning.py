@@ -8,18 +8,20 @@ import numpy as np
 from gymnasium.vector import VectorEnv
 from numpy.typing import ArrayLike
 
+from acl_gym.agents.colony import ColonyAgent
 from acl_gym.agents.remembering import RememberingAgent
 from acl_gym.agents.training import Training
 from acl_gym.callbacks.base import Callbacks
 from acl_gym.colony.greedy import epsilon_greedy_actions, epsilon_greedy_unchecked
 from acl_gym.colony.walk import Walk
 from acl_gym.colony.walking_back import WalkBack
+from acl_gym.envs.wrappers.workers import spread_over_workers
 from acl_gym.partitions import Discrete, Partition
 from acl_gym.utils.parameters import Parameter
 from acl_gym.utils.typing import BoolArray, CellArray, FloatArray, IntArray
 
 
-class ReturningACL(RememberingAgent):
+class ReturningACL(RememberingAgent, ColonyAgent):
     """A colony whose ants walk back from where they end, and which remembers.
 
     Each slot of the environment is an ant, as in `ACL`, and all share one table of
@@ -63,10 +65,21 @@ class ReturningACL(RememberingAgent):
         max_cells: the partition does not become finer than this, >= 1.
         grows: whether the partition becomes wider and finer. None: if it was chosen for
             you.
+        schedule: `"synchronous"`: an ant that has finished waits until all have.
+            `"asynchronous"` (§7.3): it sets out again at once, until the last ant is back
+            from its first way of the trial; the trial then ends for all, and paths that
+            end there are remembered as far as they go. No ant ever waits. A trial is then
+            M episodes or more. Not every environment can do it, see
+            `acl_gym.evaluation.stream.Stream`.
         max_steps: T, the most steps an ant may make, >= 1. None takes the time limit of
             the environment, or 300 if it has none.
         seed: the same seed gives the same run; None draws one from the system.
         n_actions: only needed without an environment.
+        workers: lets the ants walk in so many workers, >= 0, for environments that are
+            slow to step: the single environments of `env` are made anew in a
+            `WorkersVectorEnv`, the agent's `env`. The bits are the same for any number.
+            None leaves `env` as it is.
+        executor: where workers are, "processes" or "ray", see `WorkersVectorEnv`.
 
     Raises:
         TypeError: `env` or `partition` is of the wrong kind.
@@ -81,8 +94,8 @@ class ReturningACL(RememberingAgent):
         True
     """
 
-    slots_are = "ants"
     always_remembers = True
+    completes = False  # what an ant has done until then is remembered in any case
 
     discount = Parameter(
         "Weight of what follows a step", "gamma_rl", at_least=0, at_most=1
@@ -142,10 +155,15 @@ class ReturningACL(RememberingAgent):
         visits_to_grow: float = 5.0,
         max_cells: int = 20_000,
         grows: bool | None = None,
+        schedule: str = "synchronous",
         max_steps: int | None = None,
         seed: int | None = None,
         n_actions: int | None = None,
+        workers: int | None = None,
+        executor: str = "processes",
     ) -> None:
+        if workers is not None:
+            env = spread_over_workers(env, workers, executor)
         self.discount = discount
         self.learning_rate = learning_rate
         self.trust = trust
@@ -160,6 +178,7 @@ class ReturningACL(RememberingAgent):
             partition,
             grows=partition is None if grows is None else grows,
             memory_size=memory_size,
+            schedule=schedule,
             max_steps=max_steps,
             seed=seed,
             n_actions=n_actions,
@@ -180,8 +199,8 @@ class ReturningACL(RememberingAgent):
     ) -> Self:
         """Let the ants walk, remember, walk back and, where it may, the partition grow.
 
-        A trial is one episode in every slot. Called again, it continues from the levels
-        and the memory as they are.
+        A trial is one episode in every slot, or more, see `schedule`. Called again, it
+        continues from the levels and the memory as they are.
 
         Args:
             total_timesteps: stop after the trial that reaches this many steps of all
@@ -215,6 +234,7 @@ class ReturningACL(RememberingAgent):
     def _walk(self, observation: Any) -> tuple[Walk, Any]:
         """Let the ants that still walk make some steps; return these and where they are."""
         rollout, walk = self.rollout, Walk(self.num_envs)
+        going = rollout._ants
         while rollout._ants.size and walk.steps < self.steps_per_walk:
             ants, allowed = rollout._ants, rollout.allowed()
             seen = observation[ants]
@@ -224,13 +244,14 @@ class ReturningACL(RememberingAgent):
             )
             step = rollout._step(actions)
             walk.append(ants, seen, actions, -step.cost, allowed)
-            observation = step.observation
-            if step.finished.any():
-                done = ants[step.finished]
-                walk.stop(done, observation, rollout.allowed_after(done))
-        if rollout._ants.size:
-            ants = rollout._ants
-            walk.stop(ants, observation, rollout.allowed_after(ants))
+            observation, going = step.observation, ants[~step.finished]
+            if going.size < ants.size:
+                done, goal = ants[step.finished], step.terminated[step.finished]
+                walk.stop(done, observation, goal, rollout.allowed_after(done))
+                observation = rollout.set_out(observation)
+        if going.size:  # others may have set out, but made no step yet
+            on_the_way = np.zeros(going.size, np.bool_)
+            walk.stop(going, observation, on_the_way, rollout.allowed_after(going))
         return walk, observation
 
     def _return(self, newest: IntArray) -> None:
@@ -284,6 +305,7 @@ class ReturningACL(RememberingAgent):
             "visits_to_grow": self.visits_to_grow,
             "max_cells": self.max_cells,
             "grows": self.grows,
+            "schedule": self.schedule,
             "max_steps": self.max_steps,
             "seed": self.seed,
         }

@@ -13,6 +13,7 @@ from tqdm.auto import tqdm
 from acl_gym.agents.base import TabularAgent
 from acl_gym.callbacks.base import Callbacks, as_callbacks, is_stop
 from acl_gym.evaluation import reports_returns
+from acl_gym.evaluation.rollout import Outcome
 from acl_gym.partitions import locate_all
 from acl_gym.utils import validation
 from acl_gym.utils.serialization import check_row
@@ -125,11 +126,11 @@ class Training:
         """Count the trial, measure it (§3.6.1) and call the callbacks.
 
         Args:
-            costs: J of each ant; None takes the sums of the stage costs.
+            costs: J of each finished episode; None takes the sums of the stage costs.
         """
-        agent, rollout = self._agent, self._agent.rollout
+        agent, outcome = self._agent, self._agent.rollout.outcome()
         agent.busy = False
-        steps = int(rollout.length.sum())
+        steps = outcome.n_steps
         agent.num_timesteps += steps
         agent.trials += 1
         agent.seconds += time.perf_counter() - self._clock
@@ -138,8 +139,8 @@ class Training:
             "trial": agent.trials,
             "env_steps": agent.num_timesteps,
             "seconds": agent.seconds,
-            "ants_cost": float((rollout.cost if costs is None else costs).mean()),
-            **self._outcomes(),
+            "ants_cost": float((outcome.costs if costs is None else costs).mean()),
+            **self._outcomes(outcome),
             "policy_variation": float(np.mean(policy != self._before())),
             **agent.measures(policy),
         }
@@ -163,14 +164,13 @@ class Training:
         cells = index[np.arange(len(index)), foremost]
         return np.asarray(self._policy[cells])
 
-    def _outcomes(self) -> Row:
+    def _outcomes(self, outcome: Outcome) -> Row:
         """The measures of the ants that not every environment has."""
-        rollout = self._agent.rollout
         found: Row = {}
-        if reports_returns(rollout.env):
-            found["ants_return"] = float(-rollout.cost.mean())
-        if rollout.success is not None:
-            found["ants_success_rate"] = float(rollout.success.mean())
+        if reports_returns(self._agent.rollout.env):
+            found["ants_return"] = float(-outcome.costs.mean())
+        if outcome.success is not None:
+            found["ants_success_rate"] = float(outcome.success.mean())
         return found
 
     def _report(self, row: Row, progress: int) -> None:

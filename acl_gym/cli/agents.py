@@ -49,6 +49,7 @@ AGENTS = {
 
 
 CHOICES = {
+    "schedule": ("synchronous", "asynchronous"),
     "selection": ("max_boltzmann", "boltzmann", "epsilon_greedy"),
     "traces": ("replacing", "accumulating"),
     "update": ("each_visit", "in_turn", "once_per_ant", "once_per_trial"),

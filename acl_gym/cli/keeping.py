@@ -169,5 +169,5 @@ def _costs(agent: Any) -> Any:
     from acl_gym.colony.costs import solution_costs
 
     if agent.cost is None:
-        return agent.rollout.cost
+        return agent.rollout.outcome().costs
     return solution_costs(agent.cost, agent.rollout.episodes())

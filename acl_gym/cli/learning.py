@@ -326,9 +326,10 @@ def _failed(error: Exception, learner: Any, begun: int, target: Path) -> Excepti
     deposit = getattr(learner, "deposit", None)
     if isinstance(deposit, InverseCost) and getattr(learner, "cost", None) is None:
         rollout = learner.rollout
-        costs = getattr(rollout, "cost", None)  # there is none before the first walk
-        costs = np.ones(1) if costs is None else costs + deposit.offset
-        if (costs <= 0.0).any() and not rollout.ants.size:  # all walks are complete
+        # Before the first walk there are none.
+        back = getattr(rollout, "returned", None)
+        costs = np.ones(1) if back is None else rollout.cost[back] + deposit.offset
+        if (costs <= 0.0).any():
             words = (
                 "ants deposit 1 / cost, and costs must be > 0, but an ant has cost "
                 f"{costs.min():g}: the rewards are not negative costs. Add --param "

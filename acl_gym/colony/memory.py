@@ -98,12 +98,11 @@ class Memory:
         """U_q of each state, `(rows, n_actions)`; empty where all is allowed."""
         return self._rows.get("allowed", ALL)
 
-    def add(self, walk: Walk, terminated: BoolArray) -> IntArray:
+    def add(self, walk: Walk) -> IntArray:
         """Remember what ants have done, in the order of their numbers.
 
         Args:
-            walk: their steps.
-            terminated: whether each slot is in a terminal state now, `(n_slots,)`.
+            walk: their paths.
 
         Returns:
             The numbers of these paths.
@@ -112,7 +111,7 @@ class Memory:
             ValueError: an observation does not belong to the partition, or is not like
                 those before.
         """
-        count, new = walk.rows()
+        added, new = walk.rows()
         seen = new["seen"]
         size = len(seen)
         self._forget(self.most - size)
@@ -127,12 +126,10 @@ class Memory:
             elif name == "allowed":
                 kept[rows] = True
         self._locate(seen, rows)
-        walked = count > 0
-        ends = rows.start + np.cumsum(count)[walked]
-        paths = np.arange(self.n_paths, self.n_paths + ends.size)
-        self.first = np.concatenate([self.first, ends - count[walked]])
-        self.last = np.concatenate([self.last, ends - 1])
-        self.terminated = np.concatenate([self.terminated, terminated[walked]])
+        paths = np.arange(self.n_paths, self.n_paths + added.first.size)
+        self.first = np.concatenate([self.first, rows.start + added.first])
+        self.last = np.concatenate([self.last, rows.start + added.last])
+        self.terminated = np.concatenate([self.terminated, added.terminated])
         self._count(paths, 1)
         return paths
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
@@ -91,6 +92,9 @@ class Solutions(Fixed):
             self._size, dtype=np.min_scalar_type(n_actions - 1)
         )
         self._length: IntArray = np.zeros(n_ants, dtype=np.int64)
+        # Of a part of a colony: which ants these are, and of how many.
+        self._ants: IntArray = np.arange(n_ants)
+        self._n_slots = n_ants
         self._n_actions, self._n_cells = n_actions, partition.n_cells
         self._k = partition.cells_per_state
         self._one_cell = self._k == 1
@@ -109,9 +113,25 @@ class Solutions(Fixed):
         """How many pairs there is memory for; `_place` computes where each lies."""
         return (self._room_for_steps + RUN - 1) // RUN * RUN * self.n_ants
 
-    def clear(self) -> None:
-        """Forget all solutions."""
-        self._length[:] = 0
+    def clear(self, ants: IntArray | None = None) -> None:
+        """Forget the solutions of some ants; None: of all."""
+        self._length[slice(None) if ants is None else ants] = 0
+
+    def of(self, ants: IntArray) -> Solutions:
+        """The solutions of some ants, to be looked at until the next step.
+
+        Args:
+            ants: different ones in ascending order, `(m,)`; in what is returned they are
+                0, 1, ... m - 1.
+        """
+        if ants.size == self.n_ants:
+            return self
+        if self._rows is not None:
+            self._room_for(self._rows)  # scratch that both then use
+        some = copy.copy(self)
+        some.__dict__["n_ants"] = int(ants.size)  # fixed for everyone else
+        some._ants, some._length = self._ants[ants], self._length[ants]
+        return some
 
     def append(
         self,
@@ -245,7 +265,14 @@ class Solutions(Fixed):
             size = int(ends[last - 1]) - done
             places, action = room.places[:size], room.action[:size]
             index, degree = room.index[:size], room.degree[:size]
-            _collect(first, last, self._length, self._action, places, action)
+            _collect(
+                self._ants[first:last],
+                self._length[first:last],
+                self._n_slots,
+                self._action,
+                places,
+                action,
+            )
             seen = index if self._one_cell else room.seen[:size]
             np.take(rows, places, axis=0, out=seen, mode="clip")  # all are in range
             if not self._one_cell:
@@ -329,18 +356,19 @@ def _append(
 
 @njit
 def _collect(
-    first: int,
-    last: int,
+    ants: IntArray,
     length: IntArray,
+    n_slots: int,
     all_action: ActionArray,
     places: IntArray,
     action: ActionArray,
 ) -> None:
-    """Where the steps of ants first .. last - 1 lie, one ant after the other."""
+    """Where the steps of ants lie, `length` of each, one ant after the other."""
     row = np.uint64(0)
-    for ant in range(first, last):
-        for t in range(length[ant]):
-            place = _place(t, ant, length.size)
+    for j in range(ants.size):
+        ant = ants[j]
+        for t in range(length[j]):
+            place = _place(t, ant, n_slots)
             places[row] = place
             action[row] = all_action[place]
             row += np.uint64(1)

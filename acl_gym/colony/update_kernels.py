@@ -137,17 +137,27 @@ def reinforce(
     global_decay: float,
     levels: FloatArray,
     stale: BoolArray,
+    evaporated: FloatArray | None = None,
 ) -> None:
     """Global update, eq. (4.15), of the touched pairs.
 
-    Resets all but the first column of `summed`.
+    Resets all but the first column of `summed`. Pairs evaporate by `global_decay` times
+    their largest degree, or, where they have `evaporated` with some degree already, by
+    what is missing; then the new largest degree is noted there.
     """
     n_actions = levels.shape[1]
     for pair in touched:
         cell, u = pair // n_actions, pair % n_actions
         deposit = summed[pair, _TOTAL] + summed[pair, _DUE]
-        kept = (1.0 - global_decay * summed[pair, _LARGEST]) * levels[cell, u]
-        levels[cell, u] = kept + global_decay * deposit
+        left = 1.0 - global_decay * summed[pair, _LARGEST]
+        if evaporated is not None:
+            before = evaporated[pair]
+            if before < summed[pair, _LARGEST]:
+                left /= 1.0 - global_decay * before
+                evaporated[pair] = summed[pair, _LARGEST]
+            else:
+                left = 1.0
+        levels[cell, u] = left * levels[cell, u] + global_decay * deposit
         stale[cell] = True
         summed[pair, 1:] = 0.0
 

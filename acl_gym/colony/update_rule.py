@@ -29,6 +29,11 @@ class TrialResult:
         terminated: whether each ant ended in a terminal state, `(n_ants,)`.
         episodes: observations, actions and stage costs, step by step; None unless
             the rule's `needs_episodes` is True.
+        batch: None where these are all M ants of a trial. In an asynchronous colony
+            (§7.3) they are those that have come back in one step: `solutions` and arrays
+            hold only these, and `batch` = 0, 1, ... counts how often M ants have come
+            back since the trial began. What happens once in a synchronous trial of M
+            ants is due once for each batch.
     """
 
     solutions: Solutions
@@ -36,6 +41,7 @@ class TrialResult:
     deposits: FloatArray
     terminated: BoolArray
     episodes: Episodes | None = None
+    batch: int | None = None
 
 
 class UpdateRule(Savable, ABC):
@@ -47,7 +53,8 @@ class UpdateRule(Savable, ABC):
     `load` it hands out in `memory`.
 
     In each trial a colony calls `start_trial`, then `choose` and `local_update` in
-    every step, then `global_update`. Predictions never call a rule.
+    every step, then `global_update`; an asynchronous colony calls `global_update` after
+    each step in which ants come back. Predictions never call a rule.
 
     Attributes:
         needs_episodes: whether `TrialResult.episodes` is recorded, which costs memory
@@ -116,7 +123,7 @@ class UpdateRule(Savable, ABC):
         local_decay: float,
         global_decay: float,
     ) -> None:
-        """Change the pheromone after a trial.
+        """Change the pheromone after a trial, or when some ants have come back.
 
         Args:
             pheromone: the shared table, changed in place.

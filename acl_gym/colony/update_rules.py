@@ -48,6 +48,12 @@ class Reinforcement:
         self._summed: FloatArray = np.zeros((n_pairs, 4))
         self._touched: IntArray = np.empty(n_pairs + 1, dtype=np.int64)
         self._interrupted = False  # an update that did not end left the scratch dirty
+        self._batch: int | None = None
+        self._evaporated: FloatArray | None = None
+
+    def start_trial(self) -> None:
+        """Begin a trial, whose batches are counted from 0."""
+        self._batch = None
 
     def __call__(
         self,
@@ -55,12 +61,28 @@ class Reinforcement:
         solutions: Solutions,
         deposits: FloatArray,
         global_decay: float,
+        batch: int | None = None,
     ) -> None:
         """Reinforce along every solution.
 
         Within a solution a pair counts once, with its largest degree (4.13); the
         deposit is summed over ants, the decay weighs with the largest degree over
         all ants (4.14). Cells that no ant visited are not touched.
+
+        In an asynchronous colony only some of the M ants of a batch have come back. The
+        thesis leaves open how much a pair evaporates for them (a decision): as much as
+        makes it, over the batch, what it would be in a synchronous trial of the same M
+        solutions, 1 - rho times the largest degree. The first of them that has visited a
+        pair pays for all, those after it only for what their degree exceeds. To let
+        every ant evaporate by rho', (1 - rho')^M = 1 - rho, would make the sum over ants
+        a mean: a pair that one ant has tried could come to as much as one that all took.
+
+        Args:
+            pheromone: the shared table, changed in place.
+            solutions: of the ants that deposit.
+            deposits: of each of them.
+            global_decay: rho, in [0, 1].
+            batch: to which they belong, see `TrialResult`; None: they are all.
 
         Raises:
             ValueError: a deposit is not positive and finite.
@@ -95,9 +117,25 @@ class Reinforcement:
             )
         touched = self._touched[:n_touched]
         reinforce(
-            touched, self._summed, global_decay, pheromone.levels, pheromone.stale
+            touched,
+            self._summed,
+            global_decay,
+            pheromone.levels,
+            pheromone.stale,
+            self._evaporated_in(batch),
         )
         self._interrupted = False
+
+    def _evaporated_in(self, batch: int | None) -> FloatArray | None:
+        """With which degree each pair has evaporated in this batch; None: not at all."""
+        if batch is None:
+            return None
+        if self._evaporated is None:
+            self._evaporated = np.zeros(len(self._summed))
+        if batch != self._batch:
+            self._batch = batch
+            self._evaporated[:] = 0.0
+        return self._evaporated
 
 
 def _check_deposits(deposits: FloatArray) -> None:
@@ -121,6 +159,11 @@ class _DepositAtEnd(UpdateRule):
 
     _reinforcement: Reinforcement | None = None
 
+    def start_trial(self, pheromone: Pheromone, trial: int) -> None:
+        """See `UpdateRule`."""
+        if self._reinforcement is not None:
+            self._reinforcement.start_trial()
+
     def global_update(
         self,
         pheromone: Pheromone,
@@ -131,7 +174,9 @@ class _DepositAtEnd(UpdateRule):
         """Deposit along every solution, eq. (4.15); see `Reinforcement`."""
         if self._reinforcement is None:
             self._reinforcement = Reinforcement(pheromone.levels.size)
-        self._reinforcement(pheromone, result.solutions, result.deposits, global_decay)
+        self._reinforcement(
+            pheromone, result.solutions, result.deposits, global_decay, result.batch
+        )
 
 
 @dataclass
@@ -283,7 +328,10 @@ class OncePerAnt(_AtTheEnd):
 
 @dataclass
 class OncePerTrial(_AtTheEnd):
-    """A pair decays once per trial, with the largest degree of all its visits."""
+    """A pair decays once per trial, with the largest degree of all its visits.
+
+    In an asynchronous colony: once for all ants that come back in the same step.
+    """
 
     _each_ant = False
 

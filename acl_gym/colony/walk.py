@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,9 +10,24 @@ from numpy.typing import NDArray
 from acl_gym.utils.compiling import njit
 from acl_gym.utils.typing import BoolArray, FloatArray, IntArray
 
+_STEP, _END, _GOAL = 0, 1, 2  # what a row is: a step, or where a path ends, and how
+
+
+class Paths(NamedTuple):
+    """Where paths lie in rows of states, `(n_paths,)` each."""
+
+    first: IntArray
+    """The row of the first state."""
+    last: IntArray
+    """The row of the last state."""
+    terminated: BoolArray
+    """Whether that is a terminal state."""
+
 
 class Walk:
     """What the ants do in a part of a trial, step by step, until it is remembered.
+
+    An ant that sets out again after it has stopped begins another path.
 
     Args:
         n_slots: M, the number of ants.
@@ -25,6 +40,7 @@ class Walk:
         self._actions: list[IntArray] = []
         self._rewards: list[FloatArray] = []
         self._allowed: list[BoolArray | None] = []
+        self._kinds: list[NDArray[np.int8]] = []
         self.steps = 0
 
     def append(
@@ -45,24 +61,38 @@ class Walk:
             rewards: what they got for it, `(m,)`.
             allowed: U_q of each of them before the step, `(m, n_actions)`; None: all.
         """
-        self._add(ants, seen, actions, rewards, allowed)
+        kinds = np.full(ants.size, _STEP, dtype=np.int8)
+        self._add(ants, seen, actions, rewards, allowed, kinds)
         self.steps += ants.size
 
     def stop(
-        self, ants: IntArray, observation: NDArray[Any], allowed: BoolArray | None
+        self,
+        ants: IntArray,
+        observation: NDArray[Any],
+        terminated: BoolArray,
+        allowed: BoolArray | None,
     ) -> None:
-        """Add the states in which ants stand when their walks are remembered.
+        """Add the states in which paths end, so that they can be remembered.
 
         Args:
-            ants: who stops, `(m,)`.
+            ants: whose paths, `(m,)`; each has made a step since the last one ended.
             observation: of all slots, `(n_slots, ...)`.
+            terminated: whether these are terminal states, `(m,)`.
             allowed: see `append`.
         """
-        self._add(ants, observation[ants], _zeros(ants), _zeros(ants), allowed)
+        kinds = np.where(terminated, _GOAL, _END).astype(np.int8)
+        self._add(ants, observation[ants], _zeros(ants), _zeros(ants), allowed, kinds)
 
     def _add(
-        self, ants: Any, seen: Any, actions: Any, rewards: Any, allowed: Any
+        self,
+        ants: Any,
+        seen: Any,
+        actions: Any,
+        rewards: Any,
+        allowed: Any,
+        kinds: Any,
     ) -> None:
+        self._kinds.append(kinds)
         self._ants.append(ants)
         self._seen.append(seen)
         self._actions.append(actions)
@@ -73,13 +103,13 @@ class Walk:
         """All observations, in the order of time, `(n, ...)`."""
         return np.concatenate(self._seen)
 
-    def rows(self) -> tuple[IntArray, dict[str, NDArray[Any]]]:
-        """All of it, ant by ant.
+    def rows(self) -> tuple[Paths, dict[str, NDArray[Any]]]:
+        """All of it, ant by ant, and the paths of an ant in the order of time.
 
         Returns:
-            The number of states of each ant, `(n_slots,)`, and of all states, `(n, ...)`,
-            what was "seen", the "action", the "reward", and what was "allowed", if there
-            are masks.
+            The paths, all of which have ended, and of all states, `(n, ...)`, what was
+            "seen", the "action", the "reward", and what was "allowed", if there are
+            masks.
         """
         ants = np.concatenate(self._ants)
         count = np.bincount(ants, minlength=self._n_slots)
@@ -99,7 +129,10 @@ class Walk:
             name: np.take(np.concatenate(part), order, axis=0)
             for name, part in parts.items()
         }
-        return count, rows
+        kinds = np.concatenate(self._kinds)[order]
+        last = np.flatnonzero(kinds)
+        first = np.concatenate([[0], last[:-1] + 1])
+        return Paths(first, last, kinds[last] == _GOAL), rows
 
 
 def _zeros(ants: IntArray) -> Any:

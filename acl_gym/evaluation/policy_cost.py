@@ -15,7 +15,8 @@ from acl_gym.colony.costs import Cost, as_cost, solution_costs
 from acl_gym.colony.episodes import Episode
 from acl_gym.envs.control.environments import ControlVectorEnv
 from acl_gym.envs.control.single import ControlEnv
-from acl_gym.evaluation.rollout import Rollout, rows_of
+from acl_gym.evaluation.rollout import Rollout
+from acl_gym.evaluation.rows import rows_of
 from acl_gym.policies import PartitionPolicy
 from acl_gym.utils import validation
 from acl_gym.utils.pictures import guarded, table

@@ -19,7 +19,8 @@ from acl_gym.colony.episodes import Episodes
 from acl_gym.envs import received
 from acl_gym.envs.control.environments import ControlVectorEnv, is_native
 from acl_gym.envs.wrappers.partial_reset import reset_slots
-from acl_gym.envs.wrappers.waiting import WaitingVectorEnv
+from acl_gym.envs.wrappers.waiting import WaitingSlots
+from acl_gym.evaluation.rows import fixed, require_array, set_row
 from acl_gym.utils import validation
 from acl_gym.utils.compiling import njit
 from acl_gym.utils.typing import BoolArray, FloatArray, IntArray
@@ -41,6 +42,17 @@ class Step(NamedTuple):
     """Whether the episode ended in a terminal state."""
     finished: BoolArray
     """Whether the episode is over: a terminal state, the environment's limit or T."""
+
+
+class Outcome(NamedTuple):
+    """What the episodes of a trial came to."""
+
+    costs: FloatArray
+    """J of each finished episode, the sum of its stage costs."""
+    success: BoolArray | None
+    """Whether each was a success; None where nothing is known of success."""
+    n_steps: int
+    """Steps of all slots together."""
 
 
 class _Record:
@@ -71,7 +83,8 @@ class Rollout:
     """Steps each slot through one episode of at most `max_steps` steps.
 
     - In environments of this package finished slots wait, at no cost
-      (`reset(options={"finished": "wait"})`), as they do in a `WaitingVectorEnv`.
+      (`reset(options={"finished": "wait"})`), as they do in a `WaitingVectorEnv` and a
+      `WorkersVectorEnv`.
     - Where autoreset is disabled, finished slots are reset by mask and stepped along
       with the others; their outcomes are ignored.
     - Where the environment resets slots itself, the outcomes of finished slots are
@@ -90,6 +103,8 @@ class Rollout:
         cost: J of each slot so far, the sum of its stage costs.
         length: steps of each slot so far.
         terminated: whether the episode of each slot has ended in a terminal state.
+        returned: the ants that are back, all of them once the last has finished; None as
+            long as one of them walks.
         action_mask: which actions each slot may take now, `(num_envs, n_actions)`, the
             set U_q of the selection rule (3.4). None if the environment gives no
             `infos["action_mask"]`.
@@ -117,7 +132,7 @@ class Rollout:
         self.max_steps = validation.integer("max_steps", max_steps, at_least=1)
         self.n_actions = int(space.n)
         self._asks_to_wait = isinstance(env.unwrapped, ControlVectorEnv)
-        self._waits = isinstance(env.unwrapped, (ControlVectorEnv, WaitingVectorEnv))
+        self._waits = isinstance(env.unwrapped, (ControlVectorEnv, WaitingSlots))
         # Wrappers may reuse arrays, our own environments do not.
         self._fresh = isinstance(env, ControlVectorEnv)
         self._mode = received.autoreset_mode_of(env)
@@ -129,7 +144,8 @@ class Rollout:
         self._scratch = np.empty(n), np.empty(n, np.bool_), np.empty(n, np.bool_)
         self._stale: BoolArray | None = None  # slots to reset before the next step
         self._mask: BoolArray | None = None
-        self._ants, self._shown_ants = self._all, validation.read_only(self._all)
+        self._ants = self._all
+        self._shown_of: IntArray | None = None  # what `_shown_ants` shows
         self._reported_success: BoolArray | None = None
         self._stepping = False
         # The environment, in trials in which what it returns need not be checked.
@@ -144,7 +160,8 @@ class Rollout:
     def ants(self) -> IntArray:
         """The slots that are still walking, `(m,)`, read-only."""
         # Kernels take `_ants`: the call of one with a read-only array is slower.
-        if self._shown_ants.size != self._ants.size:
+        if self._shown_of is not self._ants:
+            self._shown_of = self._ants
             self._shown_ants = validation.read_only(self._ants)
         return self._shown_ants
 
@@ -189,7 +206,7 @@ class Rollout:
         )
         observation = received.observations(observation, n)
         self._read_mask(received.infos(infos, n))
-        self._ants, self._shown_ants = self._all, validation.read_only(self._all)
+        self._ants = self._all
         self.cost = np.zeros(n)
         self.length = np.zeros(n, dtype=np.int64)
         self.terminated = np.zeros(n, dtype=np.bool_)
@@ -198,8 +215,9 @@ class Rollout:
         self._totals = self.cost, self.length, self.terminated
         self.steps = 0
         self._stale = None
+        self.returned: IntArray | None = None
         if record:
-            _require_array(observation)
+            require_array(observation)
         self._record = _Record(observation, self._fresh) if record else None
         return observation
 
@@ -250,9 +268,28 @@ class Rollout:
             reached: `(>= m,)`, receives whether they are in a terminal state.
             stopped: `(>= m,)`, receives whether their episodes are over.
         """
+        ants, m = self._ants, self._ants.size
+        given = self._act(actions)
+        left = self._count(given, cost, reached, stopped)
+        observation, reward, _, _, infos = given
+        if left.size < m:
+            self._ants = left
+            if self._mode is AutoresetMode.SAME_STEP and not self._waits:
+                observation = self._last_seen(ants[stopped[:m]], observation, infos)
+        if self.steps >= self.max_steps:
+            self._ants = ants[:0]
+            stopped.fill(True)
+        if not self._ants.size:
+            self.returned = self._all
+        if self._record is not None:
+            self._record.append(observation, self._actions - self.first_action, reward)
+        return observation
+
+    def _act(self, actions: IntArray) -> Any:
+        """Let the walking ants act; return what the environment gave, checked."""
         if self._stepping:
             self._check_idle("step")
-        ants, native = self._ants, self._native
+        ants = self._ants
         m = ants.size
         passed: Any = actions
         if type(actions) is not np.ndarray:
@@ -277,6 +314,11 @@ class Rollout:
                 f"actions must lie in 0..{self.n_actions - 1}, got {actions[bad]} in "
                 f"slot {ants[bad]}."
             )
+        return self._advance()
+
+    def _advance(self) -> Any:
+        """Step the environment with the actions of all slots as they stand."""
+        native = self._native
         # A copy, because an environment or a wrapper may keep its actions.
         self._stepping = True
         try:
@@ -291,10 +333,16 @@ class Rollout:
             self._read_mask(given[4])
         else:
             self._mask = given[4].get("action_mask")
-        observation, reward, terminated, truncated, infos = given
-        self.steps += 1
+        return given
 
-        left = np.empty(m, np.int64)
+    def _count(
+        self, given: Any, cost: FloatArray, reached: BoolArray, stopped: BoolArray
+    ) -> IntArray:
+        """Count a step, see `_take`; return the ants whose episodes are not over."""
+        ants = self._ants
+        _, reward, terminated, truncated, infos = given
+        self.steps += 1
+        left = np.empty(ants.size, np.int64)
         n_left, bad = _account(
             ants,
             reward,
@@ -314,16 +362,28 @@ class Rollout:
             # Idle slots that finish another episode are reset with the others.
             done = np.logical_or(terminated, truncated)
             self._stale = done if done.any() else None
-        if n_left < m:
-            self._ants = left[:n_left]
-            if self._mode is AutoresetMode.SAME_STEP and not self._waits:
-                observation = self._last_seen(ants[stopped[:m]], observation, infos)
-        if self.steps >= self.max_steps:
-            self._ants = ants[:0]
-            stopped.fill(True)
-        if self._record is not None:
-            self._record.append(observation, self._actions - self.first_action, reward)
+        return left[:n_left]
+
+    def set_out(self, observation: Any) -> Any:
+        """Let the ants that are `returned` set out again, where they do not wait.
+
+        Here they wait for the next `start`; see `Stream`.
+
+        Args:
+            observation: of all slots after the step.
+
+        Returns:
+            Those from which the next step is made, `(num_envs, ...)`.
+        """
         return observation
+
+    def outcome(self) -> Outcome:
+        """What the episodes since `start` came to."""
+        return Outcome(self.cost, self.success, int(self.length.sum()))
+
+    def returned_episodes(self) -> Episodes:
+        """The steps of the ants that are `returned`; see `episodes`."""
+        return self.episodes()
 
     def episodes(self) -> Episodes:
         """The steps of every slot since `start(record=True)`.
@@ -331,6 +391,18 @@ class Rollout:
         Raises:
             ValueError: nothing was recorded.
         """
+        record = self._recorded()
+        # Read-only, because a cost or an update rule of a user's own sees them.
+        return Episodes(
+            fixed(np.stack(record.observations)),
+            fixed(np.stack(record.actions)),
+            fixed(np.stack(record.costs)),
+            validation.read_only(self.length),
+            validation.read_only(self.terminated),
+        )
+
+    def _recorded(self) -> _Record:
+        """What was recorded, checked."""
         record = self._record
         if record is None or not record.actions:
             raise ValueError(
@@ -342,14 +414,7 @@ class Rollout:
                 "observations must have the same shape and type in every step, got "
                 f"shapes {', '.join(shapes)}; check the environment's step and reset."
             )
-        # Read-only, because a cost or an update rule of a user's own sees them.
-        return Episodes(
-            _fixed(np.stack(record.observations)),
-            _fixed(np.stack(record.actions)),
-            _fixed(np.stack(record.costs)),
-            validation.read_only(self.length),
-            validation.read_only(self.terminated),
-        )
+        return record
 
     @property
     def success(self) -> BoolArray | None:
@@ -456,67 +521,13 @@ class Rollout:
         else:
             shown = observation.copy()
         for slot in stopped:
-            _set_row(shown, int(slot), final[slot])
+            set_row(shown, int(slot), final[slot])
         if self.action_mask is not None:
             # The mask already belongs to the next episode.
             last = received.infos(infos.get("final_info"), self.num_envs)
             allowed = received.action_mask(last, self.num_envs, self.n_actions)
             self.action_mask[stopped] = True if allowed is None else allowed[stopped]
         return shown
-
-
-def rows_of(observation: Any, slots: IntArray) -> Any:
-    """The observations of some slots, copied; of dicts and tuples part by part."""
-    if isinstance(observation, dict):
-        return {key: rows_of(part, slots) for key, part in observation.items()}
-    if isinstance(observation, tuple):
-        return tuple(rows_of(part, slots) for part in observation)
-    return observation[slots]
-
-
-def _set_row(observation: Any, slot: int, row: Any) -> None:
-    """Replace the observation of one slot.
-
-    Raises:
-        ValueError: `row` is not an observation of the same shape and kind.
-    """
-    if isinstance(observation, dict):
-        if not isinstance(row, dict) or set(row) != set(observation):
-            raise _not_final(slot, f"the keys {sorted(observation)}", row)
-        for key, part in observation.items():
-            _set_row(part, slot, row[key])
-        return
-    array = validation.as_array(row)
-    shape = observation.shape[1:]
-    if (
-        array is None
-        or array.shape != shape
-        or not np.can_cast(array.dtype, observation.dtype, "same_kind")
-    ):
-        raise _not_final(slot, f"shape {shape} and type {observation.dtype}", row)
-    observation[slot] = array
-
-
-def _not_final(slot: int, expected: str, row: Any) -> ValueError:
-    return ValueError(
-        f"infos['final_obs'] must have {expected} in slot {slot}, got "
-        f"{validation.shown(row)}; check the environment's step."
-    )
-
-
-def _require_array(observation: Any) -> None:
-    if not isinstance(observation, np.ndarray):
-        raise ValueError(
-            "a cost of complete solutions needs observations that are arrays, got "
-            f"{validation.shown(observation)}; leave the cost out, or flatten them with "
-            "gymnasium.wrappers.vector.FlattenObservation."
-        )
-
-
-def _fixed(array: NDArray[Any]) -> NDArray[Any]:
-    """The same new array, which from now on cannot be written to."""
-    array.setflags(write=False)
-    return array
 
 
 @njit

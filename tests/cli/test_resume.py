@@ -60,6 +60,8 @@ def assert_same(one: Any, other: Any) -> None:
             *("--param", "grows=true", "--param", "optimism=1"),
         ],
         ["--param", "cost=settling_time:0:3.14:0.3+0.1", "--param", "deposit=rank:2"],
+        ["--param", "schedule=asynchronous", "--param", "deposit=rank:2"],
+        ["--agent", "returning", "--param", "schedule=asynchronous"],
     ],
 )
 def test_two_parts_are_one_run(first: int, more: list[str], tmp_path: Path) -> None:
@@ -275,9 +277,13 @@ def test_the_second_signal_ends_at_once(tmp_path: Path) -> None:
     assert time.monotonic() - began < 2.0, "less than the grace of the first"
 
 
-def test_only_what_came_after_the_last_checkpoint_is_lost(tmp_path: Path) -> None:
+@pytest.mark.parametrize("schedule", ["synchronous", "asynchronous"])
+def test_only_what_came_after_the_last_checkpoint_is_lost(
+    schedule: str, tmp_path: Path
+) -> None:
     log = tmp_path / "log.csv"
-    arguments = [*RUN, "--trials", "1000000", "--out", "a", "--checkpoint-every", "2"]
+    run = [*RUN, "--param", f"schedule={schedule}"]
+    arguments = [*run, "--trials", "1000000", "--out", "a", "--checkpoint-every", "2"]
     process = start(tmp_path, *arguments, "--quiet", "--log", str(log))
     wait_for_trials(process, log, 5)
     process.kill()
@@ -289,7 +295,7 @@ def test_only_what_came_after_the_last_checkpoint_is_lost(tmp_path: Path) -> Non
     found = figures(
         *("train", "--resume", "a.npz", "--trials", "3", "--log", str(log)),
     )
-    figures(*RUN, "--trials", str(kept + 3), "--out", "whole")
+    figures(*run, "--trials", str(kept + 3), "--out", "whole")
     assert_same(load_agent("whole.npz"), load_agent("a.npz"))
     with log.open() as file:
         trials = [int(float(row["trial"])) for row in csv.DictReader(file)]

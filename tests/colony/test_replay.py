@@ -145,9 +145,9 @@ def test_an_end_teaches_its_beginning_in_one_pass() -> None:
         walk = Walk(1)
         for cell in range(5):
             walk.append(one, np.array([cell]), one, -np.ones(1), None)
-        walk.stop(one, np.array([5]), None)
+        walk.stop(one, np.array([5]), np.array([True]), None)
         memory = Memory(100, 1, Discrete(6))
-        paths = memory.add(walk, np.array([True]))
+        paths = memory.add(walk)
         values = np.zeros((6, 1))
         replay(memory, paths, values, rate=1.0, discount=1.0, trace_decay=trace_decay)
         assert values[:, 0].tolist() == [-5.0, -4.0, -3.0, -2.0, -1.0, 0.0]

@@ -152,7 +152,8 @@ def test_kernels_agree_with_themselves_as_plain_python() -> None:
             append(0, ants, index, False, actions[t, ants], 5, 3, cells, own, again)
         np.testing.assert_array_equal(walked, length)
         places, out = np.zeros(5, np.int64), np.zeros(5, np.uint8)
-        getattr(module._collect, name)(0, 3, walked, action, places, out)
+        collect = getattr(module._collect, name)
+        collect(np.arange(3), walked, 3, action, places, out)
         results.append((rows, cells, action, own, walked, again, places, out))
     for compiled, plain in zip(*results, strict=True):
         np.testing.assert_array_equal(compiled, plain)

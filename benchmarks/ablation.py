@@ -3,6 +3,8 @@
 Each is taken away from `ReturningACL` with its defaults, and nothing else is changed:
 
 - no memory: the ants walk the newest paths back, once, and no older ones;
+- the latest: likewise, and levels follow what was laid last, not the mean over all that
+  was tried, which the newest paths alone change little (trust = 0);
 - no growth: cells of a fixed grid that is about as fine as the grown one becomes;
 - no ants: Q-learning with the same memory, as many replays, the same growth and the
   same optimism. It learns from one remembered step after the other, each on the values
@@ -159,6 +161,9 @@ def alone(task: Task, seed: int) -> QLearning:
 VARIANTS: dict[str, Callable[[Task, int], TabularAgent | None]] = {
     "returning": colony,
     "no memory": lambda task, seed: colony(task, seed, older_paths=0, walks_back=1),
+    "the latest": lambda task, seed: colony(
+        task, seed, older_paths=0, walks_back=1, trust=0.0
+    ),
     "no growth": on_fixed_cells,
     "no ants": without_ants,
     "none": alone,

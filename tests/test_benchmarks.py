@@ -55,9 +55,9 @@ def test_ablation() -> None:
     arguments = ["--tasks", "grid,pendulum", "--steps", "1500"]
     rows = output_of("ablation.py", *arguments, once="--seeds")["rows"]
     assert [row["variant"] for row in rows if row["task"] == "grid"] == [
-        *("returning", "no memory", "no ants", "none"),
+        *("returning", "no memory", "the latest", "no ants", "none"),
     ]
-    assert len(rows) == 4 + 5
+    assert len(rows) == 5 + 6
     for row in rows:
         assert row["best"] >= row["last"]
         assert row["runs"][0]["steps"] >= 1500

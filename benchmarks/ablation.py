@@ -3,6 +3,8 @@
 Each is taken away from `ReturningACL` with its defaults, and nothing else is changed:
 
 - no memory: the ants walk the newest paths back, once, and no older ones;
+- the latest: likewise, and levels follow what was laid last, not the mean over all that
+  was tried, which the newest paths alone change little (trust = 0);
 - no growth: cells of a fixed grid that is about as fine as the grown one becomes;
 - no ants: Q-learning with the same memory, as many replays, the same growth and the
   same optimism. It learns from one remembered step after the other, each on the values
@@ -55,6 +57,7 @@ class Task:
         steps: interactions of a run.
         starts: how many episodes an evaluation has; an environment of this package has
             its own.
+        every: how many trials lie between two evaluations.
         fixed: makes a grid as fine as is sensible; None where a state is a cell.
         best: the return of the best policy; None where a model gives it.
         price: what the best policy pays, of which `WITHIN` are shares; None: minus its
@@ -64,6 +67,7 @@ class Task:
     env_id: str
     steps: int
     starts: int = 1
+    every: int = 1
     fixed: Callable[[Any], Partition] | None = None
     best: float | None = None
     price: float | None = None
@@ -75,8 +79,8 @@ class Task:
         return WaitingVectorEnv([lambda: gym.make(self.env_id)] * slots)
 
     def evaluation(self) -> PolicyEvaluation:
-        """Follows the greedy policy after every trial, always from the same starts."""
-        return PolicyEvaluation(self.make(self.starts))
+        """Follows the greedy policy between trials, always from the same starts."""
+        return PolicyEvaluation(self.make(self.starts), every=self.every)
 
     def lowest(self, share: float) -> float:
         """The return of a policy that is worse by this share."""
@@ -99,14 +103,14 @@ TASKS = {
     ),
     "mountain car": Task(
         "MountainCar-v0",
-        60_000,
+        50_000,
         starts=20,
         fixed=lambda space: Fuzzy.from_box(space, (41, 41)),
         best=-100.0,  # the best policies that were ever seen have -98 to -102
     ),
     # From the starts of the evaluation the best way has 13 steps.
-    "taxi": Task("Taxi-v4", 30_000, starts=50, price=13.0),
-    "grid": Task("acl_gym/GridSearch2D-v0", 30_000),
+    "taxi": Task("Taxi-v4", 20_000, starts=30, every=3, price=13.0),
+    "grid": Task("acl_gym/GridSearch2D-v0", 10_000),
 }
 
 
@@ -127,11 +131,12 @@ def on_fixed_cells(task: Task, seed: int) -> ReturningACL | None:
 SEQUENTIAL = {
     "discount": 0.99,
     "epsilon": 0.1,
-    "learning_rate": 0.1,
+    "learning_rate": 0.3,
     "trace_decay": 0.6,
 }
-"""Discount and epsilon are the colony's. Rate and lambda are the best of 0.05 to 0.9 and
-0 to 0.9 over all four tasks: one setting, as the colony has."""
+"""Discount and epsilon are the colony's. Rate and lambda, of 0.05 to 0.9 and 0 to 0.9,
+are good on the pendulum and the grid alike: one setting for all tasks, as the colony has.
+On the pendulum alone a rate of 0.1 is better towards the end."""
 
 
 def without_ants(task: Task, seed: int) -> QLearning:
@@ -156,6 +161,9 @@ def alone(task: Task, seed: int) -> QLearning:
 VARIANTS: dict[str, Callable[[Task, int], TabularAgent | None]] = {
     "returning": colony,
     "no memory": lambda task, seed: colony(task, seed, older_steps=0, walks_back=1),
+    "the latest": lambda task, seed: colony(
+        task, seed, older_steps=0, walks_back=1, trust=0.0
+    ),
     "no growth": on_fixed_cells,
     "no ants": without_ants,
     "none": alone,
@@ -165,14 +173,11 @@ VARIANTS: dict[str, Callable[[Task, int], TabularAgent | None]] = {
 def run(agent: TabularAgent, task: Task, bounds: Sequence[float], steps: int) -> Row:
     """Learn, and say when the policy was good enough for the first time."""
     agent.learn(total_timesteps=steps, callback=task.evaluation())
-    returns = [row.get("policy_return", -row["policy_cost"]) for row in agent.history]
+    rows = [row for row in agent.history if "policy_cost" in row]
+    returns = [row.get("policy_return", -row["policy_cost"]) for row in rows]
     found: Row = {"last": returns[-1], "best": max(returns)}
     for share, bound in zip(WITHIN, bounds, strict=True):
-        good = (
-            row
-            for row, value in zip(agent.history, returns, strict=True)
-            if value >= bound
-        )
+        good = (row for row, value in zip(rows, returns, strict=True) if value >= bound)
         first = next(good, None)
         name = f"{100 * share:.0f}"
         found[f"steps_{name}"] = None if first is None else first["env_steps"]

@@ -16,8 +16,8 @@ FOLDER = Path(__file__).resolve().parent.parent / "benchmarks"
 pytestmark = pytest.mark.slow
 
 
-def output_of(script: str, *arguments: str) -> Any:
-    command = [sys.executable, str(FOLDER / script), "--json", "--repetitions", "1"]
+def output_of(script: str, *arguments: str, once: str = "--repetitions") -> Any:
+    command = [sys.executable, str(FOLDER / script), "--json", once, "1"]
     done = subprocess.run(
         [*command, *arguments], capture_output=True, text=True, check=True
     )
@@ -48,3 +48,17 @@ def test_policy_export() -> None:
     assert len(rows) == 4 * 4
     # A call of C takes a hundredth of `predict`, which enters NumPy and Numba.
     assert all(row["ratio_to_predict"] < 0.5 for row in rows if "table_bytes" in row)
+
+
+def test_ablation() -> None:
+    """Where a state is a cell nothing grows, so that one variant is left out."""
+    arguments = ["--tasks", "grid,pendulum", "--steps", "1500"]
+    rows = output_of("ablation.py", *arguments, once="--seeds")["rows"]
+    assert [row["variant"] for row in rows if row["task"] == "grid"] == [
+        *("returning", "no memory", "the latest", "no ants", "none"),
+    ]
+    assert len(rows) == 5 + 6
+    for row in rows:
+        assert row["best"] >= row["last"]
+        assert row["runs"][0]["steps"] >= 1500
+        assert row["reached_25"] == (row["steps_25"] is not None)

@@ -287,6 +287,8 @@ class QLearning(RememberingAgent):
         self._tried |= memory.evidence.reshape(self._tried.shape) > 0
         if self.optimism is not None:
             self._promise(self.optimism)
+        elif self.grows:  # what was learned in coarse cells says nothing of new ones
+            self._values[~self._tried] = 0.0
         for _ in range(self.replay):
             replay(
                 memory,

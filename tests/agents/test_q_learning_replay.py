@@ -254,6 +254,16 @@ def test_a_partition_stays_unless_it_is_to_grow() -> None:
     assert agent.learn(trials=3).partition.n_cells > 49
 
 
+def test_untried_pairs_stay_at_zero_where_the_partition_grows() -> None:
+    """Before the range is known all is one cell, which the first steps make bad."""
+    env = gymnasium_env("MountainCar-v0")
+    agent = QLearning(env, grows=True, visits_to_grow=1e9, max_steps=50, seed=0)
+    agent.learn(trials=1)
+    assert agent.partition.n_cells > 1
+    assert (agent.table[~agent._known] == 0.0).all()
+    assert (agent.table[agent._known] < 0.0).all()
+
+
 def test_discrete_states_do_not_grow() -> None:
     agent = make("taxi", grows=True).learn(trials=2)
     assert isinstance(agent.partition, Discrete)

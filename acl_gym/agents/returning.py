@@ -18,6 +18,7 @@ from acl_gym.colony.memory import UNITS, Memory
 from acl_gym.colony.optimism import promised_level
 from acl_gym.colony.walk import Walk
 from acl_gym.colony.walking_back import WalkBack
+from acl_gym.envs.wrappers.workers import spread_over_workers
 from acl_gym.partitions import Discrete, Grid, Partition
 from acl_gym.partitions.growing import carried_over, initial_partition, refined, widened
 from acl_gym.policies import random_ranks
@@ -74,6 +75,11 @@ class ReturningACL(TabularAgent):
             the environment, or 300 if it has none.
         seed: the same seed gives the same run; None draws one from the system.
         n_actions: only needed without an environment.
+        workers: lets the ants walk in so many workers, >= 0, for environments that are
+            slow to step: the single environments of `env` are made anew in a
+            `WorkersVectorEnv`, the agent's `env`. The bits are the same for any number.
+            None leaves `env` as it is.
+        executor: where workers are, "processes" or "ray", see `WorkersVectorEnv`.
 
     Raises:
         TypeError: `env` or `partition` is of the wrong kind.
@@ -151,7 +157,11 @@ class ReturningACL(TabularAgent):
         max_steps: int | None = None,
         seed: int | None = None,
         n_actions: int | None = None,
+        workers: int | None = None,
+        executor: str = "processes",
     ) -> None:
+        if workers is not None:
+            env = spread_over_workers(env, workers, executor)
         self.discount = discount
         self.learning_rate = learning_rate
         self.trust = trust

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-import os
 import time
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
@@ -84,7 +83,6 @@ class Crew:
         self._timeout = timeout
         self._dismissed = False
         self._told = False  # of a worker that was lost
-        self._owner = os.getpid()
 
     def ask(
         self,
@@ -146,8 +144,6 @@ class Crew:
 
     def dismiss(self) -> None:
         """Let all workers end; calling it again is harmless."""
-        if os.getpid() != self._owner:  # a copy of the process that has workers
-            return
         self._dismissed = True
         working = [each.worker for each in self._members if each.worker is not None]
         for member in self._members:

@@ -120,7 +120,7 @@ class _Process:
         context: Any = get_context("loky")
         self._connection, other = context.Pipe()
         self._process = context.Process(
-            target=_serve, args=(other, os.getpid(), first, env_fns), daemon=True
+            target=_serve, args=(other, os.getpid(), first, env_fns)
         )
         self._process.start()
         other.close()  # so that the connection ends with the process

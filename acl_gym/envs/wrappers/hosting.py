@@ -266,7 +266,7 @@ def packed_message(message: Any) -> bytes:
     try:
         return pickle.dumps(message, protocol=pickle.HIGHEST_PROTOCOL)
     except Exception:  # of classes of a script, say, which only cloudpickle can send
-        return cloudpickle.dumps(message)
+        return bytes(cloudpickle.dumps(message))
 
 
 class _InWorker(Exception):  # noqa: N818 - it is shown as the cause of another one

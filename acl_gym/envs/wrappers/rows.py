@@ -104,7 +104,7 @@ def same_row(row: Any, observation: Any) -> bool:
     if isinstance(row, tuple):
         return all(map(same_row, row, observation))
     given = np.asarray(observation).astype(row.dtype)
-    return given.shape == row.shape and given.tobytes() == row.tobytes()
+    return bool(given.shape == row.shape and given.tobytes() == row.tobytes())
 
 
 def _not_of_its_space(slot: int, expected: str, observation: Any) -> ValueError:

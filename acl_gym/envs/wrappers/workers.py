@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import copy
 import warnings
-import weakref
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from itertools import pairwise
+from multiprocessing.util import Finalize
 from typing import Any, Self
 
 import gymnasium as gym
@@ -117,8 +117,9 @@ class WorkersVectorEnv(WaitingSlots):
         self._crew = Crew(
             hiring(executor, self.env_fns, self._blocks), self._blocks, timeout
         )
-        # Not by `__del__`, which is not called for what is left at the end.
-        self._end = weakref.finalize(self, self._crew.dismiss)
+        # At the end of the program this comes before processes are waited for; it does
+        # nothing in a copy of the process.
+        self._end = Finalize(self, self._crew.dismiss, exitpriority=10)
         self._finished = np.ones(self.num_envs, dtype=np.bool_)
         self._episodes = [_Episode(None, None) for _ in self.env_fns]
         self._chance: int | None = None  # where there was no seed
@@ -127,7 +128,7 @@ class WorkersVectorEnv(WaitingSlots):
         try:
             self._adopt(self._described())
         except BaseException:
-            self._crew.dismiss()
+            self._end()
             raise
 
     @classmethod
@@ -160,7 +161,7 @@ class WorkersVectorEnv(WaitingSlots):
             range(len(self._blocks)), ("describe", ())
         )
         answers = self._crew.ask(everyone, self._repeats)
-        first = answers[0]
+        first: Description = answers[0]
         for number, block in enumerate(self._blocks):
             for name in ("observation_space", "action_space"):
                 own, common = getattr(answers[number], name), getattr(first, name)
@@ -274,7 +275,7 @@ class WorkersVectorEnv(WaitingSlots):
         )
         return row_of(self._shown, slot), 0.0, False, True, {}
 
-    def _repeats(self, block: range, but: set[int] = frozenset()) -> list[Repeat]:  # type: ignore[assignment]
+    def _repeats(self, block: range, but: Collection[int] = ()) -> list[Repeat]:
         """The episodes of a block that are under way, except those of some slots."""
         return [
             Repeat(
@@ -311,7 +312,7 @@ class WorkersVectorEnv(WaitingSlots):
 
 
 def spread_over_workers(
-    env: VectorEnv[Any, Any, Any], workers: int, executor: str = "processes"
+    env: VectorEnv[Any, Any, Any] | None, workers: int, executor: str = "processes"
 ) -> WorkersVectorEnv:
     """The same single environments in a `WorkersVectorEnv`.
 
@@ -328,13 +329,11 @@ def spread_over_workers(
             argument is out of range.
     """
     require_vector_env(env)
-    env_fns = getattr(env, "env_fns", None)
-    if env_fns is None:
-        env_fns = _env_fns_by_spec(env)
+    env_fns = getattr(env, "env_fns", None) or _env_fns_by_spec(env)
     return WorkersVectorEnv(env_fns, workers, executor)
 
 
-def _env_fns_by_spec(env: VectorEnv[Any, Any, Any]) -> list[Any]:
+def _env_fns_by_spec(env: Any) -> list[Any]:
     """Functions that make single environments of the kind that a native one has."""
     spec = None if isinstance(env, VectorWrapper) else env.spec
     if spec is None or spec.entry_point is None:

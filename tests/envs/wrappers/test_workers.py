@@ -373,7 +373,7 @@ def alive(pid: int) -> bool:
 
 SCRIPT = textwrap.dedent(
     """
-    import os, time
+    import os, sys, time
     import gymnasium as gym
     import numpy as np
     from acl_gym import WorkersVectorEnv
@@ -389,11 +389,14 @@ SCRIPT = textwrap.dedent(
             time.sleep(600 if action else 0)
             return 0, 0.0, False, False, {}
 
+        def close(self):
+            print("shut", flush=True)
+
     env = WorkersVectorEnv([Slow] * 2, workers=2)
     pids = env.reset()[1]["pid"]
     print(*pids, flush=True)
     try:
-        env.step(np.array([0, 1]))
+        env.step(np.array([0, int(sys.argv[1])]))
     except KeyboardInterrupt:
         env.step(np.array([0, 0]))
         env.close()
@@ -403,13 +406,15 @@ SCRIPT = textwrap.dedent(
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
-@pytest.mark.parametrize("ending", [signal.SIGKILL, signal.SIGINT])
-def test_no_worker_outlives_its_parent(ending: signal.Signals, tmp_path: Path) -> None:
-    """Whether that is killed or interrupted; the script has no guard of `__main__`."""
+@pytest.mark.parametrize("ending", [signal.SIGKILL, signal.SIGINT, None])
+def test_no_worker_outlives_its_parent(
+    ending: signal.Signals | None, tmp_path: Path
+) -> None:
+    """Killed, interrupted, or at its end; the script has no guard of `__main__`."""
     script = tmp_path / "script.py"
     script.write_text(SCRIPT)
     parent = subprocess.Popen(
-        [sys.executable, script],
+        [sys.executable, script, str(int(ending is not None))],
         env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
@@ -418,15 +423,15 @@ def test_no_worker_outlives_its_parent(ending: signal.Signals, tmp_path: Path) -
     )
     pids = [int(pid) for pid in parent.stdout.readline().split()]
     assert len(pids) == 2
-    assert all(map(alive, pids))
-    time.sleep(0.5)  # the step is under way
-    if ending is signal.SIGINT:
-        os.killpg(parent.pid, ending)  # as a terminal does
-    else:
-        parent.kill()
+    if ending is not None:
+        assert all(map(alive, pids))
+        time.sleep(0.5)  # the step is under way
+        # As a terminal does, which interrupts all processes.
+        os.kill(-parent.pid if ending is signal.SIGINT else parent.pid, ending)
     said, complaints = parent.communicate(timeout=60)
-    if ending is signal.SIGINT:
-        assert said == "closed\n", complaints
+    if ending is not signal.SIGKILL:
+        shut = ["shut", "shut"]
+        assert said.split() == ([*shut, "closed"] if ending else shut), complaints
         assert complaints == ""
         assert parent.returncode == 0
     deadline = time.monotonic() + 20

@@ -124,6 +124,47 @@ def test_the_order_of_the_ants_does_not_change_a_bit(seed: int, shape: Any) -> N
     assert len(set(results)) == 1
 
 
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    shape=st.sampled_from(SHAPES),
+    masked=st.booleans(),
+)
+def test_ants_may_come_back_in_any_order(seed: int, shape: Any, masked: bool) -> None:
+    """Other slots for the same walks, which are remembered in another order then."""
+    order = np.random.default_rng(seed + 1).permutation(9)
+    how = {"discount": 0.97, "mix": 0.2, "rate": 0.9, "trust": 0.5}
+    results = []
+    for slots in (np.arange(9), order):
+        rng = np.random.default_rng(seed)
+        memory = Memory(10_000, shape[2], grid(*shape[:2]))
+        walk_back = WalkBack(rng.normal(size=(memory.partition.n_cells, shape[2])))
+        for _ in range(3):  # so that older walks are merged as well
+            length, walk = rng.integers(1, 12, size=9), Walk(9)
+            for t in range(length.max() + 1):
+                own = rng.uniform(size=(9, len(shape[1])))
+                allowed = rng.random((9, shape[2])) < 0.6
+                allowed[:, 0] = True
+                actions, rewards = rng.integers(shape[2], size=9), rng.normal(size=9)
+                seen = np.empty_like(own)
+                seen[slots] = own
+                for who, take in ((t < length, True), (t == length, False)):
+                    ants = np.flatnonzero(who)
+                    ants = ants[np.argsort(slots[ants])]
+                    masks = allowed[ants] if masked else None
+                    if ants.size and take:
+                        walk.append(
+                            slots[ants], seen, actions[ants], rewards[ants], masks
+                        )
+                    elif ants.size:
+                        walk.stop(slots[ants], seen, masks)
+            terminated = np.empty(9, np.bool_)
+            terminated[slots] = rng.random(9) < 0.5
+            memory.add(walk, terminated)
+            walk_back.walk(memory, np.arange(memory.n_paths), **how)
+        results.append(walk_back.levels.tobytes())
+    assert results[0] == results[1]
+
+
 def test_what_is_forgotten_leaves_nothing_behind() -> None:
     """A memory that has forgotten is the memory of those who came later."""
     rng = np.random.default_rng(0)

@@ -111,15 +111,18 @@ def test_agents_learn_the_same(kind: Any, env: WorkersVectorEnv, here: Any) -> N
     assert len(set(tables)) == 1
 
 
-def test_a_colony_spreads_its_environment() -> None:
+def test_a_colony_spreads_its_environment(tmp_path: Path) -> None:
     plain = WaitingVectorEnv.make("FrozenLake-v1", 6)
     expected = ReturningACL(plain, seed=1).learn(trials=4)
     for workers in (0, 4):
         colony = ReturningACL(plain, seed=1, workers=workers)
         assert isinstance(colony.env, WorkersVectorEnv)
         assert colony.learn(trials=4).table.tobytes() == expected.table.tobytes()
-        assert "workers" not in colony.parameters()
         colony.env.close()
+    colony.save(tmp_path / "colony")
+    again = ReturningACL.load(tmp_path / "colony", plain)
+    assert again.env is plain
+    assert again.learn(trials=1).trials == 5
 
 
 def test_what_an_environment_is_known_by_comes_from_the_worker() -> None:

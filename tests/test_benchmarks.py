@@ -31,6 +31,17 @@ def test_plant() -> None:
     assert all(case["steps_per_second"] > 0 for case in cases)
 
 
+def test_workers() -> None:
+    small = ("--slots", "2", "--steps", "2", "--milliseconds", "0.1", "--without-ray")
+    cases = output_of("workers.py", *small)["cases"]
+    assert [case["name"] for case in cases[-2:]] == [
+        "WorkersVectorEnv, processes, 1",
+        "WorkersVectorEnv, processes, 2",
+    ]
+    assert cases[0]["ratio_to_reference"] == 1.0
+    assert all(case["steps_per_second"] > 0 for case in cases)
+
+
 @pytest.mark.skipif(shutil.which("gcc") is None, reason="needs gcc")
 def test_policy_export() -> None:
     rows = output_of("policy_export.py")["rows"]

@@ -19,7 +19,7 @@ MOST_LOSSES = 3
 """So often in a row a worker may be lost at the same request."""
 
 STARTING_TIME = 60.0
-"""Seconds that a new worker may take beside the time for its first request."""
+"""Seconds in which a new worker must have made its environments, if there is a timeout."""
 
 _GRACE = 5.0
 """Seconds in which workers that are dismissed may close their environments."""
@@ -41,7 +41,6 @@ class _Member:
         behind: whether the worker has left the episodes as they stand, so that they
             must be repeated.
         losses: workers lost in a row.
-        deadline: when the answer must be there; None: never.
     """
 
     def __init__(self, slots: range) -> None:
@@ -49,15 +48,32 @@ class _Member:
         self.worker: Worker | None = None
         self.behind = False
         self.losses = 0
-        self.deadline: float | None = None
+        self._requests: list[tuple[Request, float | None]] = []
+        self._deadline: float | None = None
 
-    def receive(self) -> Any:
+    def put(self, worker: Worker, requests: list[tuple[Request, float | None]]) -> None:
+        """Ask the first of some requests; each has so many seconds, or any time."""
+        self.worker, self._requests = worker, requests
+        self._send_next()
+
+    def receive(self) -> tuple[Any, bool]:
+        """An answer, and whether it is the last one; if not, the next is asked."""
         if self.worker is None:
-            raise RuntimeError("nothing was asked")
+            raise WorkerLostError("was stopped")
         left = None
-        if self.deadline is not None:
-            left = max(0.0, self.deadline - time.monotonic())
-        return self.worker.receive(left)
+        if self._deadline is not None:
+            left = max(0.0, self._deadline - time.monotonic())
+        answer = self.worker.receive(left)
+        last = isinstance(answer, Failure) or not self._requests
+        if not last:
+            self._send_next()
+        return answer, last
+
+    def _send_next(self) -> None:
+        request, seconds = self._requests.pop(0)
+        self._deadline = None if seconds is None else time.monotonic() + seconds
+        if self.worker is not None:
+            self.worker.send(request)
 
     def stop(self) -> None:
         if self.worker is not None:
@@ -119,12 +135,14 @@ class Crew:
             while waiting:
                 number = waiting[0]
                 try:
-                    answers[number] = self._members[number].receive()
-                    waiting.popleft()
+                    answers[number], last = self._members[number].receive()
                 except WorkerLostError as loss:
                     self._note_loss(number, loss)
                     self._put(number, questions[number], repeats)
-                    waiting.rotate(-1)
+                    last = False
+                waiting.rotate(-1)
+                if last:
+                    waiting.remove(number)
         except BaseException:
             # Those that have not answered would answer later, to another question.
             for number in waiting:
@@ -161,16 +179,19 @@ class Crew:
         repeats: Callable[[range], list[Repeat]],
     ) -> None:
         """Ask a worker; if there is none, or it is behind, let episodes be repeated."""
-        member = self._members[number]
-        new = member.worker is None
-        if member.worker is None:
-            member.worker = self._hire(number)
-        before = repeats(member.slots) if new or member.behind else []
-        if self._timeout is not None:
-            steps = 1 + max((1 + len(each.actions) for each in before), default=0)
-            seconds = steps * self._timeout + (STARTING_TIME if new else 0.0)
-            member.deadline = time.monotonic() + seconds
-        member.worker.send(Request(before, *question))
+        member, limit = self._members[number], self._timeout
+        worker = member.worker
+        missing = worker is None or member.behind
+        before = repeats(member.slots) if missing else []
+        steps = 1 + max((1 + len(each.actions) for each in before), default=0)
+        requests = [
+            (Request(before, *question), None if limit is None else steps * limit)
+        ]
+        if worker is None:
+            worker = self._hire(number)
+            start = None if limit is None else max(limit, STARTING_TIME)
+            requests.insert(0, (Request([], "ready", ()), start))
+        member.put(worker, requests)
 
     def _note_loss(self, number: int, loss: WorkerLostError) -> None:
         """Put away a worker that was lost.
@@ -181,8 +202,9 @@ class Crew:
         member = self._members[number]
         member.stop()
         member.losses += 1
-        slots = f"{member.slots.start} to {member.slots.stop - 1}"
-        name = f"worker {number}, which has slots {slots},"
+        first, last = member.slots[0], member.slots[-1]
+        slots = f"slot {first}" if first == last else f"slots {first} to {last}"
+        name = f"worker {number}, which has {slots},"
         if member.losses >= MOST_LOSSES:
             member.losses = 0
             raise WorkerDiedError(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import multiprocessing
 import os
 import pickle
 import signal
@@ -30,6 +31,9 @@ _LOOK_EVERY = 1.0
 
 _GRACE = 1.0
 """Seconds in which a process whose parent has died may close its environments."""
+
+
+_TOO_LATE = "gave no answer in time"
 
 
 class WorkerLostError(Exception):
@@ -138,7 +142,7 @@ class _Process:
                 if not (self._process.is_alive() or self._connection.poll()):
                     raise EOFError
                 if deadline is not None and time.monotonic() >= deadline:
-                    raise WorkerLostError(f"gave no answer within {timeout:g} s")
+                    raise WorkerLostError(_TOO_LATE)
             return pickle.loads(self._connection.recv_bytes())
         except (EOFError, OSError):
             self._process.join(_LOOK_EVERY)
@@ -180,6 +184,8 @@ def _how_it_ended(code: int | None) -> str:
 def _serve(connection: Any, parent: int, first: int, env_fns: bytes) -> None:
     """The life of a process that is a worker."""
     serve_parent(parent, _GRACE)
+    # For environments with processes of their own: those of the system, not loky's.
+    multiprocessing.set_start_method(None, force=True)
     host = Host(first, partial(unpacked_env_fns, env_fns))
     # The connection ends with the parent, or when it has no more requests.
     with contextlib.suppress(EOFError, OSError):
@@ -206,18 +212,18 @@ class _RayActor:
             self._answer = self._actor.answer.remote(packed_message(request))
 
     def receive(self, timeout: float | None) -> Any:
-        with self._losses(timeout):
+        with self._losses():
             return pickle.loads(self._ray.get(self._answer, timeout=timeout))
 
     @contextlib.contextmanager
-    def _losses(self, timeout: float | None = None) -> Any:
+    def _losses(self) -> Any:
         try:
             yield
         except self._ray.exceptions.GetTimeoutError:
-            raise WorkerLostError(f"gave no answer within {timeout:g} s") from None
+            raise WorkerLostError(_TOO_LATE) from None
         except self._ray.exceptions.RayError as error:
-            reason = str(error).strip().splitlines()[-1]
-            raise WorkerLostError(f"was lost by Ray: {reason}") from error
+            reason = str(error).strip().splitlines()[-1].partition(". ")[0]
+            raise WorkerLostError(f"was lost by Ray ({reason})") from error
 
     def dismiss(self) -> None:
         if self._ray.is_initialized():

@@ -108,6 +108,9 @@ class Host:
         for env in envs:
             env.close()
 
+    def ready(self) -> None:
+        """Nothing; the answer comes when the environments are made."""
+
     def describe(self) -> Description:
         """What the slots have in common.
 

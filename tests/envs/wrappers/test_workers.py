@@ -133,6 +133,15 @@ def test_what_an_environment_is_known_by_comes_from_the_worker() -> None:
     colony.env.close()
 
 
+def test_frames_come_from_the_workers(env: WorkersVectorEnv) -> None:
+    env.reset(seed=0)
+    env.step(np.zeros(SLOTS, np.int64))
+    assert env.metadata["render_fps"] == 5
+    frames = env.render()
+    assert [frame.shape for frame in frames] == [(2, 2, 3)] * SLOTS
+    assert [frame.max() for frame in frames] == [1] * SLOTS
+
+
 def test_ids_registered_here_are_known_to_workers() -> None:
     gym.register("Wanderer-v0", entry_point=Wanderer, kwargs={"number": 0})
     try:
@@ -393,7 +402,7 @@ SCRIPT = textwrap.dedent(
             return 0, 0.0, False, False, {}
 
         def close(self):
-            print("shut", flush=True)
+            os.write(1, b"shut\\n")  # as a whole, while others write as well
 
     env = WorkersVectorEnv([Slow] * 2, workers=2)
     pids = env.reset()[1]["pid"]

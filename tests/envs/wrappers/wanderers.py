@@ -22,6 +22,8 @@ class Wanderer(gym.Env):
 
     observation_space = gym.spaces.Box(-100.0, 100.0, (2,), np.float64)
     action_space = gym.spaces.Discrete(3)
+    metadata = {"render_modes": ["rgb_array"], "render_fps": 5}  # noqa: RUF012
+    render_mode = "rgb_array"
 
     def __init__(self, number: int) -> None:
         self.number = number
@@ -41,6 +43,9 @@ class Wanderer(gym.Env):
         # Not before the step in which something goes wrong.
         ended = self.time > 3 and bool(self.np_random.random() < 0.1)
         return self.place.copy(), float(self.place[0]), ended, False, self.info()
+
+    def render(self):
+        return np.full((2, 2, 3), self.time, np.uint8)
 
     def info(self) -> dict[str, Any]:
         allowed = np.array([True, self.place[0] > 0, self.place[1] > 0])

@@ -148,14 +148,15 @@ class Host:
             outcomes.append((self._slot, self._env.reset(seed=seed, options=options)))
         return outcomes
 
-    def step(self, moves: list[tuple[int, Any]]) -> Outcomes:
+    def step(self, slots: list[int], actions: Iterable[Any]) -> Outcomes:
         """Take an action in each of some slots; None comes of an episode that is lost.
 
         Args:
-            moves: slots and actions.
+            slots: which.
+            actions: one for each of them.
         """
         outcomes: Outcomes = []
-        for self._slot, action in moves:
+        for self._slot, action in zip(slots, actions, strict=True):
             lost = self._slot in self._lost
             outcomes.append((self._slot, None if lost else self._env.step(action)))
         return outcomes

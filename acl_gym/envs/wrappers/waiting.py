@@ -96,11 +96,10 @@ class WaitingSlots(VectorEnv[Any, Any, NDArray[Any]]):
             shown = self._shown
         infos: dict[str, Any] = {}
         for slot, given in self._begin(started, [seeds[i] for i in started], passed):
-            if type(given) is not tuple or len(given) != 2:
-                raise _not_parts("reset", given, 2)
-            observation, info = given
+            observation, info = _parts("reset", given, 2)
             set_row(shown, slot, observation)
-            infos = self._add_info(infos, info, slot)
+            if info:
+                infos = self._add_info(infos, info, slot)
         self._shown = shown
         self._finished[slots] = False
         return copied(shown), infos
@@ -132,28 +131,21 @@ class WaitingSlots(VectorEnv[Any, Any, NDArray[Any]]):
             raise ResetNeeded("call reset before the first step.")
         plain = type(shown) is np.ndarray
         shape = shown.shape[1:] if plain else None
+        rewards = np.zeros(self.num_envs)
+        terminated = np.zeros(self.num_envs, dtype=np.bool_)
+        truncated = np.zeros(self.num_envs, dtype=np.bool_)
         infos: dict[str, Any] = {}
-        outcomes: list[tuple[Any, Any, Any]] = []
-        walking = np.flatnonzero(~self._finished)
-        for slot, given in self._advance(walking.tolist(), actions):
+        walking = np.flatnonzero(~self._finished).tolist()
+        for slot, given in self._advance(walking, actions):
             if type(given) is not tuple or len(given) != 5:
-                raise _not_parts("step", given, 5)
-            seen = given[0]
+                given = _parts("step", given, 5)
+            seen, rewards[slot], terminated[slot], truncated[slot], info = given
             if plain and type(seen) is np.ndarray and seen.shape == shape:
                 shown[slot] = seen  # what is most frequent needs no more checks
             else:
                 set_row(shown, slot, seen)
-            outcomes.append(given[1:4])
-            if given[4]:
-                infos = self._add_info(infos, given[4], slot)
-        rewards = np.zeros(self.num_envs)
-        terminated = np.zeros(self.num_envs, dtype=np.bool_)
-        truncated = np.zeros(self.num_envs, dtype=np.bool_)
-        if outcomes:
-            # At once, which is faster than slot by slot.
-            rewards[walking], terminated[walking], truncated[walking] = zip(
-                *outcomes, strict=True
-            )
+            if info:
+                infos = self._add_info(infos, info, slot)
         self._finished |= terminated | truncated
         return copied(shown), rewards, terminated, truncated, infos
 
@@ -223,8 +215,15 @@ def made_by_id(
     return [lambda: gym.make(env_id, **kwargs)] * count
 
 
-def _not_parts(name: str, given: Any, count: int) -> ValueError:
-    return ValueError(
-        f"{name} of a single environment must return a tuple of {count} parts, as "
-        f"gymnasium.Env describes, got {validation.shown(given)}."
-    )
+def _parts(name: str, given: Any, count: int) -> Any:
+    """What a single environment returned, if it has so many parts.
+
+    Raises:
+        ValueError: it has not.
+    """
+    if not isinstance(given, (tuple, list)) or len(given) != count:
+        raise ValueError(
+            f"{name} of a single environment must return a tuple of {count} parts, as "
+            f"gymnasium.Env describes, got {validation.shown(given)}."
+        )
+    return given

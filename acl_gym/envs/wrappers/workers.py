@@ -39,11 +39,13 @@ class _Episode:
 class WorkersVectorEnv(WaitingSlots):
     """Slots whose environments are stepped by workers, for those that are slow to step.
 
-    Like a `WaitingVectorEnv` it steps only the slots that have not finished, and an
-    agent learns the same with either, to the bit, from any number of workers: every
-    episode of a slot starts from a seed that is drawn here, see `reset`. It pays where
-    a step takes longer than a message to a worker, about 0.1 ms in processes and 1 ms on
-    a cluster, for all the slots of a worker together.
+    Like a `WaitingVectorEnv` it steps only the slots that have not finished. What an
+    agent learns is the same, to the bit, for any number of workers and every executor:
+    each episode of a slot starts from a seed that is drawn here, see `reset`. Where each
+    trial is seeded, as by the agents of this package, it is also the same as with a
+    `WaitingVectorEnv`. It pays where the slots of a worker take longer for a step
+    together than a message to it, a few tenths of a millisecond for a process and a few
+    milliseconds for a cluster.
 
     When a worker dies (killed, out of memory, or by a fault of a simulator), a new one
     resets its slots with the same seeds and repeats the actions of the episodes under
@@ -60,8 +62,9 @@ class WorkersVectorEnv(WaitingSlots):
         workers: how many, >= 0; slots are dealt to them in blocks. More than slots are
             not started. With 0 the environments are in this process.
         executor: "processes" of this machine; "ray" for actors on the cluster that
-            `ray.init` was called for, or else on the one that runs on this machine; or
-            "serial", in this process whatever `workers` is.
+            `ray.init` was called for, or else on the one that runs on this machine, each
+            node with the same version of this package; or "serial", in this process
+            whatever `workers` is.
         timeout: seconds that the slots of a worker may take for a step together, > 0;
             then the worker is stopped, and counts as dead. None waits for ever. It has no
             effect in this process.
@@ -247,15 +250,18 @@ class WorkersVectorEnv(WaitingSlots):
         return int(drawn.generate_state(1)[0] >> 1)  # some take 31 bits only
 
     def _advance(self, slots: list[int], actions: Any) -> Iterable[tuple[int, Any]]:
-        taken = list(iterate(self.action_space, copy.deepcopy(actions)))
+        actions = copy.deepcopy(actions)
+        taken = list(iterate(self.action_space, actions))
         if len(taken) != self.num_envs:
             raise ValueError(
                 f"actions must be {self.num_envs}, one for each slot, got {len(taken)}."
             )
-        questions: dict[int, Question] = {
-            number: ("step", ([(slot, taken[slot]) for slot in own],))
-            for number, own in self._by_worker(slots)
-        }
+        questions: dict[int, Question] = {}
+        for number, own in self._by_worker(slots):
+            rows: Any = [taken[slot] for slot in own]
+            if isinstance(actions, np.ndarray):
+                rows = actions[own]  # it is sent faster than its elements
+            questions[number] = "step", (own, rows)
         answers = self._crew.ask(questions, self._repeats)
         for slot in slots:
             self._episodes[slot].actions.append(taken[slot])

@@ -13,19 +13,33 @@ import pytest
 
 FOLDER = Path(__file__).resolve().parent.parent / "benchmarks"
 
+ONCE = ("--repetitions", "1")
+
 pytestmark = pytest.mark.slow
 
 
 def output_of(script: str, *arguments: str) -> Any:
-    command = [sys.executable, str(FOLDER / script), "--json", "--repetitions", "1"]
+    command = [sys.executable, str(FOLDER / script), "--json"]
     done = subprocess.run(
         [*command, *arguments], capture_output=True, text=True, check=True
     )
     return json.loads(done.stdout)
 
 
+def test_asynchronous() -> None:
+    arguments = ["--seeds", "1", "--cases", "grid", "--colonies", "returning"]
+    found = output_of("asynchronous.py", *arguments)
+    assert found["best"]["grid"] == pytest.approx(10.0, abs=0.3)  # mean shortest path
+    for row in found["rows"]:
+        near = row["reached"]["25%"]
+        assert 0.0 < row["walking"] <= 1.0
+        assert near["interactions"] <= row["ants"] * near["env_steps"]
+    walking = {row["schedule"]: row["walking"] for row in found["rows"]}
+    assert walking["synchronous"] < walking["asynchronous"] == 1.0
+
+
 def test_plant() -> None:
-    cases = output_of("plant.py", "--slots", "3")["cases"]
+    cases = output_of("plant.py", "--slots", "3", *ONCE)["cases"]
     assert [case["slots"] for case in cases] == [1, 3, 3, 3]
     assert cases[0]["ratio_to_reference"] == 1.0
     assert all(case["steps_per_second"] > 0 for case in cases)
@@ -33,7 +47,7 @@ def test_plant() -> None:
 
 @pytest.mark.skipif(shutil.which("gcc") is None, reason="needs gcc")
 def test_policy_export() -> None:
-    rows = output_of("policy_export.py")["rows"]
+    rows = output_of("policy_export.py", *ONCE)["rows"]
     assert len(rows) == 4 * 4
     # A call of C takes a hundredth of `predict`, which enters NumPy and Numba.
     assert all(row["ratio_to_predict"] < 0.5 for row in rows if "table_bytes" in row)

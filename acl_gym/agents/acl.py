@@ -119,7 +119,7 @@ class ACL(ColonyAgent):
         3
     """
 
-    completes = True  # only complete solutions have a cost
+    _completes = True  # only complete solutions have a cost
 
     tau0 = Parameter("Initial pheromone level", "tau_0", fixed=True, above=0)
     local_decay = Parameter(

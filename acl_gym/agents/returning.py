@@ -94,7 +94,7 @@ class ReturningACL(ColonyAgent):
         True
     """
 
-    completes = False  # what an ant has done until then is remembered in any case
+    _completes = False  # what an ant has done until then is remembered in any case
 
     discount = Parameter(
         "Weight of what follows a step", "gamma_rl", at_least=0, at_most=1

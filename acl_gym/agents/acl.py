@@ -197,8 +197,6 @@ class ACL(ColonyAgent):
         )
         self._solutions: Solutions | None = None
         self._rule = self._update  # of the trial under way; see `watched`
-        # Of the last ants that came back, at most M; kept by an asynchronous colony only.
-        self._latest_costs: FloatArray = np.empty(0)
         self._check_tau0()
 
     def learn(
@@ -296,6 +294,9 @@ class ACL(ColonyAgent):
     @cost.setter
     def cost(self, value: Cost | Callable[[Episode], float] | None) -> None:
         self._cost = as_cost(value)
+        # Of the last ants that came back, at most M, to compare the next with; kept by an
+        # asynchronous colony only.
+        self._latest_costs: FloatArray = np.empty(0)
 
     @property
     def deposit(self) -> Deposit:

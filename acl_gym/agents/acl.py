@@ -197,6 +197,8 @@ class ACL(ColonyAgent):
         )
         self._solutions: Solutions | None = None
         self._rule = self._update  # of the trial under way; see `watched`
+        # How many have come back of M ants; once they all have, others count.
+        self._in_batch, self._batch_is_full = 0, True
         self._check_tau0()
 
     def learn(
@@ -245,7 +247,7 @@ class ACL(ColonyAgent):
                 observation = rollout.start(seed=self._next_seed(), record=record)
                 rule.start_trial(pheromone, self.trials)
                 costs: list[FloatArray] = []
-                n_back = 0
+                self._in_batch, self._batch_is_full = 0, True
                 while rollout._ants.size:  # 7, 17: repeat until t = T or C is empty
                     ants = rollout._ants
                     # 8: fuzzify the states
@@ -265,8 +267,7 @@ class ACL(ColonyAgent):
                     # solutions once the last ant is back, or with each at once
                     ants_back = rollout.returned
                     if ants_back is not None:
-                        result = self._result(rollout, ants_back, solutions, n_back)
-                        n_back += ants_back.size
+                        result = self._result(rollout, ants_back, solutions)
                         rule.global_update(
                             pheromone, result, self.local_decay, self.global_decay
                         )
@@ -478,7 +479,7 @@ class ACL(ColonyAgent):
         return self.cost is not None or self.update.needs_episodes
 
     def _result(
-        self, rollout: Rollout, ants: IntArray, solutions: Solutions, before: int
+        self, rollout: Rollout, ants: IntArray, solutions: Solutions
     ) -> TrialResult:
         """The solutions of the ants that are back, what they cost, and what they deposit.
 
@@ -486,15 +487,18 @@ class ACL(ColonyAgent):
             rollout: where they walked.
             ants: who is back, `(m,)`.
             solutions: of all ants.
-            before: how many have come back in this trial before.
         """
         episodes = rollout.returned_episodes() if self._needs_episodes() else None
         costs = rollout.cost[ants]
         if self.cost is not None and episodes is not None:
             costs = solution_costs(self.cost, episodes)
-        compared, batch = costs, None
+        compared, begins = costs, None
         if self.is_asynchronous:
-            batch = before // self.num_envs
+            begins = self._batch_is_full
+            self._in_batch += ants.size
+            self._batch_is_full = self._in_batch >= self.num_envs
+            if self._batch_is_full:
+                self._in_batch -= self.num_envs
             compared = np.concatenate([self._latest_costs, costs])[-self.num_envs :]
             self._latest_costs = compared
         deposits = checked_deposits(self._deposit(compared, self.tau0), compared.size)
@@ -504,7 +508,7 @@ class ACL(ColonyAgent):
             deposits[-ants.size :],
             rollout.terminated[ants],
             episodes,
-            batch,
+            begins,
         )
 
     def _allowed(

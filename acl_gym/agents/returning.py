@@ -200,8 +200,8 @@ class ReturningACL(ColonyAgent):
     ) -> Self:
         """Let the ants walk, remember, walk back and, where it may, the partition grow.
 
-        A trial is one episode in every slot, or more, see `schedule`. Called again, it continues from the levels
-        and the memory as they are.
+        A trial is one episode in every slot, or more, see `schedule`. Called again, it
+        continues from the levels and the memory as they are.
 
         Args:
             total_timesteps: stop after the trial that reaches this many steps of all

@@ -236,7 +236,6 @@ class ReturningACL(ColonyAgent):
     def _walk(self, observation: Any) -> tuple[Walk, Any]:
         """Let the ants that still walk make some steps; return these and where they are."""
         rollout, walk = self.rollout, Walk(self.num_envs)
-        going = rollout._ants
         while rollout._ants.size and walk.steps < self.steps_per_walk:
             ants, allowed = rollout._ants, rollout.allowed()
             index, degree = self._locate(observation, ants)
@@ -245,8 +244,9 @@ class ReturningACL(ColonyAgent):
             )
             step = rollout._step(actions)
             walk.append(ants, observation, actions, -step.cost, allowed)
-            observation, going = step.observation, ants[~step.finished]
-            if going.size < ants.size:
+            observation, going = step.observation, ants
+            if step.finished.any():
+                going = ants[~step.finished]
                 done, goal = ants[step.finished], step.terminated[step.finished]
                 walk.stop(done, observation, goal, rollout.allowed_after(done))
                 observation = rollout.set_out(observation)

@@ -13,19 +13,33 @@ import pytest
 
 FOLDER = Path(__file__).resolve().parent.parent / "benchmarks"
 
+ONCE = ("--repetitions", "1")
+
 pytestmark = pytest.mark.slow
 
 
-def output_of(script: str, *arguments: str, once: str = "--repetitions") -> Any:
-    command = [sys.executable, str(FOLDER / script), "--json", once, "1"]
+def output_of(script: str, *arguments: str) -> Any:
+    command = [sys.executable, str(FOLDER / script), "--json"]
     done = subprocess.run(
         [*command, *arguments], capture_output=True, text=True, check=True
     )
     return json.loads(done.stdout)
 
 
+def test_asynchronous() -> None:
+    arguments = ["--seeds", "1", "--cases", "grid", "--colonies", "returning"]
+    found = output_of("asynchronous.py", *arguments)
+    assert found["best"]["grid"] == pytest.approx(10.0, abs=0.3)  # mean shortest path
+    for row in found["rows"]:
+        near = row["reached"]["25%"]
+        assert 0.0 < row["walking"] <= 1.0
+        assert near["interactions"] <= row["ants"] * near["env_steps"]
+    walking = {row["schedule"]: row["walking"] for row in found["rows"]}
+    assert walking["synchronous"] < walking["asynchronous"] == 1.0
+
+
 def test_plant() -> None:
-    cases = output_of("plant.py", "--slots", "3")["cases"]
+    cases = output_of("plant.py", "--slots", "3", *ONCE)["cases"]
     assert [case["slots"] for case in cases] == [1, 3, 3, 3]
     assert cases[0]["ratio_to_reference"] == 1.0
     assert all(case["steps_per_second"] > 0 for case in cases)
@@ -33,7 +47,7 @@ def test_plant() -> None:
 
 def test_workers() -> None:
     small = ("--slots", "2", "--steps", "2", "--milliseconds", "0.1", "--without-ray")
-    cases = output_of("workers.py", *small)["cases"]
+    cases = output_of("workers.py", *small, *ONCE)["cases"]
     assert [case["name"] for case in cases[-2:]] == [
         "WorkersVectorEnv, processes, 1",
         "WorkersVectorEnv, processes, 2",
@@ -44,7 +58,7 @@ def test_workers() -> None:
 
 @pytest.mark.skipif(shutil.which("gcc") is None, reason="needs gcc")
 def test_policy_export() -> None:
-    rows = output_of("policy_export.py")["rows"]
+    rows = output_of("policy_export.py", *ONCE)["rows"]
     assert len(rows) == 4 * 4
     # A call of C takes a hundredth of `predict`, which enters NumPy and Numba.
     assert all(row["ratio_to_predict"] < 0.5 for row in rows if "table_bytes" in row)
@@ -53,7 +67,7 @@ def test_policy_export() -> None:
 def test_ablation() -> None:
     """Where a state is a cell nothing grows, so that one variant is left out."""
     arguments = ["--tasks", "grid,pendulum", "--steps", "1500"]
-    rows = output_of("ablation.py", *arguments, once="--seeds")["rows"]
+    rows = output_of("ablation.py", *arguments, "--seeds", "1")["rows"]
     assert [row["variant"] for row in rows if row["task"] == "grid"] == [
         *("returning", "no memory", "the latest", "no ants", "none"),
     ]

@@ -119,7 +119,7 @@ class ACL(ColonyAgent):
         3
     """
 
-    completes = True  # only complete solutions have a cost
+    _completes = True  # only complete solutions have a cost
 
     tau0 = Parameter("Initial pheromone level", "tau_0", fixed=True, above=0)
     local_decay = Parameter(
@@ -197,8 +197,8 @@ class ACL(ColonyAgent):
         )
         self._solutions: Solutions | None = None
         self._rule = self._update  # of the trial under way; see `watched`
-        # Of the last ants that came back, at most M; kept by an asynchronous colony only.
-        self._latest_costs: FloatArray = np.empty(0)
+        # How many have come back of M ants; once they all have, others count.
+        self._in_batch, self._batch_is_full = 0, True
         self._check_tau0()
 
     def learn(
@@ -247,7 +247,7 @@ class ACL(ColonyAgent):
                 observation = rollout.start(seed=self._next_seed(), record=record)
                 rule.start_trial(pheromone, self.trials)
                 costs: list[FloatArray] = []
-                n_back = 0
+                self._in_batch, self._batch_is_full = 0, True
                 while rollout._ants.size:  # 7, 17: repeat until t = T or C is empty
                     ants = rollout._ants
                     # 8: fuzzify the states
@@ -267,8 +267,7 @@ class ACL(ColonyAgent):
                     # solutions once the last ant is back, or with each at once
                     ants_back = rollout.returned
                     if ants_back is not None:
-                        result = self._result(rollout, ants_back, solutions, n_back)
-                        n_back += ants_back.size
+                        result = self._result(rollout, ants_back, solutions)
                         rule.global_update(
                             pheromone, result, self.local_decay, self.global_decay
                         )
@@ -296,6 +295,9 @@ class ACL(ColonyAgent):
     @cost.setter
     def cost(self, value: Cost | Callable[[Episode], float] | None) -> None:
         self._cost = as_cost(value)
+        # Of the last ants that came back, at most M, to compare the next with; kept by an
+        # asynchronous colony only.
+        self._latest_costs: FloatArray = np.empty(0)
 
     @property
     def deposit(self) -> Deposit:
@@ -477,7 +479,7 @@ class ACL(ColonyAgent):
         return self.cost is not None or self.update.needs_episodes
 
     def _result(
-        self, rollout: Rollout, ants: IntArray, solutions: Solutions, before: int
+        self, rollout: Rollout, ants: IntArray, solutions: Solutions
     ) -> TrialResult:
         """The solutions of the ants that are back, what they cost, and what they deposit.
 
@@ -485,15 +487,18 @@ class ACL(ColonyAgent):
             rollout: where they walked.
             ants: who is back, `(m,)`.
             solutions: of all ants.
-            before: how many have come back in this trial before.
         """
         episodes = rollout.returned_episodes() if self._needs_episodes() else None
         costs = rollout.cost[ants]
         if self.cost is not None and episodes is not None:
             costs = solution_costs(self.cost, episodes)
-        compared, batch = costs, None
+        compared, begins = costs, None
         if self.is_asynchronous:
-            batch = before // self.num_envs
+            begins = self._batch_is_full
+            self._in_batch += ants.size
+            self._batch_is_full = self._in_batch >= self.num_envs
+            if self._batch_is_full:
+                self._in_batch -= self.num_envs
             compared = np.concatenate([self._latest_costs, costs])[-self.num_envs :]
             self._latest_costs = compared
         deposits = checked_deposits(self._deposit(compared, self.tau0), compared.size)
@@ -503,7 +508,7 @@ class ACL(ColonyAgent):
             deposits[-ants.size :],
             rollout.terminated[ants],
             episodes,
-            batch,
+            begins,
         )
 
     def _allowed(

@@ -34,7 +34,7 @@ class ColonyAgent(TabularAgent):
 
     slots_are = "ants"
 
-    completes: ClassVar[bool]
+    _completes: ClassVar[bool]
     """Of the asynchronous schedule: whether episodes are completed, see `Stream`."""
 
     def __init__(
@@ -70,4 +70,4 @@ class ColonyAgent(TabularAgent):
         if not self.is_asynchronous:
             return super()._new_rollout(env)
         limit = time_limit(env)
-        return Stream(env, self.max_steps, limit, completes=self.completes)
+        return Stream(env, self.max_steps, limit, completes=self._completes)

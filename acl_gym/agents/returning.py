@@ -104,7 +104,7 @@ class ReturningACL(RememberingAgent, ColonyAgent):
     """
 
     always_remembers = True
-    completes = False  # what an ant has done until then is remembered in any case
+    _completes = False  # what an ant has done until then is remembered in any case
 
     discount = Parameter(
         "Weight of what follows a step", "gamma_rl", at_least=0, at_most=1
@@ -277,8 +277,9 @@ class ReturningACL(RememberingAgent, ColonyAgent):
             )
             step = rollout._step(actions)
             walk.append(ants, seen, actions, -step.cost, allowed)
-            observation, going = step.observation, ants[~step.finished]
-            if going.size < ants.size:
+            observation, going = step.observation, ants
+            if step.finished.any():
+                going = ants[~step.finished]
                 done, goal = ants[step.finished], step.terminated[step.finished]
                 walk.stop(done, observation, goal, rollout.allowed_after(done))
                 observation = rollout.set_out(observation)

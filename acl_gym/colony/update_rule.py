@@ -29,11 +29,11 @@ class TrialResult:
         terminated: whether each ant ended in a terminal state, `(n_ants,)`.
         episodes: observations, actions and stage costs, step by step; None unless
             the rule's `needs_episodes` is True.
-        batch: None where these are all M ants of a trial. In an asynchronous colony
-            (§7.3) they are those that have come back in one step: `solutions` and arrays
-            hold only these, and `batch` = 0, 1, ... counts how often M ants have come
-            back since the trial began. What happens once in a synchronous trial of M
-            ants is due once for each batch.
+        begins_batch: None where these are all M ants of a trial. In an asynchronous
+            colony (§7.3) they are those that have come back in one step, and `solutions`
+            and arrays hold only these. True: they are the first of the trial, or the
+            first after another M. What happens once in a synchronous trial of M ants is
+            then due again.
     """
 
     solutions: Solutions
@@ -41,7 +41,7 @@ class TrialResult:
     deposits: FloatArray
     terminated: BoolArray
     episodes: Episodes | None = None
-    batch: int | None = None
+    begins_batch: bool | None = None
 
 
 class UpdateRule(Savable, ABC):

@@ -48,12 +48,7 @@ class Reinforcement:
         self._summed: FloatArray = np.zeros((n_pairs, 4))
         self._touched: IntArray = np.empty(n_pairs + 1, dtype=np.int64)
         self._interrupted = False  # an update that did not end left the scratch dirty
-        self._batch: int | None = None
         self._evaporated: FloatArray | None = None
-
-    def start_trial(self) -> None:
-        """Begin a trial, whose batches are counted from 0."""
-        self._batch = None
 
     def __call__(
         self,
@@ -61,7 +56,7 @@ class Reinforcement:
         solutions: Solutions,
         deposits: FloatArray,
         global_decay: float,
-        batch: int | None = None,
+        begins_batch: bool | None = None,
     ) -> None:
         """Reinforce along every solution.
 
@@ -82,7 +77,7 @@ class Reinforcement:
             solutions: of the ants that deposit.
             deposits: of each of them.
             global_decay: rho, in [0, 1].
-            batch: to which they belong, see `TrialResult`; None: they are all.
+            begins_batch: see `TrialResult`.
 
         Raises:
             ValueError: a deposit is not positive and finite.
@@ -122,18 +117,17 @@ class Reinforcement:
             global_decay,
             pheromone.levels,
             pheromone.stale,
-            self._evaporated_in(batch),
+            self._evaporated_so_far(begins_batch),
         )
         self._interrupted = False
 
-    def _evaporated_in(self, batch: int | None) -> FloatArray | None:
-        """With which degree each pair has evaporated in this batch; None: not at all."""
-        if batch is None:
+    def _evaporated_so_far(self, begins_batch: bool | None) -> FloatArray | None:
+        """With which degree each pair has evaporated in this batch; None: with none."""
+        if begins_batch is None:
             return None
         if self._evaporated is None:
             self._evaporated = np.zeros(len(self._summed))
-        if batch != self._batch:
-            self._batch = batch
+        elif begins_batch:
             self._evaporated[:] = 0.0
         return self._evaporated
 
@@ -159,11 +153,6 @@ class _DepositAtEnd(UpdateRule):
 
     _reinforcement: Reinforcement | None = None
 
-    def start_trial(self, pheromone: Pheromone, trial: int) -> None:
-        """See `UpdateRule`."""
-        if self._reinforcement is not None:
-            self._reinforcement.start_trial()
-
     def global_update(
         self,
         pheromone: Pheromone,
@@ -175,7 +164,11 @@ class _DepositAtEnd(UpdateRule):
         if self._reinforcement is None:
             self._reinforcement = Reinforcement(pheromone.levels.size)
         self._reinforcement(
-            pheromone, result.solutions, result.deposits, global_decay, result.batch
+            pheromone,
+            result.solutions,
+            result.deposits,
+            global_decay,
+            result.begins_batch,
         )
 
 

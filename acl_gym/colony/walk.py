@@ -40,7 +40,8 @@ class Walk:
         self._actions: list[IntArray] = []
         self._rewards: list[FloatArray] = []
         self._allowed: list[BoolArray | None] = []
-        self._kinds: list[NDArray[np.int8]] = []
+        self._ends: list[tuple[int, NDArray[np.int8]]] = []
+        self._n_rows = 0
         self.steps = 0
 
     def append(
@@ -61,8 +62,7 @@ class Walk:
             rewards: what they got for it, `(m,)`.
             allowed: U_q of each of them before the step, `(m, n_actions)`; None: all.
         """
-        kinds = np.full(ants.size, _STEP, dtype=np.int8)
-        self._add(ants, seen, actions, rewards, allowed, kinds)
+        self._add(ants, seen, actions, rewards, allowed)
         self.steps += ants.size
 
     def stop(
@@ -81,18 +81,13 @@ class Walk:
             allowed: see `append`.
         """
         kinds = np.where(terminated, _GOAL, _END).astype(np.int8)
-        self._add(ants, observation[ants], _zeros(ants), _zeros(ants), allowed, kinds)
+        self._ends.append((self._n_rows, kinds))
+        self._add(ants, observation[ants], _zeros(ants), _zeros(ants), allowed)
 
     def _add(
-        self,
-        ants: Any,
-        seen: Any,
-        actions: Any,
-        rewards: Any,
-        allowed: Any,
-        kinds: Any,
+        self, ants: Any, seen: Any, actions: Any, rewards: Any, allowed: Any
     ) -> None:
-        self._kinds.append(kinds)
+        self._n_rows += ants.size
         self._ants.append(ants)
         self._seen.append(seen)
         self._actions.append(actions)
@@ -129,7 +124,10 @@ class Walk:
             name: np.take(np.concatenate(part), order, axis=0)
             for name, part in parts.items()
         }
-        kinds = np.concatenate(self._kinds)[order]
+        kinds = np.full(self._n_rows, _STEP, dtype=np.int8)
+        for begin, ends in self._ends:
+            kinds[begin : begin + ends.size] = ends
+        kinds = kinds[order]
         last = np.flatnonzero(kinds)
         first = np.concatenate([[0], last[:-1] + 1])
         return Paths(first, last, kinds[last] == _GOAL), rows

@@ -279,7 +279,7 @@ class Rollout:
         if self.steps >= self.max_steps:
             self._ants = ants[:0]
             stopped.fill(True)
-        if not self._ants.size:
+        if self._ants is not ants and not self._ants.size:
             self.returned = self._all
         if self._record is not None:
             self._record.append(observation, self._actions - self.first_action, reward)
@@ -289,7 +289,7 @@ class Rollout:
         """Let the walking ants act; return what the environment gave, checked."""
         if self._stepping:
             self._check_idle("step")
-        ants = self._ants
+        ants, native = self._ants, self._native
         m = ants.size
         passed: Any = actions
         if type(actions) is not np.ndarray:
@@ -314,11 +314,6 @@ class Rollout:
                 f"actions must lie in 0..{self.n_actions - 1}, got {actions[bad]} in "
                 f"slot {ants[bad]}."
             )
-        return self._advance()
-
-    def _advance(self) -> Any:
-        """Step the environment with the actions of all slots as they stand."""
-        native = self._native
         # A copy, because an environment or a wrapper may keep its actions.
         self._stepping = True
         try:

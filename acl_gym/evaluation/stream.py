@@ -248,7 +248,7 @@ class Stream(Rollout):
 
     def _wait_for_resets(self) -> Any:
         """Make the step that resets all resting slots, where no ant walks."""
-        observation, *_ = self._advance()
+        observation, *_ = self._act(self._ants)  # of no ant
         self._ants, self._resting = self._resting, self._all[:0]
         return observation
 

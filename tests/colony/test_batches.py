@@ -49,11 +49,11 @@ def test_levels_are_those_of_the_equation(trial: Trial, seed: int) -> None:
     parts, tau = parts_of(seed, len(trial.length)), trial.tau.copy()
     pheromone, solutions = trial.pheromone, trial.packed()
     lay = Reinforcement(tau.size)
-    for batch in (0, 1):  # each begins anew
+    for _ in range(2):  # the second batch begins anew
         before = pheromone.levels.copy()
-        for part in parts:
-            deposits = 1.0 / trial.costs[part]
-            lay(pheromone, solutions.of(part), deposits, trial.rho, batch)
+        for number, part in enumerate(parts):
+            deposits, begins = 1.0 / trial.costs[part], number == 0
+            lay(pheromone, solutions.of(part), deposits, trial.rho, begins)
         wanted = expected(trial, parts, before)
         np.testing.assert_allclose(pheromone.levels, wanted, rtol=1e-9)
 
@@ -63,11 +63,11 @@ def test_levels_are_those_of_the_equation(trial: Trial, seed: int) -> None:
 def test_a_whole_batch_is_a_synchronous_trial_to_the_bit(trial: Trial) -> None:
     tau, deposits = trial.tau.copy(), 1.0 / trial.costs
     levels = []
-    for batch in (None, 0):
+    for begins in (None, True):
         pheromone = Pheromone(*tau.shape, tau0=trial.pheromone.tau0, alpha=1.0)
         pheromone.set_levels(tau)
         lay = Reinforcement(tau.size)
-        lay(pheromone, trial.packed(), deposits, trial.rho, batch)
+        lay(pheromone, trial.packed(), deposits, trial.rho, begins)
         levels.append(pheromone.levels.tobytes())
     assert levels[0] == levels[1]
 
@@ -83,8 +83,8 @@ def test_one_by_one_in_any_order_comes_to_the_same() -> None:
     for order in ([[0, 1, 2, 3]], [[0], [1], [2], [3]], [[3], [0, 2], [1]]):
         pheromone = Pheromone(3, 2, tau0=1.0, alpha=1.0)
         lay = Reinforcement(6)
-        for part in map(np.array, order):
-            lay(pheromone, solutions.of(part), deposits[part], 0.5, 7)
+        for number, part in enumerate(map(np.array, order)):
+            lay(pheromone, solutions.of(part), deposits[part], 0.5, number == 0)
         levels.append(pheromone.levels)
     wanted = 0.5 + 0.5 * np.array([[1 + 2, 3], [1, 1], [1 + 4, 1]])
     for each in levels:
@@ -100,8 +100,7 @@ class _Cells:
 _CELLS = _Cells()
 
 
-def test_a_trial_begins_with_a_batch_of_its_own() -> None:
-    """Its number is 0 again; what evaporated in the last trial does not count."""
+def test_every_rule_evaporates_once_a_batch() -> None:
     index = np.zeros((1, 1), dtype=np.int32)
     solutions = Solutions(2, 3, 1, partition=_CELLS)
     solutions.append(
@@ -119,7 +118,7 @@ def test_a_trial_begins_with_a_batch_of_its_own() -> None:
                 before = pheromone.levels[0, 0]
                 part = solutions.of(np.array([ant]))
                 one, no = np.array([1.0]), np.array([False])
-                result = TrialResult(part, one, one, no, batch=0)
+                result = TrialResult(part, one, one, no, begins_batch=ant == 0)
                 rule.global_update(pheromone, result, 0.0, 0.5)
                 kept = 0.5 if ant == 0 else 1.0
                 assert pheromone.levels[0, 0] == kept * before + 0.5

@@ -42,6 +42,7 @@ if TYPE_CHECKING:
     from acl_gym.envs.plant import plant
     from acl_gym.envs.wrappers.scaling import ScaledObservation, ScaledVectorObservation
     from acl_gym.envs.wrappers.waiting import WaitingVectorEnv
+    from acl_gym.envs.wrappers.workers import WorkersVectorEnv
     from acl_gym.evaluation import PolicyCost, evaluate_policy_cost
     from acl_gym.partitions import Crisp, Discrete, Fuzzy, Partition
     from acl_gym.partitions.automatic import automatic_partition
@@ -97,6 +98,7 @@ _PUBLIC = {
     "VectorEnvAdapter": "acl_gym.sb3.adapter",
     "WaitingVectorEnv": "acl_gym.envs.wrappers.waiting",
     "Weighted": "acl_gym.costs",
+    "WorkersVectorEnv": "acl_gym.envs.wrappers.workers",
     "automatic_partition": "acl_gym.partitions.automatic",
     "evaluate_policy_cost": "acl_gym.evaluation",
     "fuzzy_q_iteration": "acl_gym.planning.q_iteration",
@@ -147,6 +149,7 @@ __all__ = [
     "VectorEnvAdapter",
     "WaitingVectorEnv",
     "Weighted",
+    "WorkersVectorEnv",
     "__version__",
     "automatic_partition",
     "evaluate_policy_cost",

@@ -45,9 +45,34 @@ def test_plant() -> None:
     assert all(case["steps_per_second"] > 0 for case in cases)
 
 
+def test_workers() -> None:
+    small = ("--slots", "2", "--steps", "2", "--milliseconds", "0.1", "--without-ray")
+    cases = output_of("workers.py", *small, *ONCE)["cases"]
+    assert [case["name"] for case in cases[-2:]] == [
+        "WorkersVectorEnv, processes, 1",
+        "WorkersVectorEnv, processes, 2",
+    ]
+    assert cases[0]["ratio_to_reference"] == 1.0
+    assert all(case["steps_per_second"] > 0 for case in cases)
+
+
 @pytest.mark.skipif(shutil.which("gcc") is None, reason="needs gcc")
 def test_policy_export() -> None:
     rows = output_of("policy_export.py", *ONCE)["rows"]
     assert len(rows) == 4 * 4
     # A call of C takes a hundredth of `predict`, which enters NumPy and Numba.
     assert all(row["ratio_to_predict"] < 0.5 for row in rows if "table_bytes" in row)
+
+
+def test_ablation() -> None:
+    """Where a state is a cell nothing grows, so that one variant is left out."""
+    arguments = ["--tasks", "grid,pendulum", "--steps", "1500"]
+    rows = output_of("ablation.py", *arguments, "--seeds", "1")["rows"]
+    assert [row["variant"] for row in rows if row["task"] == "grid"] == [
+        *("returning", "no memory", "the latest", "no ants", "none"),
+    ]
+    assert len(rows) == 5 + 6
+    for row in rows:
+        assert row["best"] >= row["last"]
+        assert row["runs"][0]["steps"] >= 1500
+        assert row["reached_25"] == (row["steps_25"] is not None)

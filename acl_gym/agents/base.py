@@ -284,6 +284,15 @@ class TabularAgent(SavedAgent):
         )
         self._located = _Located(slots, k)
 
+    def _replace_partition(self, partition: Partition) -> None:
+        """Take over a partition that has grown; the table is to be replaced as well."""
+        self.__dict__["partition"] = partition  # fixed for everyone else
+        # A function of the size, so that a run that is resumed breaks ties alike.
+        ties = np.random.default_rng(partition.n_cells)
+        self._ranks = random_ranks(partition.n_cells, self.n_actions, ties)
+        if self._rollout is not None:
+            self._make_room(self.num_envs, partition.cells_per_state)
+
     def set_random_seed(self, seed: int | None) -> None:
         """Restart the agent's random numbers.
 

@@ -8,33 +8,26 @@ import numpy as np
 from gymnasium.vector import VectorEnv
 from numpy.typing import ArrayLike
 
-from acl_gym.agents.base import TabularAgent
+from acl_gym.agents.remembering import RememberingAgent
 from acl_gym.agents.training import Training
 from acl_gym.callbacks.base import Callbacks
 from acl_gym.colony.greedy import (
     ALL,
-    LOOP,
-    best_value,
     epsilon_greedy_actions,
     epsilon_greedy_unchecked,
     mark_greedy,
 )
-from acl_gym.partitions import Partition, locate_all
+from acl_gym.colony.replay import replay
+from acl_gym.colony.temporal_difference import update_values
+from acl_gym.colony.traces import TRACES, Traces
+from acl_gym.colony.walk import Walk
+from acl_gym.partitions import Partition
 from acl_gym.utils import validation
-from acl_gym.utils.compiling import njit
 from acl_gym.utils.parameters import Parameter, fixed
 from acl_gym.utils.typing import BoolArray, CellArray, FloatArray, IntArray
 
-TRACES = ("replacing", "accumulating")
 
-FIRST_TRACES = 1_024
-"""For how many traces of each slot there is memory at first."""
-
-TRACE_CUTOFF = 1e-4
-"""Traces that fade below it are dropped (a decision)."""
-
-
-class QLearning(TabularAgent):
+class QLearning(RememberingAgent):
     """Watkins's Q-learning (3.44) and Q(lambda) (3.45), all slots learning one table.
 
     Through a `Crisp` partition it is tabular Q-learning; through a `Fuzzy` one the
@@ -51,10 +44,18 @@ class QLearning(TabularAgent):
     it was chosen on first clears the slot's traces; tied actions are greedy. Traces
     below 1e-4 are dropped.
 
+    With `replay` > 0 the slots remember what they did, as the ants of `ReturningACL` do.
+    After every `steps_per_replay` steps the newest paths and some older ones are learned
+    from again, `replay` times: backwards along each path, one step after the other,
+    each on the values as they then are. With `trace_decay` > 0 these steps learn from
+    the lambda-return of Watkins's Q(lambda), see `acl_gym.colony.replay`. With
+    `grows=True` the partition becomes wider and finer with what is seen, as that of
+    `ReturningACL`; traces then begin anew.
+
     Args:
         env: a vector environment with `Discrete` actions.
         partition: turns observations into cells and degrees; None takes
-            `automatic_partition(env)`.
+            `automatic_partition(env)`, or a coarse one to begin with if it grows.
         learning_rate: alpha_rl, in (0, 1].
         discount: gamma_rl, in [0, 1].
         epsilon: probability of a random action, in [0, 1].
@@ -64,6 +65,20 @@ class QLearning(TabularAgent):
             it e + beta: a slot that stands still against a wall comes to
             1 / (1 - gamma_rl lambda), which times the learning rate can exceed 1, and
             then the value moves further than the error.
+        replay: how often paths are learned from again after `steps_per_replay` steps,
+            in [0, 10000]; 0: never.
+        older_steps: how many steps of older paths are replayed beside the newest paths
+            each time, in [0, 1e9].
+        steps_per_replay: after how many steps of all slots together, in [1, 1e9], or at
+            the end of the trial, paths are replayed and the partition may grow.
+        memory_size: how many states are remembered, >= 1, where `replay`, `grows` or
+            `optimism` needs it.
+        optimism: in [0, 1], what pairs promise that were never tried: with 0 the value
+            of a good state, with 1 the most that could be had. None: they stay at 0.
+        grows: whether the partition becomes wider and finer.
+        visits_to_grow: how often the median pair of those tried must have been tried
+            before the partition becomes finer along one variable, > 0.
+        max_cells: the partition does not become finer than this, in [1, 2e9].
         max_steps: the longest an episode may last, >= 1. None takes the time limit of
             the environment, or 300 if it has none.
         seed: the same seed gives the same run; None draws one from the system.
@@ -92,6 +107,33 @@ class QLearning(TabularAgent):
         at_least=0,
         at_most=1,
     )
+    replay = Parameter(
+        "Replays of remembered paths after some steps; 0: none",
+        whole=True,
+        at_least=0,
+        at_most=10_000,
+    )
+    older_steps = Parameter(
+        "Steps of older paths in each replay",
+        whole=True,
+        at_least=0,
+        at_most=1_000_000_000,
+    )
+    steps_per_replay = Parameter(
+        "Steps of all slots before paths are replayed",
+        whole=True,
+        at_least=1,
+        at_most=1_000_000_000,
+    )
+    visits_to_grow = Parameter(
+        "Tries of the median pair before cells are split", above=0
+    )
+    max_cells = Parameter(
+        "The most cells of a partition that grows",
+        whole=True,
+        at_least=1,
+        at_most=2_000_000_000,
+    )
 
     def __init__(
         self,
@@ -103,6 +145,14 @@ class QLearning(TabularAgent):
         epsilon: float = 0.1,
         trace_decay: float = 0.0,
         traces: str = "replacing",
+        replay: int = 0,
+        older_steps: int = 10_000,
+        steps_per_replay: int = 300,
+        memory_size: int = 100_000,
+        optimism: float | None = None,
+        grows: bool = False,
+        visits_to_grow: float = 20.0,
+        max_cells: int = 20_000,
         max_steps: int | None = None,
         seed: int | None = None,
         n_actions: int | None = None,
@@ -112,11 +162,22 @@ class QLearning(TabularAgent):
         self.epsilon = epsilon
         self.trace_decay = trace_decay
         self._kind = validation.one_of("traces", traces, TRACES)
-        self._traces: _Traces | None = None
+        self._traces: Traces | None = None
+        self.replay, self.older_steps = replay, older_steps
+        self.steps_per_replay = steps_per_replay
+        self.optimism = optimism
+        self.visits_to_grow, self.max_cells = visits_to_grow, max_cells
         super().__init__(
-            env, partition, max_steps=max_steps, seed=seed, n_actions=n_actions
+            env,
+            partition,
+            grows=grows,
+            memory_size=memory_size,
+            max_steps=max_steps,
+            seed=seed,
+            n_actions=n_actions,
         )
         self._values: FloatArray = np.zeros((self.partition.n_cells, self.n_actions))
+        self._tried: BoolArray = np.zeros(self._values.shape, np.bool_)
 
     def learn(
         self,
@@ -151,55 +212,104 @@ class QLearning(TabularAgent):
         budget = (total_timesteps, trials, callback, log_interval, progress_bar)
         with Training(self, *budget) as training:
             while training.next_trial():
-                rollout, traces = self.rollout, self._empty_traces()
-                observation = rollout.start(seed=self._next_seed())
-                index, degree = locate_all(self.partition, observation, self._n_cells)
-                allowed = rollout.allowed()
-                while rollout._ants.size:
-                    actions = epsilon_greedy_unchecked(
-                        self._table, index, degree, self.epsilon, self.rng, allowed
-                    )
-                    step = rollout._step(actions)
-                    next_index, next_degree = self._locate(step.observation, step.ants)
-                    next_allowed = rollout.allowed()
-                    after = rollout.allowed_after(step.ants)
-                    transition = (
-                        self._table,
-                        index,
-                        degree,
-                        actions,
-                        step.cost,
-                        step.terminated,
-                        next_index,
-                        next_degree,
-                        ALL if after is None else after,
-                        self.learning_rate,
-                        self.discount,
-                    )
-                    if traces is None:
-                        _update(*transition)
-                    else:
-                        mark_greedy(
-                            self._table,
-                            index,
-                            degree,
-                            actions,
-                            ALL if allowed is None else allowed,
-                            traces.greedy,
-                        )
-                        _update_traced(
-                            *transition,
-                            self.discount * self.trace_decay,
-                            self._kind == "accumulating",
-                            TRACE_CUTOFF,
-                            step.ants,
-                            *traces.with_room(index.shape[1]),
-                        )
-                    allowed, stays = next_allowed, ~step.finished
-                    index, degree = next_index[stays], next_degree[stays]
+                observation = self.rollout.start(seed=self._next_seed())
+                if self._traces is not None:
+                    self._traces.clear()
+                while self.rollout._ants.size:
+                    walk, observation = self._walk(observation)
+                    if walk is not None:
+                        self._learn_again(walk)
                 self._check_values()
                 training.end_trial()
         return self
+
+    def _walk(self, observation: Any) -> tuple[Walk | None, Any]:
+        """Let the slots that still walk make some steps, and learn from each.
+
+        Returns:
+            What they did, to be remembered, None where that is not wanted; and all
+            observations after it.
+        """
+        rollout, traces = self.rollout, self._present_traces()
+        walk = Walk(self.num_envs) if self._remembers else None
+        cells, shares = self._locate(observation, rollout._ants)
+        index, degree = cells.copy(), shares.copy()
+        allowed = rollout.allowed()
+        while rollout._ants.size:
+            actions = epsilon_greedy_unchecked(
+                self._table, index, degree, self.epsilon, self.rng, allowed
+            )
+            seen = observation if walk is None else observation[rollout._ants]
+            step = rollout._step(actions)
+            next_index, next_degree = self._locate(step.observation, step.ants)
+            next_allowed = rollout.allowed()
+            after = rollout.allowed_after(step.ants)
+            transition = (
+                self._table,
+                index,
+                degree,
+                actions,
+                step.cost,
+                step.terminated,
+                next_index,
+                next_degree,
+                ALL if after is None else after,
+                self.learning_rate,
+                self.discount,
+            )
+            if traces is None:
+                update_values(*transition)
+            else:
+                mask = ALL if allowed is None else allowed
+                mark_greedy(self._table, index, degree, actions, mask, traces.greedy)
+                fading = self.discount * self.trace_decay
+                accumulate = self._kind == "accumulating"
+                traces.update(transition, step.ants, fading, accumulate)
+            if walk is not None:
+                walk.append(step.ants, seen, actions, -step.cost, allowed)
+                observation = step.observation
+                done = step.ants[step.finished]
+                if done.size:
+                    goal = step.terminated[step.finished]
+                    walk.stop(done, observation, goal, rollout.allowed_after(done))
+                if walk.steps >= self.steps_per_replay:
+                    break
+            allowed, stays = next_allowed, ~step.finished
+            index, degree = next_index[stays], next_degree[stays]
+        if walk is not None and rollout._ants.size:
+            ants, on_the_way = rollout._ants, np.zeros(rollout._ants.size, np.bool_)
+            walk.stop(ants, observation, on_the_way, rollout.allowed_after(ants))
+        return walk, observation
+
+    def _learn_again(self, walk: Walk) -> None:
+        """Remember what was done, learn from memory, and let the partition grow."""
+        newest, memory = self._remember(walk), self._memory
+        self._tried |= memory.evidence.reshape(self._tried.shape) > 0
+        if self.optimism is not None:
+            self._promise(self.optimism)
+        elif self.grows:  # what was learned in coarse cells says nothing of new ones
+            self._values[~self._tried] = 0.0
+        for _ in range(self.replay):
+            replay(
+                memory,
+                memory.with_older(newest, self.older_steps, self.rng),
+                self._values,
+                rate=self.learning_rate,
+                discount=self.discount,
+                trace_decay=self.trace_decay,
+            )
+        self._split()
+
+    @property
+    def optimism(self) -> float | None:
+        """What untried pairs promise: a good state, 0, or the most, 1; None: 0 reward."""
+        return self._optimism
+
+    @optimism.setter
+    def optimism(self, value: float | None) -> None:
+        if value is not None:
+            value = validation.number("optimism", value, at_least=0, at_most=1)
+        self._optimism = value
 
     @property
     def traces(self) -> str:
@@ -214,14 +324,29 @@ class QLearning(TabularAgent):
     def _table(self) -> FloatArray:
         return self._values
 
+    @property
+    def _known(self) -> BoolArray:
+        return self._tried
+
+    @property
+    def _remembers(self) -> bool:
+        return self.replay > 0 or self.grows or self.optimism is not None
+
+    def _set_partition(
+        self, partition: Partition, table: FloatArray, known: BoolArray
+    ) -> None:
+        super()._set_partition(partition, table, known)
+        self._values, self._tried = table, known
+        self._traces = None  # those of other cells
+
     def set_table(self, table: ArrayLike) -> None:
-        """Replace the action values.
+        """Replace the action values; all pairs then count as tried.
 
         Raises:
             ValueError: the shape differs, or a value is not finite.
         """
-        values = self._checked_table(table)
-        self._values[:] = values
+        self._values[:] = self._checked_table(table)
+        self._tried[:] = True
 
     def _check_values(self) -> None:
         if not np.isfinite(self._values).all():
@@ -239,6 +364,14 @@ class QLearning(TabularAgent):
             "epsilon": self.epsilon,
             "trace_decay": self.trace_decay,
             "traces": self.traces,
+            "replay": self.replay,
+            "older_steps": self.older_steps,
+            "steps_per_replay": self.steps_per_replay,
+            "memory_size": self.memory_size,
+            "optimism": self.optimism,
+            "grows": self.grows,
+            "visits_to_grow": self.visits_to_grow,
+            "max_cells": self.max_cells,
             "max_steps": self.max_steps,
             "seed": self.seed,
         }
@@ -250,222 +383,11 @@ class QLearning(TabularAgent):
             self._table, index, degree, self.epsilon, self._predict_rng, allowed
         )
 
-    def _empty_traces(self) -> _Traces | None:
-        """Memory for a trial, reused from trial to trial; None without traces."""
+    def _present_traces(self) -> Traces | None:
+        """The traces of the trial under way; None without traces."""
         if self.trace_decay == 0:
             return None
-        kept = self._traces
-        if kept is None or kept.greedy.size != self.num_envs:
+        if self._traces is None or self._traces.greedy.size != self.num_envs:
             longest = self.max_steps * self.partition.cells_per_state
-            kept = _Traces(self.num_envs, self._values.size, longest)
-            self._traces = kept
-        kept.clear()
-        return kept
-
-
-class _Traces:
-    """The eligibility traces e of all slots, those that are not 0.
-
-    Memory grows with what traces need: by doubling, up to the longest episode.
-
-    Args:
-        slots: how many slots there are.
-        n_pairs: entries of the table.
-        longest: how many visits to pairs an episode can hold.
-    """
-
-    def __init__(self, slots: int, n_pairs: int, longest: int) -> None:
-        self._most = min(n_pairs, longest)
-        first = min(self._most, FIRST_TRACES)
-        self._greedy: BoolArray = np.empty(slots, dtype=np.bool_)
-        self._pair: IntArray = np.empty((slots, first), dtype=np.int64)
-        self._trace: FloatArray = np.empty((slots, first))
-        self._count: IntArray = np.zeros(slots, dtype=np.int64)
-        self._mark: FloatArray = np.zeros(n_pairs)
-        self._at_most = 0  # no slot has more traces than this
-
-    @property
-    def greedy(self) -> BoolArray:
-        """Whether the last action of each walking slot was greedy; to be written."""
-        return self._greedy
-
-    def clear(self) -> None:
-        """Forget all traces."""
-        self._count[:] = 0
-        self._at_most = 0
-
-    def with_room(self, more: int) -> tuple[Any, ...]:
-        """The arrays that `_update_traced` changes, with room for `more` in each slot."""
-        self._at_most += more
-        if self._at_most > (room := self._pair.shape[1]):
-            self._at_most = int(self._count.max()) + more
-            if min(self._at_most, self._most) > room:
-                self._widen(min(max(2 * room, self._at_most), self._most))
-        return self._greedy, self._pair, self._trace, self._count, self._mark
-
-    def _widen(self, width: int) -> None:
-        """Make room for more traces of each slot; those that are there stay."""
-        for name in ("_pair", "_trace"):
-            array = getattr(self, name)
-            wider = np.empty((len(array), width), dtype=array.dtype)
-            wider[:, : array.shape[1]] = array
-            setattr(self, name, wider)
-
-
-@njit(inline="always")
-def _error(
-    values: FloatArray,
-    index: CellArray,
-    degree: FloatArray,
-    u: int,
-    cost: float,
-    terminated: bool,
-    next_index: CellArray,
-    next_degree: FloatArray,
-    next_allowed: BoolArray,
-    discount: float,
-    j: int,
-) -> float:
-    """The temporal-difference error of slot j: by how much the value of its pair is off."""
-    best = 0.0
-    if not terminated:
-        best = best_value(values, next_index, next_degree, j, next_allowed, LOOP, LOOP)
-    error = -cost + discount * best
-    for c in range(index.shape[1]):
-        error -= degree[j, c] * values[index[j, c], u]
-    return error
-
-
-@njit
-def _update(
-    values: FloatArray,
-    index: CellArray,
-    degree: FloatArray,
-    actions: IntArray,
-    costs: FloatArray,
-    terminated: BoolArray,
-    next_index: CellArray,
-    next_degree: FloatArray,
-    next_allowed: BoolArray,
-    learning_rate: float,
-    discount: float,
-) -> None:
-    """Q-learning update, eq. (3.44), slot by slot, each on the values as they then are.
-
-    Adding up the slots' corrections instead would overshoot where many slots share a
-    cell: with ten slots at a rate of 0.3 it would move by three times the error.
-    """
-    for j in range(actions.size):
-        u = actions[j]
-        error = _error(
-            values,
-            index,
-            degree,
-            u,
-            costs[j],
-            terminated[j],
-            next_index,
-            next_degree,
-            next_allowed,
-            discount,
-            j,
-        )
-        for c in range(index.shape[1]):
-            values[index[j, c], u] += learning_rate * degree[j, c] * error
-
-
-@njit
-def _update_traced(
-    values: FloatArray,
-    index: CellArray,
-    degree: FloatArray,
-    actions: IntArray,
-    costs: FloatArray,
-    terminated: BoolArray,
-    next_index: CellArray,
-    next_degree: FloatArray,
-    next_allowed: BoolArray,
-    learning_rate: float,
-    discount: float,
-    fading: float,
-    accumulate: bool,
-    cutoff: float,
-    ants: IntArray,
-    greedy: BoolArray,
-    pair: IntArray,
-    trace: FloatArray,
-    count: IntArray,
-    mark: FloatArray,
-) -> None:
-    """Q(lambda) update, eq. (3.45), slot by slot, each on the values as they then are.
-
-    The degrees of the state are written to `mark`, so that one pass over the slot's
-    traces can fade them, merge the state into them, drop the smallest and correct the
-    values.
-
-    Args:
-        values: `(n_cells, n_actions)`, corrected in place.
-        index: cells of the `m` walking slots, `(m, k)`; those of degree > 0 differ.
-        degree: their degrees, `(m, k)`.
-        actions: what they did, `(m,)`.
-        costs: what it cost, `(m,)`.
-        terminated: whether it led to a terminal state, `(m,)`.
-        next_index: where it led, `(m, k)`.
-        next_degree: `(m, k)`.
-        next_allowed: U_q there, `(m, n_actions)`, or empty.
-        learning_rate: alpha_rl.
-        discount: gamma_rl.
-        fading: gamma_rl lambda.
-        accumulate: add a visit to a trace, instead of replacing it.
-        cutoff: traces that are not above it are dropped.
-        ants: which slots walk, `(m,)`.
-        greedy: whether their actions were, `(>= m,)`.
-        pair: of each trace of each slot, cell * n_actions + action.
-        trace: e, of the shape of `pair`.
-        count: how many traces each slot has.
-        mark: zeros, `(values.size,)`; zero again afterwards.
-    """
-    n_actions = values.shape[1]
-    flat = values.reshape(values.size)
-    for j in range(actions.size):
-        u = actions[j]
-        error = _error(
-            values,
-            index,
-            degree,
-            u,
-            costs[j],
-            terminated[j],
-            next_index,
-            next_degree,
-            next_allowed,
-            discount,
-            j,
-        )
-        for c in range(index.shape[1]):
-            if degree[j, c] > 0.0:
-                mark[index[j, c] * n_actions + u] = degree[j, c]
-        slot = ants[j]
-        kept = 0
-        for i in range(count[slot] if greedy[j] else 0):
-            p = pair[slot, i]
-            e = fading * trace[slot, i]
-            beta = mark[p]
-            if beta > 0.0:
-                e = e + beta if accumulate else max(e, beta)
-                mark[p] = 0.0
-            elif e <= cutoff:
-                continue
-            pair[slot, kept] = p
-            trace[slot, kept] = e
-            kept += 1
-            flat[p] += learning_rate * e * error
-        for c in range(index.shape[1]):
-            p = index[j, c] * n_actions + u
-            if mark[p] > 0.0:
-                pair[slot, kept] = p
-                trace[slot, kept] = mark[p]
-                kept += 1
-                flat[p] += learning_rate * mark[p] * error
-                mark[p] = 0.0
-        count[slot] = kept
+            self._traces = Traces(self.num_envs, self._values.size, longest)
+        return self._traces

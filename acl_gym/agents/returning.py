@@ -10,23 +10,23 @@ from gymnasium.vector import VectorEnv
 from numpy.typing import ArrayLike, NDArray
 
 from acl_gym.agents.colony import ColonyAgent
+from acl_gym.agents.remembering import RememberingAgent
 from acl_gym.agents.saving import with_prefix
 from acl_gym.agents.training import Training
 from acl_gym.callbacks.base import Callbacks
 from acl_gym.colony.greedy import epsilon_greedy_actions, epsilon_greedy_unchecked
-from acl_gym.colony.memory import UNITS, Memory
-from acl_gym.colony.optimism import promised_level
+from acl_gym.colony.optimism import possible_levels
+from acl_gym.colony.starts import Starts
 from acl_gym.colony.walk import Walk
 from acl_gym.colony.walking_back import WalkBack
-from acl_gym.partitions import Discrete, Grid, Partition
-from acl_gym.partitions.growing import carried_over, initial_partition, refined, widened
-from acl_gym.policies import random_ranks
+from acl_gym.envs.wrappers.workers import spread_over_workers
+from acl_gym.partitions import Discrete, Partition
 from acl_gym.utils import validation
 from acl_gym.utils.parameters import Parameter
-from acl_gym.utils.typing import BoolArray, CellArray, FloatArray, IntArray, Row
+from acl_gym.utils.typing import BoolArray, CellArray, FloatArray, IntArray
 
 
-class ReturningACL(ColonyAgent):
+class ReturningACL(RememberingAgent, ColonyAgent):
     """A colony whose ants walk back from where they end, and which remembers.
 
     Each slot of the environment is an ant, as in `ACL`, and all share one table of
@@ -61,7 +61,8 @@ class ReturningACL(ColonyAgent):
         optimism: in [0, 1], what pairs promise that were never tried: with 0 the value
             of a good state, with 1 the most that could be had.
         walks_back: how often the ants walk back after each walk, >= 1.
-        older_paths: how many older paths they walk back beside the newest each time.
+        older_steps: how many steps of older paths they walk back beside the newest paths
+            each time, >= 0.
         steps_per_walk: after how many steps of all ants together they walk back, >= 1.
             Ants that have not finished go on from where they are.
         memory_size: how many states are remembered, >= 1.
@@ -70,6 +71,9 @@ class ReturningACL(ColonyAgent):
         max_cells: the partition does not become finer than this, >= 1.
         grows: whether the partition becomes wider and finer. None: if it was chosen for
             you.
+        restart_after: after how many steps all ants set out anew, though they have not
+            finished, >= 1. None takes 60 where they start anywhere, and never does so
+            where all start in the same place, see `acl_gym.colony.starts`.
         schedule: `"synchronous"`: an ant that has finished waits until all have.
             `"asynchronous"` (§7.3): it sets out again at once, until the last ant is back
             from its first way of the trial; the trial then ends for all, and paths that
@@ -80,6 +84,11 @@ class ReturningACL(ColonyAgent):
             the environment, or 300 if it has none.
         seed: the same seed gives the same run; None draws one from the system.
         n_actions: only needed without an environment.
+        workers: lets the ants walk in so many workers, >= 0, for environments that are
+            slow to step: the single environments of `env` are made anew in a
+            `WorkersVectorEnv`, the agent's `env`. The bits are the same for any number.
+            None leaves `env` as it is.
+        executor: where workers are, "processes" or "ray", see `WorkersVectorEnv`.
 
     Raises:
         TypeError: `env` or `partition` is of the wrong kind.
@@ -94,6 +103,7 @@ class ReturningACL(ColonyAgent):
         True
     """
 
+    always_remembers = True
     _completes = False  # what an ant has done until then is remembered in any case
 
     discount = Parameter(
@@ -117,8 +127,11 @@ class ReturningACL(ColonyAgent):
     walks_back = Parameter(
         "Walks back after each walk", whole=True, at_least=1, at_most=10_000
     )
-    older_paths = Parameter(
-        "Older paths in each walk back", whole=True, at_least=0, at_most=1_000_000
+    older_steps = Parameter(
+        "Steps of older paths in each walk back",
+        whole=True,
+        at_least=0,
+        at_most=1_000_000_000,
     )
     steps_per_walk = Parameter(
         "Steps of all ants before they walk back",
@@ -148,32 +161,37 @@ class ReturningACL(ColonyAgent):
         epsilon: float = 0.1,
         optimism: float = 1.0,
         walks_back: int = 10,
-        older_paths: int = 50,
+        older_steps: int = 10_000,
         steps_per_walk: int = 300,
         memory_size: int = 100_000,
-        visits_to_grow: float = 5.0,
+        visits_to_grow: float = 20.0,
         max_cells: int = 20_000,
         grows: bool | None = None,
+        restart_after: int | None = None,
         schedule: str = "synchronous",
         max_steps: int | None = None,
         seed: int | None = None,
         n_actions: int | None = None,
+        workers: int | None = None,
+        executor: str = "processes",
     ) -> None:
+        if workers is not None:
+            env = spread_over_workers(env, workers, executor)
         self.discount = discount
         self.learning_rate = learning_rate
         self.trust = trust
         self.epsilon = epsilon
         self.optimism = optimism
         self.visits_to_grow = visits_to_grow
-        self.walks_back, self.older_paths = walks_back, older_paths
+        self.walks_back, self.older_steps = walks_back, older_steps
         self.steps_per_walk = steps_per_walk
         self.max_cells = max_cells
-        self.grows = partition is None if grows is None else grows
-        if partition is None and env is not None:
-            partition = initial_partition(env)
+        self.restart_after = restart_after
         super().__init__(
             env,
             partition,
+            grows=partition is None if grows is None else grows,
+            memory_size=memory_size,
             schedule=schedule,
             max_steps=max_steps,
             seed=seed,
@@ -182,13 +200,9 @@ class ReturningACL(ColonyAgent):
         if mix is None:
             mix = 0.0 if isinstance(self.partition, Discrete) else 0.2
         self.mix = mix
-        self._splits = 0
         shape = self.partition.n_cells, self.n_actions
         self._walk_back = WalkBack(np.zeros(shape))
-        memory_size = validation.integer(
-            "memory_size", memory_size, at_least=1, at_most=2**25
-        )
-        self._memory = Memory(memory_size, self.n_actions, self.partition)
+        self._starts = Starts()
 
     def learn(
         self,
@@ -222,28 +236,47 @@ class ReturningACL(ColonyAgent):
         with Training(self, *budget) as training:
             while training.next_trial():
                 observation = self.rollout.start(seed=self._next_seed())
-                while self.rollout._ants.size:
-                    walk, observation = self._walk(observation)
-                    self._widen(walk)
-                    newest = self._memory.add(walk)
-                    self._promise()
+                limit = self._steps_of_trial(observation)
+                while self.rollout._ants.size and self.rollout.steps < limit:
+                    walk, observation = self._walk(observation, limit)
+                    newest = self._remember(walk)
+                    self._promise(self.optimism)
+                    bounds = possible_levels(self._memory, self.discount)
                     for _ in range(self.walks_back):
-                        self._return(newest)
+                        self._return(newest, bounds)
                     self._split()
                 training.end_trial()
         return self
 
-    def _walk(self, observation: Any) -> tuple[Walk, Any]:
-        """Let the ants that still walk make some steps; return these and where they are."""
+    def _steps_of_trial(self, observation: NDArray[Any]) -> int:
+        """After how many steps all ants set out anew."""
+        self._starts.add(observation, self._memory)
+        if self.restart_after is not None:
+            return min(self.restart_after, self.max_steps)
+        return self._starts.steps(self.max_steps)
+
+    def _walk(self, observation: Any, limit: int) -> tuple[Walk, Any]:
+        """Let the ants that still walk make some steps; return these and where they are.
+
+        Args:
+            observation: where they are, of all slots.
+            limit: after how many steps of the trial they stop in any case.
+        """
         rollout, walk = self.rollout, Walk(self.num_envs)
-        while rollout._ants.size and walk.steps < self.steps_per_walk:
+        going = rollout._ants
+        while (
+            rollout._ants.size
+            and walk.steps < self.steps_per_walk
+            and rollout.steps < limit
+        ):
             ants, allowed = rollout._ants, rollout.allowed()
+            seen = observation[ants]
             index, degree = self._locate(observation, ants)
             actions = epsilon_greedy_unchecked(
                 self._table, index, degree, self.epsilon, self.rng, allowed
             )
             step = rollout._step(actions)
-            walk.append(ants, observation, actions, -step.cost, allowed)
+            walk.append(ants, seen, actions, -step.cost, allowed)
             observation, going = step.observation, ants
             if step.finished.any():
                 going = ants[~step.finished]
@@ -255,88 +288,43 @@ class ReturningACL(ColonyAgent):
             walk.stop(going, observation, on_the_way, rollout.allowed_after(going))
         return walk, observation
 
-    def _promise(self) -> None:
-        """Set what pairs promise of which nothing is known yet."""
-        level = promised_level(self._memory, self._table, self.optimism, self.discount)
-        self._table[~self._walk_back.known] = level
-
-    def _return(self, newest: IntArray) -> None:
+    def _return(self, newest: IntArray, bounds: tuple[float, float]) -> None:
         """Let the ants walk the newest paths back, and some older ones."""
-        older = self._memory.n_paths - newest.size
-        drawn = np.arange(older)
-        if older > self.older_paths:
-            drawn = np.unique(self.rng.integers(older, size=self.older_paths))
         self._walk_back.walk(
             self._memory,
-            np.concatenate([drawn, newest]),
+            self._memory.with_older(newest, self.older_steps, self.rng),
             discount=self.discount,
             mix=self.mix,
             rate=self.learning_rate,
             trust=self.trust,
+            bounds=bounds,
         )
 
-    def _widen(self, walk: Walk) -> None:
-        """Widen the partition if the ants have come beyond its range."""
-        if self.grows and isinstance(self.partition, Grid):
-            space: Any = self.rollout.env.single_observation_space
-            wider = widened(self.partition, walk.states(), space)
-            if wider is not None:
-                self._grow_to(wider)
-
-    def _split(self) -> None:
-        """Halve the cells along the next variable if there is evidence for finer ones."""
-        grid = self.partition
-        if not (self.grows and isinstance(grid, Grid)):
-            return
-        tried = self._memory.evidence[self._memory.evidence > 0]
-        tries = float(np.median(tried)) / UNITS * grid.cells_per_state
-        several = [axis for axis, line in enumerate(grid.centres) if line.size > 1]
-        if tries <= self.visits_to_grow or not several:
-            return
-        finer = refined(grid, several[self._splits % len(several)])
-        if finer.n_cells <= self.max_cells:
-            self._splits += 1
-            self._grow_to(finer)
-
-    def _grow_to(self, partition: Grid) -> None:
-        """Take over another partition; levels and what is known are carried over."""
-        levels, known = self._walk_back.levels, self._walk_back.known
-        both = carried_over(np.hstack([levels, known]), self.partition, partition)
-        self._set_partition(partition, both[:, : self.n_actions].copy())
-        # A cell between one that is known and one that is not is not known.
-        self._walk_back.known[:] = both[:, self.n_actions :] > 1.0 - 1e-9
-        self._memory.set_partition(partition)
-
-    def _set_partition(self, partition: Partition, levels: FloatArray) -> None:
-        self.__dict__["partition"] = partition  # fixed for everyone else
-        self._walk_back = WalkBack(levels)
-        # A function of the size, so that a run that is resumed breaks ties alike.
-        ties = np.random.default_rng(partition.n_cells)
-        self._ranks = random_ranks(partition.n_cells, self.n_actions, ties)
-        if self._rollout is not None:
-            self._make_room(self.num_envs, partition.cells_per_state)
-
-    @property
-    def grows(self) -> bool:
-        """Whether the partition becomes wider and finer."""
-        return self._grows
-
-    @grows.setter
-    def grows(self, value: bool) -> None:
-        if not isinstance(value, bool):
-            raise TypeError(
-                f"grows must be True or False, got {validation.shown(value)}."
-            )
-        self._grows = value
-
-    @property
-    def remembered_steps(self) -> int:
-        """How many steps the colony remembers."""
-        return self._memory.n_steps
+    def _set_partition(
+        self, partition: Partition, table: FloatArray, known: BoolArray
+    ) -> None:
+        super()._set_partition(partition, table, known)
+        self._walk_back = WalkBack(table)
+        self._walk_back.known[:] = known
 
     @property
     def _table(self) -> FloatArray:
         return self._walk_back.levels
+
+    @property
+    def _known(self) -> BoolArray:
+        return self._walk_back.known
+
+    @property
+    def restart_after(self) -> int | None:
+        """After how many steps all ants set out anew; None: it depends on the starts."""
+        return self._restart_after
+
+    @restart_after.setter
+    def restart_after(self, value: int | None) -> None:
+        if value is not None:
+            value = validation.integer("restart_after", value, at_least=1)
+        self._restart_after = value
 
     def set_table(self, table: ArrayLike) -> None:
         """Replace all levels; all pairs then count as known.
@@ -346,13 +334,6 @@ class ReturningACL(ColonyAgent):
         """
         self._table[:] = self._checked_table(table)
         self._walk_back.known[:] = True
-
-    def measures(self, policy: IntArray) -> Row:
-        """How many cells the partition has, and how many steps are remembered."""
-        return {
-            "cells": self.partition.n_cells,
-            "remembered_steps": self.remembered_steps,
-        }
 
     def parameters(self) -> dict[str, Any]:
         """The keyword arguments of the constructor."""
@@ -364,50 +345,35 @@ class ReturningACL(ColonyAgent):
             "epsilon": self.epsilon,
             "optimism": self.optimism,
             "walks_back": self.walks_back,
-            "older_paths": self.older_paths,
+            "older_steps": self.older_steps,
             "steps_per_walk": self.steps_per_walk,
-            "memory_size": self._memory.most,
+            "memory_size": self.memory_size,
             "visits_to_grow": self.visits_to_grow,
             "max_cells": self.max_cells,
             "grows": self.grows,
+            "restart_after": self.restart_after,
             "schedule": self.schedule,
             "max_steps": self.max_steps,
             "seed": self.seed,
         }
 
     def _arrays(self) -> dict[str, NDArray[Any]]:
-        remembered = {f"memory_{n}": a for n, a in self._memory.arrays().items()}
-        splits = np.array(self._splits)
-        return {"known": self._walk_back.known, "splits": splits, **remembered}
+        starts = {f"starts_{name}": a for name, a in self._starts.arrays().items()}
+        return {**super()._arrays(), **starts}
 
     def _restore(
         self, header: dict[str, Any], arrays: Mapping[str, NDArray[Any]]
     ) -> None:
         super()._restore(header, arrays)
-        known, splits = arrays["known"], arrays["splits"]
-        if known.shape != self._table.shape or known.dtype.kind != "b":
-            raise ValueError("the array known does not fit the table")
-        self._walk_back.known[:] = known
-        if splits.shape != () or splits.dtype.kind not in "iu" or splits < 0:
-            raise ValueError("splits must be a number >= 0")
-        self._splits = int(splits)
-        self._memory.restore(with_prefix("memory_", arrays))
+        self._starts.restore(with_prefix("starts_", arrays), self._memory)
 
     def _state(self) -> Any:
-        # What is remembered is shared with the colony, not copied.
-        return (
-            self.partition,
-            self._ranks,
-            self._walk_back.known.copy(),
-            self._splits,
-            self._memory.copy(),
-        )
+        return super()._state(), self._starts.copy()
 
     def _take_over(self, table: FloatArray, state: Any) -> None:
-        partition, ranks, known, self._splits, memory = state
-        self._set_partition(partition, table.copy())
-        self._ranks, self._memory = ranks, memory.copy()
-        self._walk_back.known[:] = known
+        remembered, starts = state
+        super()._take_over(table, remembered)
+        self._starts = starts.copy()
 
     def _explore(
         self, index: CellArray, degree: FloatArray, allowed: BoolArray | None

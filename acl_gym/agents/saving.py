@@ -30,8 +30,9 @@ from acl_gym.utils.serialization import (
 )
 from acl_gym.utils.typing import FloatArray, RankArray, Row
 
-_NOT_GIVEN = ("env", "heuristic", "n_actions", "seed")
-"""Arguments of constructors that a file holds otherwise, or that `load` has itself."""
+_NOT_GIVEN = ("env", "executor", "heuristic", "n_actions", "seed", "workers")
+"""Arguments of constructors that a file holds otherwise, that `load` has itself, or that
+say where the environment is."""
 
 _COLUMNS = (
     "trial",

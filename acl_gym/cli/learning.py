@@ -98,15 +98,18 @@ def begin(
     Raises:
         BadArgumentError: an argument does not suit the environment or the agent.
     """
-    if ants is None and AGENTS[kind].grows:
+    grows = settings.get("grows")
+    if grows is None:
+        grows = AGENTS[kind].grows
+    if ants is None and grows:
         ants = FEW_ANTS
     elif ants is None:
         ants = ANTS if environment.is_own else FOREIGN_ANTS
     env = environment.vector(ants)
     steps = max_steps or default_steps(env)
     with bad_arguments():
-        grid = None  # the agent chooses
-        if not AGENTS[kind].grows or cells or partition != "auto":
+        grid = None  # the agent chooses, coarse cells to begin with
+        if not grows or cells or partition != "auto":
             grid = automatic_partition(
                 env,
                 kind=Crisp if partition == "crisp" else Fuzzy,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -132,6 +133,33 @@ class Memory:
         self.terminated = np.concatenate([self.terminated, added.terminated])
         self._count(paths, 1)
         return paths
+
+    def live_rows(self) -> IntArray:
+        """The rows of all states that are remembered, in the order of time."""
+        begin = int(self.first[0]) if self.n_paths else self._used
+        return np.arange(begin, self._used)
+
+    def with_older(
+        self, newest: IntArray, most: int, rng: np.random.Generator
+    ) -> IntArray:
+        """Paths to be walked again: the newest, and before them older ones.
+
+        Args:
+            newest: the numbers of the newest paths, as `add` gave them.
+            most: how many steps the older ones have together, at most, but for one of
+                them.
+            rng: draws them.
+
+        Returns:
+            Their numbers, in the order of time.
+        """
+        older = self.n_paths - newest.size
+        drawn = np.arange(older)
+        steps = int((self.last[:older] - self.first[:older]).sum())
+        if steps > most:
+            share = math.ceil(older * most / steps)
+            drawn = np.sort(rng.choice(older, share, replace=False))
+        return np.concatenate([drawn, newest])
 
     def set_partition(self, partition: Partition) -> None:
         """Locate everything anew, in a partition of the same state variables.

@@ -48,6 +48,34 @@ def promised_level(
     return good + optimism * (most - good)
 
 
+def possible_levels(memory: Memory, discount: float) -> tuple[float, float]:
+    """The least and the most that a pair can promise, from the rewards seen so far.
+
+    The worst reward for ever; and the best one for ever, then the best end.
+
+    Args:
+        memory: what the ants remember.
+        discount: gamma_rl, in [0, 1]; without discounting nothing is ruled out but what
+            the signs of the rewards rule out.
+    """
+    for_ever = np.inf if discount == 1.0 else 1.0 / (1.0 - discount)
+    going, ending = _best_rewards(
+        memory.first, memory.last, memory.terminated, memory.reward
+    )
+    worst = _worst_reward(memory.first, memory.last, memory.reward)
+    most = (going * for_ever if going > 0.0 else 0.0) + max(0.0, ending)
+    return (worst * for_ever if worst < 0.0 else 0.0), most
+
+
+@njit
+def _worst_reward(first: IntArray, last: IntArray, reward: FloatArray) -> float:
+    worst = np.inf
+    for path in range(first.size):
+        for row in range(first[path], last[path]):
+            worst = min(worst, reward[row])
+    return worst
+
+
 @njit
 def _values(
     first: IntArray,

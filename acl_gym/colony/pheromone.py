@@ -195,7 +195,7 @@ def repair(
     cell is not one of the table.
     """
     n_actions = len(columns) or levels.shape[1]
-    whole = int(alpha)
+    whole = int(min(alpha, 9.0))  # what no integer holds would be anything
     multiply = whole == alpha and whole <= 8  # cheaper than pow
     for j in range(index.shape[0]):
         for c in range(len(corners) or index.shape[1]):

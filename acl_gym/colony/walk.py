@@ -47,7 +47,7 @@ class Walk:
     def append(
         self,
         ants: IntArray,
-        observation: NDArray[Any],
+        seen: NDArray[Any],
         actions: IntArray,
         rewards: FloatArray,
         allowed: BoolArray | None,
@@ -56,12 +56,13 @@ class Walk:
 
         Args:
             ants: the ants that took it, `(m,)`.
-            observation: of all slots before the step, `(n_slots, ...)`.
+            seen: what they saw before the step, `(m, ...)`, a copy made by then: the
+                environment may write the next observations to the same array.
             actions: what these ants did, `(m,)`.
             rewards: what they got for it, `(m,)`.
             allowed: U_q of each of them before the step, `(m, n_actions)`; None: all.
         """
-        self._add(ants, observation, actions, rewards, allowed)
+        self._add(ants, seen, actions, rewards, allowed)
         self.steps += ants.size
 
     def stop(
@@ -81,14 +82,14 @@ class Walk:
         """
         kinds = np.where(terminated, _GOAL, _END).astype(np.int8)
         self._ends.append((self._n_rows, kinds))
-        self._add(ants, observation, _zeros(ants), _zeros(ants), allowed)
+        self._add(ants, observation[ants], _zeros(ants), _zeros(ants), allowed)
 
     def _add(
-        self, ants: Any, observation: Any, actions: Any, rewards: Any, allowed: Any
+        self, ants: Any, seen: Any, actions: Any, rewards: Any, allowed: Any
     ) -> None:
         self._n_rows += ants.size
         self._ants.append(ants)
-        self._seen.append(observation[ants])
+        self._seen.append(seen)
         self._actions.append(actions)
         self._rewards.append(rewards)
         self._allowed.append(allowed)

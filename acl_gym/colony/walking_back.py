@@ -1,12 +1,22 @@
 """The returning ants: they walk their paths back and lay what they know by then.
 
-At a pair (x_t, u_t) an ant on its way back lays
+Levels promise Q(x, u), the sum of those of the cells of x weighted with its degrees, and
+V(x), the largest Q(x, u) over the allowed u. At a pair (x_t, u_t) an ant on its way back
+expects
 
     G_t = r_t + discount * (mix * G_{t+1} + (1 - mix) * V(x_{t+1})),
 
-V(x) being the best that the levels of before this walk promise in x. In a terminal state
-both are 0; where the path ends otherwise, both are V. What all ants lay on a pair is
-merged by its mean, weighted with the degrees, and the level moves towards the mean.
+all from the levels of before this walk. In a terminal state G and V are 0; where the path
+ends otherwise, G is V. It lays on each cell by how much the promise falls short,
+G_t - Q(x_t, u_t). What all ants lay on a pair is merged by its mean, weighted with the
+degrees, and the level moves by a share of that.
+
+In a state that has one cell, Q is its level, so that the level moves towards the mean of
+what is expected. Where cells overlap, that mean would blur what differs from one side of
+a cell to the other. The mean of the shortfalls does not: it is a step of the simultaneous
+iterative reconstruction technique, which approaches the least-squares fit of the levels
+to all that is expected (Gilbert, 1972, doi:10.1016/0022-5193(72)90180-4). Such a fit may
+exceed what is possible where there is little evidence. So levels stay between bounds.
 
 The sums are kept in fixed point: integers add up to the same bits in any order, so that
 neither the order of the ants, nor the number of threads or processes matters.
@@ -59,12 +69,13 @@ class WalkBack:
         mix: float,
         rate: float,
         trust: float,
+        bounds: tuple[float, float],
     ) -> None:
         """Let ants walk paths back, all on the same levels, then merge.
 
-        A level moves by the share `rate * largest * (n / N) ** trust` of the way to the
-        mean of what was laid: `largest` is the largest degree with which it was
-        visited, n the evidence of these paths, N that of all remembered ones.
+        A level moves by the share `rate * largest * (n / N) ** trust` of the mean of what
+        was laid: `largest` is the largest degree with which it was visited, n the
+        evidence of these paths, N that of all remembered ones.
 
         Args:
             memory: the paths, located in the cells of the levels.
@@ -73,6 +84,7 @@ class WalkBack:
             mix: weight of the ant's own continuation, in [0, 1]; the rest is V.
             rate: rho, in (0, 1].
             trust: in [0, 1]. 0 follows the latest paths, 1 the mean of all.
+            bounds: the least and the most that a level may be.
 
         Raises:
             ValueError: levels or rewards are not finite, or too large to be added up.
@@ -106,6 +118,7 @@ class WalkBack:
             float(UNITS),
             rate,
             trust,
+            *bounds,
             self.levels.reshape(-1),
             self.known.reshape(-1),
         )
@@ -123,7 +136,7 @@ class WalkBack:
         rows = memory.reward[int(first.min()) : int(last.max())]
         reward = max(abs(rows.min(initial=0.0)), abs(rows.max(initial=0.0)))
         level = max(abs(self.levels.min()), abs(self.levels.max()))
-        bound = (reward + level) * (steps + 1) * int((last - first).sum() + 1)
+        bound = (reward + 2.0 * level) * (steps + 1) * int((last - first).sum() + 1)
         if not bound < 2.0**1000:
             raise ValueError(
                 f"levels and rewards must be numbers that can be added up, got {level:g} "
@@ -185,11 +198,16 @@ def _walk_back(
         value = 0.0
         if not terminated[path]:
             value = best_value(levels, index, degree, end, allowed, corners, choices)
-        deposit = value
+        expected = value
         for row in range(end - 1, first[path] - 1, -1):
-            deposit = reward[row] + own * deposit + promised * value
+            expected = reward[row] + own * expected + promised * value
             place = np.uint64(row)
             taken = np.uint64(action[place])
+            said = 0.0
+            for c in range(len(corners) or index.shape[1]):
+                cell = np.uint64(index[place, np.uint64(c)])
+                said += degree[place, np.uint64(c)] * levels[cell, taken]
+            short = expected - said
             for c in range(len(corners) or index.shape[1]):
                 share = degree[place, np.uint64(c)]
                 if share > 0.0:
@@ -199,7 +217,7 @@ def _walk_back(
                     if laid[pair, 1] == 0:
                         touched[count] = np.int64(pair)
                         count += 1
-                    laid[pair, 0] += np.int64(np.rint(share * deposit * scale))
+                    laid[pair, 0] += np.int64(np.rint(share * short * scale))
                     laid[pair, 1] += weight
                     laid[pair, 2] = max(laid[pair, 2], weight)
             if row > first[path]:
@@ -218,10 +236,12 @@ def _merge(
     units: float,
     rate: float,
     trust: float,
+    least: float,
+    most: float,
     levels: FloatArray,
     known: BoolArray,
 ) -> None:
-    """Move the level of each touched pair towards its mean, and clear the sums."""
+    """Move the level of each touched pair by its mean, and clear the sums."""
     for j in range(touched.size):
         pair = touched[j]
         weight = laid[pair, 1]
@@ -229,6 +249,6 @@ def _merge(
         step = rate * laid[pair, 2] / units
         if trust > 0.0:
             step *= min(1.0, weight / max(evidence[pair], 1)) ** trust
-        levels[pair] += step * (mean - levels[pair])
+        levels[pair] = min(max(levels[pair] + step * mean, least), most)
         known[pair] = True
         laid[pair] = 0

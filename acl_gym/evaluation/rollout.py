@@ -19,7 +19,7 @@ from acl_gym.colony.episodes import Episodes
 from acl_gym.envs import received
 from acl_gym.envs.control.environments import ControlVectorEnv, is_native
 from acl_gym.envs.wrappers.partial_reset import reset_slots
-from acl_gym.envs.wrappers.waiting import WaitingVectorEnv
+from acl_gym.envs.wrappers.waiting import WaitingSlots
 from acl_gym.evaluation.rows import fixed, require_array, set_row
 from acl_gym.utils import validation
 from acl_gym.utils.compiling import njit
@@ -83,7 +83,8 @@ class Rollout:
     """Steps each slot through one episode of at most `max_steps` steps.
 
     - In environments of this package finished slots wait, at no cost
-      (`reset(options={"finished": "wait"})`), as they do in a `WaitingVectorEnv`.
+      (`reset(options={"finished": "wait"})`), as they do in a `WaitingVectorEnv` and a
+      `WorkersVectorEnv`.
     - Where autoreset is disabled, finished slots are reset by mask and stepped along
       with the others; their outcomes are ignored.
     - Where the environment resets slots itself, the outcomes of finished slots are
@@ -131,7 +132,7 @@ class Rollout:
         self.max_steps = validation.integer("max_steps", max_steps, at_least=1)
         self.n_actions = int(space.n)
         self._asks_to_wait = isinstance(env.unwrapped, ControlVectorEnv)
-        self._waits = isinstance(env.unwrapped, (ControlVectorEnv, WaitingVectorEnv))
+        self._waits = isinstance(env.unwrapped, (ControlVectorEnv, WaitingSlots))
         # Wrappers may reuse arrays, our own environments do not.
         self._fresh = isinstance(env, ControlVectorEnv)
         self._mode = received.autoreset_mode_of(env)

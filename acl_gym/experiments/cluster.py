@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 import platform
 from typing import Any
 
@@ -11,6 +10,7 @@ from acl_gym.experiments.methods import run as run_study
 from acl_gym.experiments.provenance import circumstances
 from acl_gym.experiments.results import Run
 from acl_gym.experiments.store import Job, Store
+from acl_gym.utils.ray_cluster import connected_ray
 
 
 def in_ray(jobs: list[Job], store: Store) -> Finished:
@@ -24,21 +24,12 @@ def in_ray(jobs: list[Job], store: Store) -> Finished:
             worker died.
     """
     try:
-        import ray
-    except ModuleNotFoundError as error:
-        raise RunFailedError(
-            "the executor 'ray' needs Ray; pip install 'acl-gym[cluster]'."
-        ) from error
-    try:
-        ray.init(address="auto", log_to_driver=False, logging_level=logging.ERROR)
-    except ConnectionError as error:
-        raise RunFailedError(
-            "there is no Ray cluster here; `ray start --head` makes one of this "
-            "machine, `ray start --address=...` joins one."
-        ) from error
+        ray, made_now = connected_ray()
+    except (ModuleNotFoundError, ConnectionError) as error:
+        raise RunFailedError(str(error)) from error
     run: Any = ray.remote(num_cpus=1, max_retries=0)(_run)
     under_way = {run.remote(job, job.key): job for job in jobs}
-    resources = ray.cluster_resources()  # type: ignore[no-untyped-call]
+    resources = ray.cluster_resources()
     made = circumstances(int(resources.get("CPU", 1)))
     try:
         while under_way:
@@ -58,7 +49,8 @@ def in_ray(jobs: list[Job], store: Store) -> Finished:
     finally:
         for reference in under_way:
             ray.cancel(reference, force=True)
-        ray.shutdown()
+        if made_now:
+            ray.shutdown()
 
 
 def _run(job: Job, key: str) -> Run:

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import os
-import signal
 import threading
-import time
 from collections.abc import Callable, Generator
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from concurrent.futures.process import BrokenProcessPool
@@ -19,6 +17,7 @@ from acl_gym.experiments.methods import run as run_study
 from acl_gym.experiments.provenance import circumstances
 from acl_gym.experiments.results import Run
 from acl_gym.experiments.store import Job, Store
+from acl_gym.utils.processes import serve_parent
 
 
 class RunFailedError(RuntimeError):
@@ -98,16 +97,7 @@ def write_run(job: Job, run: Run, store: Store, made: dict[str, Any]) -> None:
 
 
 def _start_worker(parent: int) -> None:
-    # Ctrl-C reaches every process of a terminal; the parent is the one to answer it.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    serve_parent(parent)
     # The lock that tqdm makes otherwise is one for all processes: when this process is
     # killed, Python would complain of a leak below the error that is the reason.
     tqdm.set_lock(threading.RLock())
-    threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
-
-
-def _end_with(parent: int) -> None:
-    """Exit if the parent process has died, because nobody waits for the runs."""
-    while os.getppid() == parent:
-        time.sleep(0.2)
-    os._exit(1)

@@ -21,7 +21,7 @@ from acl_gym.partitions.base import (
 from acl_gym.partitions.kernels import OUTSIDE, Axes, locate, locate_in_parallel
 from acl_gym.utils import threads, validation
 from acl_gym.utils.boxes import declared_bounds
-from acl_gym.utils.typing import CellArray, FloatArray, IntArray
+from acl_gym.utils.typing import BoolArray, CellArray, FloatArray, IntArray
 
 _FLOAT = np.dtype(np.float64)
 
@@ -183,7 +183,7 @@ class Grid(FixedPartition):
             )
 
     def refine(self, axis: int, centres: ArrayLike) -> Self:
-        """Return the partition with more centres along one axis.
+        """Return the partition with centres of your choice added along one axis.
 
         Around a goal that is narrow compared with the cells, this costs few cells and
         can keep a policy from hovering near the goal (docs/hovering.md).
@@ -195,10 +195,7 @@ class Grid(FixedPartition):
         Raises:
             ValueError: there is no such axis, or a centre is not finite.
         """
-        if validation.integer("axis", axis, at_least=0) >= len(self.centres):
-            raise ValueError(
-                f"axis must lie in 0..{len(self.centres) - 1}, got {axis}."
-            )
+        axis = self._checked_axis(axis)
         axes = list(self.centres)
         there = axes[axis]
         added = validation.real_array("centres", centres, ndim=1)
@@ -207,6 +204,50 @@ class Grid(FixedPartition):
         new = added[distance > 1e-9 * max(np.ptp(there), np.ptp(added))]
         axes[axis] = np.union1d(there, new)
         return type(self)(axes, self.periods)
+
+    def refined(
+        self, axis: int, intervals: Sequence[bool] | BoolArray | None = None
+    ) -> Self:
+        """Return the partition with a new centre in the middle of intervals of one axis.
+
+        All old centres stay, so that `acl_gym.partitions.growing.carried_over` carries a
+        fuzzy table over exactly: values and policy stay as they are but for rounding.
+        An axis with one centre stays too; nothing is known of its range.
+
+        Args:
+            axis: the state variable, 0 .. d - 1.
+            intervals: which to halve, `(n,)`: those between neighbouring centres, on a
+                circular axis also the last one, which closes the circle. None halves
+                all.
+
+        Raises:
+            ValueError: there is no such axis, `intervals` do not fit it, or there would
+                be 2^31 cells or more.
+        """
+        axis = self._checked_axis(axis)
+        axes = list(self.centres)
+        edges, period = axes[axis], self.periods[axis]
+        if period is not None and edges.size > 1:
+            edges = np.append(edges, edges[0] + period)
+        middles = edges[:-1] + np.diff(edges) / 2
+        if intervals is not None:
+            chosen = validation.as_array(intervals)
+            if (
+                chosen is None
+                or chosen.shape != middles.shape
+                or chosen.dtype.kind != "b"
+            ):
+                raise ValueError(
+                    f"intervals must be {middles.size} bools for axis {axis}, got "
+                    f"{validation.shown(intervals)}."
+                )
+            middles = middles[chosen]
+        axes[axis] = np.sort(np.concatenate([axes[axis], middles]))
+        return type(self)(axes, self.periods)
+
+    def _checked_axis(self, axis: int) -> int:
+        most = len(self.centres) - 1
+        return validation.integer("axis", axis, at_least=0, at_most=most)
 
     def _fill(
         self,

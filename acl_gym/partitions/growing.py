@@ -1,8 +1,10 @@
-"""Partitions that grow (§7.3): wider and finer grids, and a coarse one to begin with."""
+"""Partitions that grow (§7.3): a coarse one to begin with, wider ones, their tables.
+
+`Grid.refined` gives the finer ones.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import TypeVar
 
 import numpy as np
@@ -17,7 +19,7 @@ from acl_gym.partitions.discrete import FINITE_SPACES, Discrete
 from acl_gym.partitions.grid import Fuzzy, Grid
 from acl_gym.utils import validation
 from acl_gym.utils.boxes import declared_bounds
-from acl_gym.utils.typing import BoolArray, FloatArray
+from acl_gym.utils.typing import FloatArray
 
 COARSE = {1: 21, 2: 9, 3: 6, 4: 5, 5: 4, 6: 3}
 """Number of variables -> centres of each to begin with: at most about a thousand cells."""
@@ -108,43 +110,6 @@ def widened(grid: AnyGrid, states: FloatArray, space: spaces.Box) -> AnyGrid | N
     return type(grid)(axes, grid.periods) if wider else None
 
 
-def refined(
-    grid: AnyGrid, axis: int, intervals: Sequence[bool] | BoolArray | None = None
-) -> AnyGrid:
-    """Return the grid with a new centre in the middle of intervals of one axis.
-
-    All old centres stay, so that a fuzzy table can be carried over exactly. An axis with
-    one centre stays as it is: nothing is known of its range.
-
-    Args:
-        grid: a crisp or a fuzzy partition.
-        axis: the state variable, 0 .. d - 1.
-        intervals: which to halve, `(n,)`: those between neighbouring centres, on a
-            circular axis also the last one, which closes the circle. None halves all.
-
-    Raises:
-        ValueError: there is no such axis, `intervals` do not fit it, or there would be
-            2^31 cells or more.
-    """
-    dimensions = len(grid.centres)
-    axis = validation.integer("axis", axis, at_least=0, at_most=dimensions - 1)
-    axes = list(grid.centres)
-    edges, period = axes[axis], grid.periods[axis]
-    if period is not None and edges.size > 1:
-        edges = np.append(edges, edges[0] + period)
-    middles = edges[:-1] + np.diff(edges) / 2
-    if intervals is not None:
-        chosen = validation.as_array(intervals)
-        if chosen is None or chosen.shape != middles.shape or chosen.dtype.kind != "b":
-            raise ValueError(
-                f"intervals must be {middles.size} bools for axis {axis}, got "
-                f"{validation.shown(intervals)}."
-            )
-        middles = middles[chosen]
-    axes[axis] = np.sort(np.concatenate([axes[axis], middles]))
-    return type(grid)(axes, grid.periods)
-
-
 def carried_over(table: ArrayLike, old: Partition, new: Partition) -> FloatArray:
     """Return the table of a new partition that says what one of an old one said.
 
@@ -153,6 +118,9 @@ def carried_over(table: ArrayLike, old: Partition, new: Partition) -> FloatArray
     centres of `old`, both tables agree in every state but for rounding, and so do their
     policies. The cells of a crisp grid receive a copy of the cell that holds their
     centre.
+
+    Any agent goes on on finer cells so: a new one with `coarse.refined(0)`, whose
+    `set_table` takes what was carried over.
 
     Args:
         table: `(old.n_cells, n_actions)`.
@@ -164,6 +132,12 @@ def carried_over(table: ArrayLike, old: Partition, new: Partition) -> FloatArray
 
     Raises:
         ValueError: the table is not one of `old`.
+
+    Example:
+        >>> from acl_gym import Fuzzy
+        >>> coarse = Fuzzy([[0.0, 1.0]])
+        >>> carried_over([[1.0], [3.0]], coarse, coarse.refined(0)).ravel().tolist()
+        [1.0, 2.0, 3.0]
     """
     values = validation.real_array("table", table, ndim=2)
     if len(values) != old.n_cells:

@@ -47,22 +47,27 @@ class Range:
         )
 
     def __str__(self) -> str:
-        left = f"({self.above:g}" if self.above is not None else "(-inf"
+        left = f"({_short(self.above)}" if self.above is not None else "(-inf"
         if self.at_least is not None:
-            left = f"[{self.at_least:g}"
-        right = f"{self.below:g})" if self.below is not None else "inf)"
+            left = f"[{_short(self.at_least)}"
+        right = f"{_short(self.below)})" if self.below is not None else "inf)"
         if self.at_most is not None:
-            right = f"{self.at_most:g}]"
+            right = f"{_short(self.at_most)}]"
         return f"{left}, {right}"
 
     def in_words(self) -> str:
         """As docstrings say it: "in [0, 1)", "> 0", ">= 0"."""
         if self.at_most is None and self.below is None:
             if self.at_least is not None:
-                return f">= {self.at_least:g}"
+                return f">= {_short(self.at_least)}"
             if self.above is not None:
-                return f"> {self.above:g}"
+                return f"> {_short(self.above)}"
         return f"in {self}"
+
+
+def _short(bound: float) -> str:
+    """A bound as people write it: 1e6, not 1e+06."""
+    return f"{bound:g}".replace("e+0", "e").replace("e+", "e")
 
 
 def number(

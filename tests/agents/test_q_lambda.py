@@ -13,9 +13,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from acl_gym import Crisp, Fuzzy, QLearning
-from acl_gym.agents import q_learning
 from acl_gym.colony import greedy
+from acl_gym.colony import traces as traces_module
 from acl_gym.colony.greedy import ALL
+from acl_gym.colony.temporal_difference import update_values
+from acl_gym.colony.traces import TRACES, Traces, update_traced
 from acl_gym.planning.value_iteration import value_iteration
 from tests.agents import reference_colony as reference
 from tests.agents.reference_colony import chains
@@ -23,7 +25,7 @@ from tests.agents.test_q_learning import ROW, VALUES, masks
 from tests.colony.test_pheromone import degrees
 from tests.planning.chains import Table, corridor, model, vector
 
-KINDS = pytest.mark.parametrize("traces", q_learning.TRACES)
+KINDS = pytest.mark.parametrize("traces", TRACES)
 WALL: Table = {0: {0: [(1.0, 0, -1.0, False)]}, 1: {0: [(1.0, 1, 0.0, True)]}}
 """One cell that cannot be left, one action."""
 
@@ -60,7 +62,7 @@ def follow(
     values = rng.normal(size=(n_cells, n_actions))
     expected = values.copy()
     full = np.zeros((slots, n_cells, n_actions))
-    memory = q_learning._Traces(slots, values.size, case["steps"] * k)
+    memory = Traces(slots, values.size, case["steps"] * k)
     ants = np.arange(slots)
     for _ in range(case["steps"]):
         m = ants.size
@@ -136,7 +138,7 @@ def follow(
 @given(walks())
 @settings(max_examples=60)
 def test_updates_are_those_of_full_tables(case: dict[str, Any]) -> None:
-    update, mark = q_learning._update_traced, greedy.mark_greedy
+    update, mark = update_traced, greedy.mark_greedy
     state = case["rng"].bit_generator.state
     values, expected = follow(update, mark, case)
     np.testing.assert_allclose(values, expected, rtol=1e-9, atol=1e-9)
@@ -151,7 +153,7 @@ def test_traces_that_fade_at_once_are_no_traces(seed: int, slots: int, k: int) -
     """lambda = 0, to the last bit: the fast path is the same method."""
     rng = np.random.default_rng(seed)
     one, other = np.tile(rng.normal(size=(7, 3)), (2, 1, 1))
-    memory = q_learning._Traces(slots, one.size, 5 * k)
+    memory = Traces(slots, one.size, 5 * k)
     for _ in range(5):
         cells = [rng.permutation(7)[:k] for _ in range(2 * slots)]
         index, next_index = np.array(cells, dtype=np.int32).reshape(2, slots, k)
@@ -168,8 +170,8 @@ def test_traces_that_fade_at_once_are_no_traces(seed: int, slots: int, k: int) -
             0.98,
         )
         memory.greedy[:] = True
-        q_learning._update(one, *step)
-        q_learning._update_traced(
+        update_values(one, *step)
+        update_traced(
             other, *step, 0.0, False, 1e-4, np.arange(slots), *memory.with_room(k)
         )
     assert one.tobytes() == other.tobytes()
@@ -178,7 +180,7 @@ def test_traces_that_fade_at_once_are_no_traces(seed: int, slots: int, k: int) -
 def test_traces_below_the_cutoff_are_dropped() -> None:
     """Eleven cells one after another, each trace a tenth of the next."""
     values = np.zeros((12, 1))
-    memory = q_learning._Traces(1, 12, 11)
+    memory = Traces(1, 12, 11)
     memory.greedy[:] = True
     for cell in range(11):
         state, following = (
@@ -186,7 +188,7 @@ def test_traces_below_the_cutoff_are_dropped() -> None:
             np.array([[cell + 1]], np.int32),
         )
         one, action = np.ones((1, 1)), np.zeros(1, dtype=np.int64)
-        q_learning._update_traced(
+        update_traced(
             *(values, state, one, action, np.ones(1), np.zeros(1, dtype=np.bool_)),
             *(following, one, ALL, 0.5, 1.0, 0.1, False, 1e-4, np.zeros(1, np.int64)),
             *memory.with_room(1),
@@ -322,7 +324,7 @@ def test_a_trial_is_that_of_plain_loops(
     kind: type, traces: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Two trials, five slots, the same random numbers, single environments."""
-    monkeypatch.setattr(q_learning, "TRACE_CUTOFF", 0.0)
+    monkeypatch.setattr(traces_module, "TRACE_CUTOFF", 0.0)
     goal = {"goal_bounds": (1.2, 6.0)}
     env = gym.make_vec("acl_gym/Pendulum-v0", num_envs=5, **goal)
     grid = kind.from_box(env.single_observation_space, (4, 5), circular=[0])
@@ -460,13 +462,13 @@ def test_moves_that_fail_with_a_falling_rate(trace_decay: float) -> None:
     np.testing.assert_allclose(agent.table[:, 0], -(6 - np.arange(7)) / 0.7, rtol=0.1)
 
 
-@pytest.mark.parametrize("traces", q_learning.TRACES)
+@pytest.mark.parametrize("traces", TRACES)
 def test_memory_that_grows_changes_nothing(
     traces: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """From room for one trace on, to the last bit; and none is made beforehand."""
     whole = on_chain(traces=traces).learn(trials=5)
-    monkeypatch.setattr(q_learning, "FIRST_TRACES", 1)
+    monkeypatch.setattr(traces_module, "FIRST_TRACES", 1)
     grown = on_chain(traces=traces)
     grown._max_steps = 10**12
     grown.set_env(grown.env)

@@ -12,8 +12,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from acl_gym import Crisp, Fuzzy, QLearning
-from acl_gym.agents import q_learning
 from acl_gym.colony.greedy import ALL
+from acl_gym.colony.temporal_difference import update_values
 from tests.agents import reference_colony as reference
 from tests.agents.reference_colony import Chain, chains
 from tests.colony.test_pheromone import degrees
@@ -82,9 +82,9 @@ def test_updates_are_those_of_the_slots_one_after_another(case: dict[str, Any]) 
             case["next_allowed"][j] if case["next_allowed"].size else None,
         )
     plain = case["values"].copy()
-    q_learning._update(*case.values())
+    update_values(*case.values())
     np.testing.assert_allclose(case["values"], expected, rtol=1e-10, atol=1e-10)
-    q_learning._update.py_func(*{**case, "values": plain}.values())
+    update_values.py_func(*{**case, "values": plain}.values())
     np.testing.assert_allclose(case["values"], plain, rtol=1e-13, atol=1e-13)
 
 

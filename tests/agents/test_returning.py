@@ -44,7 +44,7 @@ SETTINGS: dict[str, tuple[Callable[[], Any], dict[str, Any]]] = {
     "cart-pole": (lambda: gymnasium_env("CartPole-v1"), {}),
     "taxi": (lambda: gymnasium_env("Taxi-v4"), {}),
     "lake": (lambda: gymnasium_env("FrozenLake-v1"), {"trust": 0.5, "mix": 0.1}),
-    "small memory": (pendulum, {"memory_size": 700, "older_paths": 3}),
+    "small memory": (pendulum, {"memory_size": 700, "older_steps": 3}),
 }
 EACH = pytest.mark.parametrize("name", SETTINGS)
 
@@ -109,6 +109,19 @@ def test_every_autoreset_mode_teaches_the_same(mode: AutoresetMode) -> None:
     colony = ReturningACL(env, seed=0, epsilon=0.0).learn(trials=1)
     waiting = ReturningACL(WaitingVectorEnv(made), seed=0, epsilon=0.0).learn(trials=1)
     assert colony.table.tobytes() == waiting.table.tobytes()
+
+
+@pytest.mark.parametrize("mode", list(AutoresetMode))
+def test_what_was_seen_is_remembered_where_arrays_are_used_again(
+    mode: AutoresetMode,
+) -> None:
+    """Some environments write each observation over the one before."""
+    tables = []
+    for fresh in (True, False):
+        made = [lambda: gym.make("MountainCar-v0", max_episode_steps=40)] * 3
+        env = SyncVectorEnv(made, copy=fresh, autoreset_mode=mode)
+        tables.append(ReturningACL(env, seed=0).learn(trials=2).table.tobytes())
+    assert tables[0] == tables[1]
 
 
 def test_the_pendulum_is_near_the_optimum_after_ten_thousand_steps() -> None:
@@ -221,7 +234,7 @@ def test_callbacks_evaluate_a_growing_policy() -> None:
         ({"mix": -0.1}, r"mix must lie in"),
         ({"learning_rate": 0}, r"learning_rate must lie in \(0, 1\]"),
         ({"walks_back": 0}, "walks_back must be at least 1"),
-        ({"older_paths": -1}, "older_paths must be at least 0"),
+        ({"older_steps": -1}, "older_steps must be at least 0"),
         ({"steps_per_walk": 0}, "steps_per_walk must be at least 1"),
         ({"memory_size": 10**9}, "memory_size must be at most"),
         ({"max_cells": 0}, "max_cells must be at least 1"),

@@ -55,6 +55,10 @@ def assert_same(one: Any, other: Any) -> None:
         [],
         [*CHANGING, "--param", "update=in_turn"],
         ["--agent", "q-learning", "--param", "trace_decay=0.5"],
+        [
+            *("--agent", "q-learning", "--param", "replay=2"),
+            *("--param", "grows=true", "--param", "optimism=1"),
+        ],
         ["--param", "cost=settling_time:0:3.14:0.3+0.1", "--param", "deposit=rank:2"],
         ["--param", "schedule=asynchronous", "--param", "deposit=rank:2"],
         ["--agent", "returning", "--param", "schedule=asynchronous"],

@@ -1,4 +1,4 @@
-"""The returning ants again, from the equation: one ant after the other, pair by pair."""
+"""The returning ants again, from the equations: one ant after the other, pair by pair."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def value(levels: Array, beta: Array, allowed: Array) -> float:
 
 
 def laid(levels: Array, path: Path, discount: float, mix: float) -> list[float]:
-    """G_t of each step, from the definition, forwards by recursion."""
+    """G_t - Q(x_t, u_t) of each step, from the definition, forwards by recursion."""
     states, actions, rewards, terminated, allowed = path
     length = len(actions)
 
@@ -32,7 +32,7 @@ def laid(levels: Array, path: Path, discount: float, mix: float) -> list[float]:
             mix * from_step(t + 1) + (1 - mix) * promise(t + 1)
         )
 
-    return [from_step(t) for t in range(length)]
+    return [from_step(t) - states[t] @ levels[:, actions[t]] for t in range(length)]
 
 
 def after(
@@ -43,15 +43,16 @@ def after(
     mix: float,
     rate: float,
     trust: float,
+    bounds: tuple[float, float],
 ) -> Array:
     """The levels when all paths of `walked` have been merged."""
     new = levels.copy()
     for cell, u in np.ndindex(levels.shape):
         deposits, weights = [], []
         for path in walked:
-            for t, g in enumerate(laid(levels, path, discount, mix)):
+            for t, short in enumerate(laid(levels, path, discount, mix)):
                 if path[1][t] == u and path[0][t][cell] > 0:
-                    deposits.append(g)
+                    deposits.append(short)
                     weights.append(path[0][t][cell])
         if weights:
             evidence = sum(
@@ -62,5 +63,5 @@ def after(
             )
             step = rate * max(weights) * min(1.0, sum(weights) / evidence) ** trust
             mean = np.average(deposits, weights=weights)
-            new[cell, u] += step * (mean - levels[cell, u])
+            new[cell, u] = np.clip(levels[cell, u] + step * mean, *bounds)
     return new

@@ -132,6 +132,18 @@ def test_extreme_levels_are_no_trouble(rule: str, alpha: float) -> None:
         assert pheromone.probabilities[0] == pytest.approx([0, 1, 0], abs=1e-299)
 
 
+@pytest.mark.parametrize("alpha", [8.0, 9.0, 1e19, 1e308])
+@pytest.mark.parametrize("k", [1, 4])
+def test_exponents_that_no_integer_holds_are_no_trouble(alpha: float, k: int) -> None:
+    """Small whole exponents are multiplied out; these would take for ever."""
+    pheromone = Pheromone(4, 2, 0.1, alpha, np.ones((4, 2)))
+    pheromone.set_levels(np.array([[0.5, 1.0]] * 4))
+    index, degree = np.arange(k, dtype=np.int32)[None], np.full((1, k), 1 / k)
+    choose_actions("boltzmann", pheromone, index, degree, 0.0, np.random.default_rng(0))
+    low = 0.5**alpha
+    assert pheromone.probabilities[0] == pytest.approx([low / (1 + low), 1 / (1 + low)])
+
+
 @pytest.mark.parametrize("choice", [0.0, np.nextafter(1.0, 0.0)])
 @pytest.mark.parametrize("n_actions", [1, 2, 17])
 def test_the_ends_of_the_unit_interval_choose_the_first_and_last(

@@ -20,7 +20,7 @@ def walk_of_three() -> Walk:
     for t, (ants, back) in enumerate(STEPS):
         who = np.array(ants)
         seen = np.arange(3)[:, None] * 10.0 + t
-        walk.append(who, seen, who % 2, -1.0 * who - t, None)
+        walk.append(who, seen[who], who % 2, -1.0 * who - t, None)
         if back:
             end = np.array(back)
             ended = np.array([next(goals)])

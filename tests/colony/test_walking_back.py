@@ -18,6 +18,7 @@ from tests.colony import reference_walk_back as reference
 from tests.colony.reference_walk_back import Path
 
 Array = np.ndarray
+NO_BOUNDS = (-np.inf, np.inf)
 SHAPES = [(Crisp, (3,), 2), (Fuzzy, (4,), 3), (Fuzzy, (3, 4), 2), (Fuzzy, (2, 2, 2), 3)]
 
 
@@ -63,7 +64,7 @@ class Colony:
                 for ant, u, r in zip(walking, actions, rewards, strict=True):
                     own[ant][-1] += [int(u), float(r)]
                 masks = mask[walking] if self.masked else None
-                walk.append(walking, seen, actions, rewards, masks)
+                walk.append(walking, seen[walking], actions, rewards, masks)
             if ending.size:
                 masks = mask[ending] if self.masked else None
                 walk.stop(ending, seen, terminated[ending], masks)
@@ -88,9 +89,16 @@ class Colony:
     discount=st.sampled_from([0.0, 0.9, 1.0]),
     mix=st.sampled_from([0.0, 0.3, 1.0]),
     trust=st.sampled_from([0.0, 0.5, 1.0]),
+    bounds=st.sampled_from([NO_BOUNDS, (-5.0, 2.0)]),
 )
 def test_levels_are_those_of_the_equation(
-    seed: int, shape: Any, masked: bool, discount: float, mix: float, trust: float
+    seed: int,
+    shape: Any,
+    masked: bool,
+    discount: float,
+    mix: float,
+    trust: float,
+    bounds: tuple[float, float],
 ) -> None:
     rng = np.random.default_rng(seed)
     colony = Colony(rng, shape, masked)
@@ -101,7 +109,8 @@ def test_levels_are_those_of_the_equation(
     paths = np.flatnonzero(rng.random(colony.memory.n_paths) < 0.7)
     if not paths.size:
         paths = np.arange(1)
-    how = {"discount": discount, "mix": mix, "rate": 0.7, "trust": trust}
+    how: Any = {"discount": discount, "mix": mix, "rate": 0.7, "trust": trust}
+    how["bounds"] = bounds
     walk_back.walk(colony.memory, paths, **how)
     walked = [colony.paths[path] for path in paths]
     expected = reference.after(levels, walked, colony.paths, **how)
@@ -116,13 +125,56 @@ def test_the_order_of_the_ants_does_not_change_a_bit(seed: int, shape: Any) -> N
     colony = Colony(rng, shape, masked=False)
     colony.walk(ants=9, longest=12)
     levels = rng.normal(scale=100.0, size=(colony.partition.n_cells, colony.n_actions))
-    how = {"discount": 0.97, "mix": 0.2, "rate": 0.9, "trust": 1.0}
+    how: Any = {"discount": 0.97, "mix": 0.2, "rate": 0.9, "trust": 1.0}
+    how["bounds"] = NO_BOUNDS
     results = []
     for _ in range(3):
         walk_back = WalkBack(levels.copy())
         walk_back.walk(colony.memory, rng.permutation(colony.memory.n_paths), **how)
         results.append(walk_back.levels.tobytes())
     assert len(set(results)) == 1
+
+
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    shape=st.sampled_from(SHAPES),
+    masked=st.booleans(),
+)
+def test_ants_may_come_back_in_any_order(seed: int, shape: Any, masked: bool) -> None:
+    """Other slots for the same walks, which are remembered in another order then."""
+    order = np.random.default_rng(seed + 1).permutation(9)
+    how: Any = {"discount": 0.97, "mix": 0.2, "rate": 0.9, "trust": 0.5}
+    how["bounds"] = NO_BOUNDS
+    results = []
+    for slots in (np.arange(9), order):
+        rng = np.random.default_rng(seed)
+        memory = Memory(10_000, shape[2], grid(*shape[:2]))
+        walk_back = WalkBack(rng.normal(size=(memory.partition.n_cells, shape[2])))
+        for _ in range(3):  # so that older walks are merged as well
+            length, walk = rng.integers(1, 12, size=9), Walk(9)
+            terminated = rng.random(9) < 0.5
+            for t in range(length.max() + 1):
+                own = rng.uniform(size=(9, len(shape[1])))
+                allowed = rng.random((9, shape[2])) < 0.6
+                allowed[:, 0] = True
+                actions, rewards = rng.integers(shape[2], size=9), rng.normal(size=9)
+                seen = np.empty_like(own)
+                seen[slots] = own
+                for who, take in ((t < length, True), (t == length, False)):
+                    ants = np.flatnonzero(who)
+                    ants = ants[np.argsort(slots[ants])]
+                    masks = allowed[ants] if masked else None
+                    if ants.size and take:
+                        own_rows = seen[slots[ants]]
+                        walk.append(
+                            slots[ants], own_rows, actions[ants], rewards[ants], masks
+                        )
+                    elif ants.size:
+                        walk.stop(slots[ants], seen, terminated[ants], masks)
+            memory.add(walk)
+            walk_back.walk(memory, np.arange(memory.n_paths), **how)
+        results.append(walk_back.levels.tobytes())
+    assert results[0] == results[1]
 
 
 def test_what_is_forgotten_leaves_nothing_behind() -> None:
@@ -169,5 +221,11 @@ def test_levels_that_cannot_be_added_up_are_refused() -> None:
     walk_back = WalkBack(np.full((3, 2), 1e305))
     with pytest.raises(ValueError, match="must be numbers that can be added up"):
         walk_back.walk(
-            colony.memory, np.arange(2), discount=1.0, mix=0.5, rate=1.0, trust=1.0
+            colony.memory,
+            np.arange(2),
+            discount=1.0,
+            mix=0.5,
+            rate=1.0,
+            trust=1.0,
+            bounds=NO_BOUNDS,
         )

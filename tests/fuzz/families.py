@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -133,6 +134,14 @@ CONSTRUCTORS: dict[str, Callable[[], tuple[Callable[..., Any], dict[str, Any]]]]
             "epsilon": 0.1,
             "trace_decay": 0.5,
             "traces": "replacing",
+            "replay": 2,
+            "older_steps": 3,
+            "steps_per_replay": 5,
+            "memory_size": 20,
+            "optimism": 1.0,
+            "grows": True,
+            "visits_to_grow": 5.0,
+            "max_cells": 100,
             "max_steps": 3,
             "seed": 0,
             "n_actions": 3,
@@ -150,7 +159,7 @@ CONSTRUCTORS: dict[str, Callable[[], tuple[Callable[..., Any], dict[str, Any]]]]
             "epsilon": 0.1,
             "optimism": 1.0,
             "walks_back": 2,
-            "older_paths": 3,
+            "older_steps": 3,
             "steps_per_walk": 5,
             "memory_size": 20,
             "visits_to_grow": 5.0,
@@ -444,7 +453,11 @@ def _run(env: Any, kind: str, boxes: bool) -> Any:
         cost = costs.Steps() if boxes else None
         found = evaluate_policy_cost(liars.Model(), env, max_steps=9, seed=1, cost=cost)
         return found.costs.tolist(), found.returns.tolist(), found.lengths.tolist()
-    kinds: dict[str, Any] = {"q": QLearning, "returning": ReturningACL}
+    kinds: dict[str, Any] = {
+        "q": QLearning,
+        "replay": partial(QLearning, replay=2, trace_decay=0.5),
+        "returning": ReturningACL,
+    }
     agent: Any = kinds.get(kind, ACL)(env, partition, seed=0, max_steps=9)
     agent.learn(trials=2)
     return agent.table.tolist(), agent.num_timesteps
@@ -457,7 +470,7 @@ def environments(rng: Rng) -> Call:
     """One thing that an environment returns is changed."""
     boxes, masked = bool(rng.integers(2)), bool(rng.integers(2))
     mode = choice(rng, list(AutoresetMode))
-    kind = choice(rng, ("crisp", "fuzzy", "q", "returning", "model"))
+    kind = choice(rng, ("crisp", "fuzzy", "q", "replay", "returning", "model"))
     what = choice(rng, ("observations", "rewards", "terminated", "truncated", "infos"))
     forms, outcome = values.WRONG, "refuse"
     if masked and rng.random() < 0.3:

@@ -11,12 +11,11 @@ from gymnasium import spaces
 from hypothesis import given
 from hypothesis import strategies as st
 
-from acl_gym import Crisp, Discrete, Fuzzy
+from acl_gym import ACL, Crisp, Discrete, Fuzzy
 from acl_gym.partitions import locate_all
 from acl_gym.partitions.growing import (
     carried_over,
     initial_partition,
-    refined,
     widened,
 )
 
@@ -40,12 +39,18 @@ def test_a_fuzzy_table_says_the_same_everywhere(
     period = 10.0 if round_axis and sizes[0] > 1 else None
     coarse = Fuzzy(centres, [period] + [None] * (len(sizes) - 1))
     axis %= len(sizes)
-    fine = refined(coarse, axis)
+    fine = coarse.refined(axis)
     table = rng.normal(size=(coarse.n_cells, 3))
     carried = carried_over(table, coarse, fine)
     states = rng.uniform(-2.0, 12.0, (200, len(sizes)))
     np.testing.assert_allclose(
         value(carried, fine, states), value(table, coarse, states), atol=1e-9
+    )
+    old, new = value(table, coarse, states), value(carried, fine, states)
+    chosen = new.argmax(axis=1)[:, None]
+    # Where two actions are equal but for rounding, either may be the policy's.
+    np.testing.assert_allclose(
+        np.take_along_axis(old, chosen, 1)[:, 0], old.max(axis=1), atol=1e-9
     )
     assert set(coarse.centres[axis]) <= set(fine.centres[axis])
     rounded = axis == 0 and period is not None
@@ -55,22 +60,42 @@ def test_a_fuzzy_table_says_the_same_everywhere(
 
 def test_cells_of_a_crisp_grid_are_copied() -> None:
     coarse = Crisp([[0.0, 1.0, 2.0]])
-    fine = refined(coarse, 0)
+    fine = coarse.refined(0)
     table = np.array([[1.0], [2.0], [4.0]])
     # A centre on the border of two cells belongs to the upper one, as a state does.
     assert carried_over(table, coarse, fine).ravel().tolist() == [1, 2, 2, 4, 4]
 
 
-@pytest.mark.parametrize(("axis", "words"), [(2, "axis must be"), (-1, "axis must be")])
-def test_an_axis_must_exist(axis: int, words: str) -> None:
-    with pytest.raises(ValueError, match=words):
-        refined(Fuzzy([[0.0, 1.0]] * 2), axis)
+def test_a_colony_goes_on_on_finer_cells() -> None:
+    env = gym.make_vec("acl_gym/Pendulum-v0", num_envs=20)
+    coarse = Fuzzy.from_box(env.single_observation_space, (8, 9), circular=[0])
+    colony = ACL(env, coarse, seed=0, max_steps=100).learn(trials=3)
+    finer = ACL(env, coarse.refined(1), seed=0, max_steps=100)
+    finer.set_table(carried_over(colony.table, coarse, finer.partition))
+    states = env.reset(seed=2)[0]
+    chosen = colony.predict(states)[0]
+    # Where levels tie, either action may be taken; here few do.
+    assert np.mean(finer.predict(states)[0] == chosen) > 0.8
+    assert finer.learn(trials=1).partition.n_cells == 8 * 17
+
+
+def test_only_grids_can_be_refined_and_stay_of_their_kind() -> None:
+    assert type(Crisp([[0.0, 1.0]]).refined(0)) is Crisp
+    assert not hasattr(Discrete(5), "refined")
+    lone = Fuzzy([[0.5], [0.0, 1.0]])
+    assert lone.refined(0).n_cells == lone.n_cells
+
+
+@pytest.mark.parametrize("axis", [2, -1, "0", 0.5, None, True])
+def test_an_axis_must_exist(axis: Any) -> None:
+    with pytest.raises((TypeError, ValueError), match="axis must be"):
+        Fuzzy([[0.0, 1.0]] * 2).refined(axis)
 
 
 def test_a_table_of_another_partition_is_refused() -> None:
     coarse = Fuzzy([[0.0, 1.0]])
     with pytest.raises(ValueError, match="table must have 2 rows, one for each cell"):
-        carried_over(np.zeros((3, 1)), coarse, refined(coarse, 0))
+        carried_over(np.zeros((3, 1)), coarse, coarse.refined(0))
 
 
 BOX = spaces.Box(np.array([-np.inf, 0.0]), np.array([np.inf, 1.0]), dtype=np.float64)
@@ -120,11 +145,11 @@ class Many(gym.Env):
 @pytest.mark.parametrize("intervals", [[True], [1, 0], [True, False, True], "ab"])
 def test_intervals_must_fit(intervals: Any) -> None:
     with pytest.raises(ValueError, match="intervals must be 2 bools for axis 0"):
-        refined(Fuzzy([[0.0, 1.0, 3.0]]), 0, intervals)
+        Fuzzy([[0.0, 1.0, 3.0]]).refined(0, intervals)
 
 
 def test_single_intervals_are_halved() -> None:
-    fine = refined(Fuzzy([[0.0, 1.0, 3.0]]), 0, [False, True])
+    fine = Fuzzy([[0.0, 1.0, 3.0]]).refined(0, [False, True])
     assert fine.centres[0].tolist() == [0.0, 1.0, 2.0, 3.0]
-    rounded = refined(Fuzzy([[0.0, 1.0]], [3.0]), 0, [False, True])
+    rounded = Fuzzy([[0.0, 1.0]], [3.0]).refined(0, [False, True])
     assert rounded.centres[0].tolist() == [0.0, 1.0, 2.0]

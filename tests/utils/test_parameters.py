@@ -55,8 +55,9 @@ def test_defaults_are_in_range_and_set_values_are_checked(kind: Any) -> None:
         assert parameter.default == default_of(kind, name)
         agent = kind(None, grid, n_actions=2)
         assert getattr(agent, name) == parameter.default
-        with pytest.raises(ValueError, match=f"{name} must lie in"):
-            kind(None, grid, n_actions=2, **{name: -1.0})
+        bad, words = (-1, "be at least") if parameter.whole else (-1.0, "lie in")
+        with pytest.raises(ValueError, match=f"{name} must {words}"):
+            kind(None, grid, n_actions=2, **{name: bad})
 
 
 def test_a_fixed_parameter_is_set_once() -> None:
@@ -80,6 +81,7 @@ def test_ranges_in_words() -> None:
     assert Range(at_least=0, below=1).in_words() == "in [0, 1)"
     assert Range(above=0).in_words() == "> 0"
     assert Range(at_least=-1).in_words() == ">= -1"
+    assert Range(at_least=1, at_most=2_000_000_000).in_words() == "in [1, 2e9]"
     assert Range().in_words() == "in (-inf, inf)"
     assert 0.0 in Range(at_least=0)
     assert np.inf not in Range()

@@ -6,7 +6,6 @@ from typing import Any, Protocol
 
 import gymnasium as gym
 import numpy as np
-from gymnasium.error import ResetNeeded
 from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
@@ -128,33 +127,6 @@ def checked_actions(actions: Any, count: int, n_actions: int) -> IntArray:
             f"in slot {slot}."
         )
     return checked
-
-
-def checked_reset_mask(mask: Any, num_envs: int, *, begun: bool) -> BoolArray | None:
-    """Return the mask of a partial reset, None for a full one.
-
-    Raises:
-        TypeError: it is not a bool array.
-        ValueError: it has the wrong shape or nothing is True.
-        ResetNeeded: there was no full reset yet.
-    """
-    if mask is None:
-        return None
-    if not isinstance(mask, np.ndarray) or mask.dtype != np.bool_:
-        actual = mask.dtype if isinstance(mask, np.ndarray) else type(mask)
-        raise TypeError(
-            f"options['reset_mask'] must be a NumPy array of bool, got {actual}."
-        )
-    if mask.shape != (num_envs,) or not mask.any():
-        raise ValueError(
-            f"options['reset_mask'] must have shape ({num_envs},) and at least one "
-            f"True, got shape {mask.shape} with {int(mask.sum())} True."
-        )
-    if not begun:
-        raise ResetNeeded(
-            "the first reset must start all slots; leave 'reset_mask' out."
-        )
-    return mask
 
 
 def final_infos(

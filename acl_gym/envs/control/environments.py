@@ -23,7 +23,6 @@ from acl_gym.envs.control.bookkeeping import (
     checked_autoreset_mode,
     checked_options,
     checked_render_mode,
-    checked_reset_mask,
     count_step,
     draw_uniforms,
     final_infos,
@@ -35,6 +34,7 @@ from acl_gym.envs.control.rendering import Frame, Renderer
 from acl_gym.envs.control.stepping import PartialStep
 from acl_gym.envs.control.system import ControlSystem
 from acl_gym.envs.limits import checked_limit, trial_limit
+from acl_gym.envs.reset_mask import checked_reset_mask
 from acl_gym.utils import validation
 from acl_gym.utils.typing import BoolArray, FloatArray, IntArray
 

@@ -253,14 +253,19 @@ class Stream(Rollout):
         self._mask[slots] = True if allowed is None else allowed[slots]
 
     def outcome(self) -> Outcome:
-        """What the episodes that were finished since `start` came to."""
+        """What the episodes that were finished since `start` came to.
+
+        Where a trial ends before some ants have ever come back, also what theirs have
+        come to by then, as in a `Rollout`.
+        """
+        away, success = np.flatnonzero(self._on_first), self.success
         told = [
             np.zeros(each.ants.size, np.bool_) if each.success is None else each.success
             for each in self._back
         ]
         return Outcome(
-            np.concatenate([each.costs for each in self._back]),
-            None if self.success is None else np.concatenate(told),
+            np.concatenate([*(each.costs for each in self._back), self.cost[away]]),
+            None if success is None else np.concatenate([*told, success[away]]),
             int(sum((b.ended - b.begun).sum() for b in self._back) + self.length.sum()),
         )
 

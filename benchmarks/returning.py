@@ -66,13 +66,13 @@ TASKS = {
     "pendulum": Task("acl_gym/Pendulum-v0", 20_000, 500, -48.0),  # the best has -38.4
     "pendulum, 10%": Task("acl_gym/Pendulum-v0", 20_000, 500, -42.2),
     "navigation": Task("acl_gym/Navigation-v0", 250_000, 10_000, -75.0),
-    "grid 1-D": Task("acl_gym/GridSearch1D-v0", 4_000, 100, -5.0),
+    "grid 1-D": Task("acl_gym/GridSearch1D-v0", 2_000, 100, -5.0),
     "grid 2-D": Task("acl_gym/GridSearch2D-v0", 16_000, 500, -10.05),
     "mountain car": Task("MountainCar-v0", 60_000, 5_000, -110.0),
     "cart-pole": Task("CartPole-v1", 30_000, 1_500, 475.0),
-    "frozen lake": Task("FrozenLake-v1", 20_000, 1_000, 0.70, starts=500),
+    "frozen lake": Task("FrozenLake-v1", 20_000, 1_000, 0.70, starts=200),
     "cliff": Task("CliffWalking-v1", 8_000, 500, -13.0, starts=1, limit=200),
-    "taxi": Task("Taxi-v4", 20_000, 1_000, 7.8, starts=200),
+    "taxi": Task("Taxi-v4", 20_000, 1_000, 7.8, starts=100),
     "acrobot": Task("Acrobot-v1", 100_000, 10_000, -100.0),
 }
 

@@ -57,7 +57,10 @@ class ReturningACL(RememberingAgent, ColonyAgent):
         trust: in [0, 1]. With 1, a level moves by the share of its remembered evidence
             that the ants have just walked back, and so comes to the mean over all that
             is remembered; with 0 it follows the paths that were walked back last.
-        epsilon: probability of a random action, in [0, 1].
+        epsilon: probability of a random action, in [0, 1], on the average of the ants:
+            the first ant never explores, the last one twice as often, and those between
+            in even steps. So there are always long walks without accidents, which show
+            where the present policy fails, and ants that look elsewhere.
         optimism: in [0, 1], what pairs promise that were never tried: with 0 the value
             of a good state, with 1 the most that could be had.
         walks_back: how often the ants walk back after each walk, >= 1.
@@ -263,6 +266,7 @@ class ReturningACL(RememberingAgent, ColonyAgent):
             limit: after how many steps of the trial they stop in any case.
         """
         rollout, walk = self.rollout, Walk(self.num_envs)
+        curiosity = self._curiosity()
         going = rollout._ants
         while (
             rollout._ants.size
@@ -273,7 +277,7 @@ class ReturningACL(RememberingAgent, ColonyAgent):
             seen = observation[ants]
             index, degree = self._locate(observation, ants)
             actions = epsilon_greedy_unchecked(
-                self._table, index, degree, self.epsilon, self.rng, allowed
+                self._table, index, degree, curiosity[ants], self.rng, allowed
             )
             step = rollout._step(actions)
             walk.append(ants, seen, actions, -step.cost, allowed)
@@ -287,6 +291,12 @@ class ReturningACL(RememberingAgent, ColonyAgent):
             on_the_way = np.zeros(going.size, np.bool_)
             walk.stop(going, observation, on_the_way, rollout.allowed_after(going))
         return walk, observation
+
+    def _curiosity(self) -> FloatArray:
+        """How often each ant explores, `(num_envs,)`."""
+        if self.num_envs == 1:
+            return np.array([self.epsilon])
+        return np.minimum(np.linspace(0.0, 2.0 * self.epsilon, self.num_envs), 1.0)
 
     def _return(self, newest: IntArray, bounds: tuple[float, float]) -> None:
         """Let the ants walk the newest paths back, and some older ones."""

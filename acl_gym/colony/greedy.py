@@ -46,13 +46,19 @@ def epsilon_greedy_unchecked(
     table: FloatArray,
     index: CellArray,
     degree: FloatArray,
-    epsilon: float,
+    epsilon: float | FloatArray,
     rng: np.random.Generator,
     allowed: BoolArray | None = None,
     weights: FloatArray | None = None,
 ) -> IntArray:
-    """`epsilon_greedy_actions` for cells that `locate_checked` has found for the table."""
+    """`epsilon_greedy_actions` for cells that `locate_checked` has found for the table.
+
+    `epsilon` may differ from state to state, `(n,)`.
+    """
     draws = drawn_numbers(rng, len(index))
+    if isinstance(epsilon, np.ndarray):
+        draws[0] = draws[0] >= epsilon  # a coin that has fallen: 0 explores
+        epsilon = 0.5
     actions = np.empty(len(index), np.int64)
     any_action = ALL if allowed is None else allowed
     _epsilon_greedy(table, weights, index, degree, draws, epsilon, any_action, actions)

@@ -204,14 +204,25 @@ def _walk_back(
         for row in range(end, first[path] - 1, -1):
             place = np.uint64(row)  # unsigned: no check for indices from the end
             best = -np.inf
-            for u in range(len(choices) or levels.shape[1]):
-                promise = 0.0
-                for c in range(len(corners) or index.shape[1]):
-                    cell = np.uint64(index[place, np.uint64(c)])
-                    promise += degree[place, np.uint64(c)] * levels[cell, np.uint64(u)]
-                if masked and not allowed[place, np.uint64(u)]:
-                    continue
-                best = promise if promise > best else best
+            if masked:
+                for u in range(len(choices) or levels.shape[1]):
+                    promise = 0.0
+                    for c in range(len(corners) or index.shape[1]):
+                        cell = np.uint64(index[place, np.uint64(c)])
+                        promise += (
+                            degree[place, np.uint64(c)] * levels[cell, np.uint64(u)]
+                        )
+                    if allowed[place, np.uint64(u)]:
+                        best = max(best, promise)
+            else:
+                for u in range(len(choices) or levels.shape[1]):
+                    promise = 0.0
+                    for c in range(len(corners) or index.shape[1]):
+                        cell = np.uint64(index[place, np.uint64(c)])
+                        promise += (
+                            degree[place, np.uint64(c)] * levels[cell, np.uint64(u)]
+                        )
+                    best = promise if promise > best else best
             if row == end:
                 expected = value = 0.0 if terminated[path] else best
                 continue

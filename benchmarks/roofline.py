@@ -139,6 +139,7 @@ class Ants:
             3.0,
             None,
             self.table.probabilities,
+            self.table.stale,
             self.index,
             self.degree,
             self.draws,

@@ -127,7 +127,7 @@ class Memory:
         rows = self._room(size, new)
         for name, kept in self._rows.items():
             if name in new:
-                kept[rows] = new[name]
+                kept[rows] = new.pop(name)
             elif name == "allowed":
                 kept[rows] = True
         self._locate(seen, rows)

@@ -52,6 +52,7 @@ class Memory:
         evidence: how often each pair of a cell and an action was tried: the sum of the
             degrees, in units of 1 / `UNITS`, `(n_cells * n_actions,)`. Integers, so that
             the sum does not depend on the order, and forgetting undoes adding exactly.
+        largest_reward: of all steps that are remembered, without its sign.
     """
 
     def __init__(self, most: int, n_actions: int, partition: Partition) -> None:
@@ -59,6 +60,7 @@ class Memory:
         self.first: IntArray = np.empty(0, np.int64)
         self.last: IntArray = np.empty(0, np.int64)
         self.terminated: BoolArray = np.empty(0, np.bool_)
+        self.largest_reward = 0.0
         self._used = 0  # rows, those of forgotten paths before them included
         self._shared = False  # whether a copy has the same rows
         self._rows: dict[str, NDArray[Any]] = {
@@ -136,6 +138,7 @@ class Memory:
         self.last = np.concatenate([self.last, rows.start + added.last])
         self.terminated = np.concatenate([self.terminated, added.terminated])
         self._count(paths, 1)
+        self._find_largest_reward()
         return paths
 
     def live_rows(self) -> IntArray:
@@ -246,6 +249,7 @@ class Memory:
         self._rows, self._used, self._shared = rows, size, False
         self.first, self.last = first, last
         self.terminated = arrays["terminated"].copy()
+        self._find_largest_reward()
         if located:
             self.set_partition(self.partition)
         else:
@@ -285,6 +289,12 @@ class Memory:
             sign * UNITS,
             self.evidence,
         )
+
+    def _find_largest_reward(self) -> None:
+        """Find it once for each walk, since each walk back needs it."""
+        begin = int(self.first[0]) if self.n_paths else self._used
+        rows = self.reward[begin : self._used]
+        self.largest_reward = float(max(-rows.min(initial=0.0), rows.max(initial=0.0)))
 
     def _forget(self, most: int) -> None:
         """Forget the oldest paths, until at most so many states are left."""

@@ -134,8 +134,7 @@ class WalkBack:
         """
         longest = int((last - first).max(initial=1))
         steps = longest if kept == 1.0 else min(longest, 1.0 / (1.0 - kept))
-        rows = memory.reward[int(first.min()) : int(last.max())]
-        reward = max(abs(rows.min(initial=0.0)), abs(rows.max(initial=0.0)))
+        reward = memory.largest_reward
         level = max(abs(self.levels.min()), abs(self.levels.max()))
         bound = (reward + 2.0 * level) * (steps + 1) * int((last - first).sum() + 1)
         if not bound < 2.0**1000:

@@ -23,11 +23,11 @@ from matplotlib.ticker import NullFormatter, ScalarFormatter
 from numba import njit
 from rich.console import Console
 from rich.table import Table
+from walks import Remembered, Trial
 
 from acl_gym.colony import greedy, selection
 from acl_gym.colony.pheromone import Pheromone
-from acl_gym.colony.solutions import Solutions
-from acl_gym.colony.update_rules import EachVisit, Reinforcement
+from acl_gym.colony.update_rules import EachVisit
 from acl_gym.envs import navigation, pendulum
 from acl_gym.partitions import Fuzzy
 from acl_gym.partitions.kernels import written_out
@@ -139,6 +139,7 @@ class Ants:
             3.0,
             None,
             self.table.probabilities,
+            self.table.stale,
             self.index,
             self.degree,
             self.draws,
@@ -159,38 +160,6 @@ class Ants:
         )
 
 
-class Trial:
-    """A trial of random walks over a grid, ready for the deposit.
-
-    Args:
-        cells: centres of each of the two axes.
-        walked: centres per axis, from the first, that the ants visit; 0 means all.
-        ants: M.
-        steps: T.
-    """
-
-    def __init__(
-        self, cells: int, walked: int = 0, ants: int = 200, steps: int = 100
-    ) -> None:
-        rng = np.random.default_rng(1)
-        last = (walked or cells) - 1  # the distance between centres is 1
-        grid = Fuzzy([np.arange(float(cells))] * 2)
-        self.solutions = Solutions(ants, steps, 3, grid)
-        everyone, states = np.arange(ants), rng.uniform(0, last, (ants, 2))
-        for _ in range(steps):
-            moves = rng.normal(scale=0.025 * last, size=states.shape)
-            states = np.clip(states + moves, 0, last)
-            actions = rng.integers(0, 3, ants)
-            self.solutions.append(everyone, states, grid(states)[0], actions)
-        self.table = Pheromone(grid.n_cells, 3, 1e-4, 3.0)
-        self.deposits = np.full(ants, 1e-3)
-        self.reinforcement = Reinforcement(self.table.levels.size)
-        self.n_steps = ants * steps
-
-    def deposit(self) -> None:
-        self.reinforcement(self.table, self.solutions, self.deposits, 0.1)
-
-
 def kernels() -> list[Kernel]:
     """The kernels of a fuzzy learning step, with the work counted from the equations."""
     two, four = Ants(2, 3), Ants(4, 9)
@@ -201,7 +170,7 @@ def kernels() -> list[Kernel]:
     drives = vehicle.sample_states(rng, ANTS)
     few, many = rng.integers(0, 3, ANTS), rng.integers(0, 9, ANTS)
     rewards, reached = np.empty(ANTS), np.empty(ANTS, dtype=np.bool_)
-    trial = Trial(40)
+    trial, remembered = Trial(40), Remembered(250)
     # Operations of a sine: 13 (reduction) + 17 (series) + 4 (end); of an exponential:
     # 9 + 28 + 3.
     sine, exponential = 34, 40
@@ -223,6 +192,10 @@ def kernels() -> list[Kernel]:
         Kernel("decay, 16 cells", 16 * 5, 16 * (12 + 17) + 8, four.decay),
         Kernel("deposit, 4 cells", 28 + 4 * 6, 17 * 3 + 4 * (12 + 3 * 16),
                trial.deposit, trial.n_steps),
+        # V: 3 sums of 4 products, and the largest; Q: another sum; G: 5.
+        Kernel("walk back, 4 cells x 3 actions", 3 * 8 + 3 + 8 + 5 + 4 * 8,
+               4 * 12 + 9 + 4 * 24 + 4 * 2 * 24, remembered.walk_back,
+               remembered.n_steps),
         Kernel("random numbers, 2 per ant", 2 * 8, 16, lambda: rng.random((2, ANTS))),
     ]  # fmt: skip
 

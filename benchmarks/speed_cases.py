@@ -10,8 +10,10 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 from numpy_colony import NumpyColony
+from walks import Remembered, Trial
 
 from acl_gym.agents.acl import ACL
+from acl_gym.agents.returning import ReturningACL
 from acl_gym.partitions import Crisp, Fuzzy, Partition
 from acl_gym.partitions.automatic import thesis_partition
 
@@ -27,6 +29,10 @@ SYSTEMS = {
 }
 TAU0 = {"pendulum": 1e-4}  # Table 5.2; 0.001 elsewhere, Table 4.1
 TRIALS_OF_A_RUN = 100
+BACK = 10
+"""How often the same paths are walked back."""
+WALKERS = 250, 2_500
+"""Ants that walk about 10,000 and 100,000 steps in 60 steps of time."""
 
 
 @dataclass(frozen=True)
@@ -119,6 +125,41 @@ def learn(system: str, kind: str, n_ants: int, trials: int) -> Work:
     return work
 
 
+def learn_returning(n_ants: int) -> Work:
+    """Let a new returning colony learn the pendulum: it walks back ten times as often."""
+    env = make_env("pendulum", n_ants)
+
+    def work() -> int:
+        agent = ReturningACL(env, seed=0)
+        return agent.learn(total_timesteps=max(10_000, 60 * n_ants)).num_timesteps
+
+    return work
+
+
+def deposit(ants: int) -> Work:
+    """Deposit the solutions of one trial, on about as many cells as are walked back."""
+    trial = Trial(64, ants=ants, steps=40)
+
+    def work() -> int:
+        for _ in range(BACK):
+            trial.deposit()
+        return BACK * trial.n_steps
+
+    return work
+
+
+def walk_back(ants: int) -> Work:
+    """Walk remembered paths back, and merge what was laid."""
+    remembered = Remembered(ants)
+
+    def work() -> int:
+        for _ in range(BACK):
+            remembered.walk_back()
+        return BACK * remembered.n_steps
+
+    return work
+
+
 def learn_in_numpy(n_ants: int, trials: int) -> Work:
     """The same trials of the fuzzy pendulum in vectorised NumPy."""
 
@@ -165,6 +206,21 @@ def loop(system: str, kind: str, n: int) -> str:
 def in_numpy(n: int) -> str:
     """The name of the case of the NumPy colony."""
     return f"fuzzy pendulum learning in NumPy, {n:,} ants"
+
+
+def returning(n: int) -> str:
+    """The name of the case of a returning colony that learns."""
+    return f"returning ants learning the pendulum, {n:,} ants"
+
+
+def walking_back(n: int) -> str:
+    """The name of the case of ants that walk back."""
+    return f"walking back, 64 x 65 cells, {n:,} ants"
+
+
+def depositing(n: int) -> str:
+    """The name of the case with which walking back is compared."""
+    return f"deposit, 64 x 64 cells, {n:,} ants"
 
 
 COMPLETE_RUN = f"fuzzy pendulum, complete run of {TRIALS_OF_A_RUN} trials, 250 ants"
@@ -222,6 +278,23 @@ def plan(systems: list[str], sizes: list[int], dqn_steps: int) -> Iterator[Plan]
             n,
             lambda n=n: learn_in_numpy(n, trials_for(n)),
             loop("pendulum", "fuzzy", n),
+        )
+    for n in (n for n in sizes if n <= 2_000):
+        yield Plan(
+            returning(n),
+            "pendulum",
+            n,
+            lambda n=n: learn_returning(n),
+            loop("pendulum", "fuzzy", n),
+        )
+    for n in WALKERS:
+        yield Plan(depositing(n), "pendulum", n, lambda n=n: deposit(n))
+        yield Plan(
+            walking_back(n),
+            "pendulum",
+            n,
+            lambda n=n: walk_back(n),
+            depositing(n),
         )
     yield Plan(
         "synchronous vector of single pendulums, 16 slots",

@@ -1,10 +1,10 @@
-"""The project's targets for its speed, as ratios within one run."""
+"""The project's targets for its speed, most of them as ratios within one run."""
 
 from __future__ import annotations
 
 from typing import Any
 
-from speed_cases import alone, cart_pole, in_numpy, loop
+from speed_cases import WALKERS, alone, cart_pole, in_numpy, loop, walking_back
 
 FUZZY_LOOP = loop("pendulum", "fuzzy", 2_000)
 ALONE = alone("pendulum", 2_048)
@@ -47,6 +47,9 @@ def criteria(rates: dict[str, float]) -> list[dict[str, Any]]:
         ratio = rates[same] / rates[FUZZY_LOOP]
         what = "cost of a learning ant-step to that of the environment alone"
         rows.append(_row(what, ratio, "at most", 3.5))
+    if walking_back(WALKERS[0]) in rates:
+        what = "walking back, nanoseconds a remembered step"
+        rows.append(_row(what, 1e9 / rates[walking_back(WALKERS[0])], "at most", 35.0))
     return rows
 
 

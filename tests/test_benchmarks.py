@@ -45,6 +45,16 @@ def test_plant() -> None:
     assert all(case["steps_per_second"] > 0 for case in cases)
 
 
+def test_throughput_of_walking_back() -> None:
+    found = output_of("throughput.py", "--only", "walking back", "--no-peers", *ONCE)
+    names = [case["name"] for case in found["cases"]]
+    for ants in ("250", "2,500"):
+        deposit = f"deposit, 64 x 64 cells, {ants} ants"
+        back = names.index(f"walking back, 64 x 65 cells, {ants} ants")
+        assert found["cases"][back]["reference"] == deposit
+    assert [row["asked"] for row in found["criteria"]] == ["at most"]
+
+
 def test_workers() -> None:
     small = ("--slots", "2", "--steps", "2", "--milliseconds", "0.1", "--without-ray")
     cases = output_of("workers.py", *small, *ONCE)["cases"]

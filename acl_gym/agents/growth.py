@@ -83,16 +83,20 @@ class Growth:
         """
         if not (self.on and isinstance(partition, Grid)):
             return None
+        several = [i for i, line in enumerate(partition.centres) if line.size > 1]
+        if not several:
+            return None
+        axis = several[self.splits % len(several)]
+        size = partition.centres[axis].size
+        halved = size - 1 if partition.periods[axis] is None else size
+        if partition.n_cells // size * (size + halved) > max_cells:
+            return None  # first, since a look at the evidence takes longer
         tried = evidence[evidence > 0]
         tries = float(np.median(tried)) / UNITS * partition.cells_per_state
-        several = [i for i, line in enumerate(partition.centres) if line.size > 1]
-        if tries <= visits_to_grow or not several:
-            return None
-        finer = partition.refined(several[self.splits % len(several)])
-        if finer.n_cells > max_cells:
+        if tries <= visits_to_grow:
             return None
         self.splits += 1
-        return finer
+        return partition.refined(axis)
 
     def restore(self, splits: NDArray[Any]) -> None:
         """Take over the number of splits, perhaps from a stranger's file.

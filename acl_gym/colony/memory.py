@@ -25,6 +25,9 @@ from acl_gym.utils.typing import (
 FIRST_ROWS = 4_096
 """States for which there is memory at first; more is made when needed."""
 
+SPARE = 1.25
+"""For how many times as many states as are remembered there is memory at most."""
+
 UNITS = 2**36
 """Parts of a degree in which evidence is counted."""
 
@@ -49,6 +52,7 @@ class Memory:
         evidence: how often each pair of a cell and an action was tried: the sum of the
             degrees, in units of 1 / `UNITS`, `(n_cells * n_actions,)`. Integers, so that
             the sum does not depend on the order, and forgetting undoes adding exactly.
+        largest_reward: of all steps that are remembered, without its sign.
     """
 
     def __init__(self, most: int, n_actions: int, partition: Partition) -> None:
@@ -56,7 +60,9 @@ class Memory:
         self.first: IntArray = np.empty(0, np.int64)
         self.last: IntArray = np.empty(0, np.int64)
         self.terminated: BoolArray = np.empty(0, np.bool_)
+        self.largest_reward = 0.0
         self._used = 0  # rows, those of forgotten paths before them included
+        self._shared = False  # whether a copy has the same rows
         self._rows: dict[str, NDArray[Any]] = {
             "action": np.empty(0, np.min_scalar_type(n_actions - 1)),
             "reward": np.empty(0),
@@ -72,7 +78,7 @@ class Memory:
     @property
     def n_steps(self) -> int:
         """How many steps they have together."""
-        return int((self.last - self.first).sum())
+        return int(self.last.sum() - self.first.sum())
 
     @property
     def index(self) -> CellArray:
@@ -123,7 +129,7 @@ class Memory:
         rows = self._room(size, new)
         for name, kept in self._rows.items():
             if name in new:
-                kept[rows] = new[name]
+                kept[rows] = new.pop(name)
             elif name == "allowed":
                 kept[rows] = True
         self._locate(seen, rows)
@@ -132,6 +138,7 @@ class Memory:
         self.last = np.concatenate([self.last, rows.start + added.last])
         self.terminated = np.concatenate([self.terminated, added.terminated])
         self._count(paths, 1)
+        self._find_largest_reward()
         return paths
 
     def live_rows(self) -> IntArray:
@@ -154,11 +161,12 @@ class Memory:
             Their numbers, in the order of time.
         """
         older = self.n_paths - newest.size
-        drawn = np.arange(older)
-        steps = int((self.last[:older] - self.first[:older]).sum())
+        steps = int(self.last[:older].sum() - self.first[:older].sum())
         if steps > most:
             share = math.ceil(older * most / steps)
             drawn = np.sort(rng.choice(older, share, replace=False))
+        else:
+            drawn = np.arange(older)
         return np.concatenate([drawn, newest])
 
     def set_partition(self, partition: Partition) -> None:
@@ -180,8 +188,9 @@ class Memory:
     def copy(self) -> Memory:
         """What is remembered now, to come back to; what is added later is not in it."""
         copied = copy.copy(self)
-        # Rows are only ever added behind those in use, so that they may be shared.
+        # Rows are added behind those in use, and shared ones are not moved.
         copied._rows = dict(self._rows)
+        copied._shared = self._shared = True
         copied.evidence = self.evidence.copy()
         return copied
 
@@ -237,9 +246,10 @@ class Memory:
             rows[name] = np.ascontiguousarray(arrays[name])
         if not located:
             self._check_cells(rows["index"], rows["degree"])
-        self._rows, self._used = rows, size
+        self._rows, self._used, self._shared = rows, size, False
         self.first, self.last = first, last
         self.terminated = arrays["terminated"].copy()
+        self._find_largest_reward()
         if located:
             self.set_partition(self.partition)
         else:
@@ -280,6 +290,12 @@ class Memory:
             self.evidence,
         )
 
+    def _find_largest_reward(self) -> None:
+        """Find it once for each walk, since each walk back needs it."""
+        begin = int(self.first[0]) if self.n_paths else self._used
+        rows = self.reward[begin : self._used]
+        self.largest_reward = float(max(-rows.min(initial=0.0), rows.max(initial=0.0)))
+
     def _forget(self, most: int) -> None:
         """Forget the oldest paths, until at most so many states are left."""
         sizes = self.last - self.first + 1
@@ -307,20 +323,35 @@ class Memory:
                 kind = np.result_type(kept, array)
                 self._rows[name] = kept.astype(kind)
         if self._used + size > len(self.action):
-            begin = int(self.first[0]) if self.n_paths else self._used
-            live = self._used - begin
-            length = max(len(self.action), FIRST_ROWS)
-            while length < 2 * live + size:
-                length *= 2
+            self._move_to_the_front(size)
+        rows = slice(self._used, self._used + size)
+        self._used += size
+        return rows
+
+    def _move_to_the_front(self, size: int) -> None:
+        """Let the rows in use begin at 0, so that `size` rows fit behind them."""
+        begin = int(self.first[0]) if self.n_paths else self._used
+        live = self._used - begin
+        # Where not everything is remembered any more, a quarter is spare, so that rows
+        # are moved seldom; before that, memory doubles.
+        enough = int(SPARE * (max(self.most, live) + size))
+        length = max(len(self.action), FIRST_ROWS)
+        while length < 2 * live + size and length < enough:
+            length = min(2 * length, enough)
+        if length > len(self.action) or self._shared:
             for name, kept in self._rows.items():
                 moved = np.zeros((length, *kept.shape[1:]), dtype=kept.dtype)
                 moved[:live] = kept[begin : self._used]
                 self._rows[name] = moved
-            self.first, self.last = self.first - begin, self.last - begin
-            self._used = live
-        rows = slice(self._used, self._used + size)
-        self._used += size
-        return rows
+            self._shared = False
+        else:
+            for kept in self._rows.values():
+                # In parts that do not overlap, which NumPy moves without a copy.
+                for row in range(0, live, max(begin, 1)):
+                    end = min(row + begin, live)
+                    kept[row:end] = kept[begin + row : begin + end]
+        self.first, self.last = self.first - begin, self.last - begin
+        self._used = live
 
 
 @njit

@@ -101,6 +101,8 @@ class Walk:
     def rows(self) -> tuple[Paths, dict[str, NDArray[Any]]]:
         """All of it, ant by ant, and the paths of an ant in the order of time.
 
+        Ask once: what is returned is not kept.
+
         Returns:
             The paths, all of which have ended, and of all states, `(n, ...)`, what was
             "seen", the "action", the "reward", and what was "allowed", if there are
@@ -120,10 +122,10 @@ class Walk:
                 np.ones((ant.size, masks[0].shape[1]), np.bool_) if m is None else m
                 for ant, m in zip(self._ants, self._allowed, strict=True)
             ]
-        rows = {
-            name: np.take(np.concatenate(part), order, axis=0)
-            for name, part in parts.items()
-        }
+        rows = {}
+        for name, part in parts.items():
+            rows[name] = np.take(np.concatenate(part), order, axis=0)
+            part.clear()  # a long walk of many ants would not fit into memory twice
         kinds = np.full(self._n_rows, _STEP, dtype=np.int8)
         for begin, ends in self._ends:
             kinds[begin : begin + ends.size] = ends

@@ -28,7 +28,6 @@ import math
 
 import numpy as np
 
-from acl_gym.colony.greedy import best_value
 from acl_gym.colony.memory import UNITS, Memory
 from acl_gym.partitions.kernels import written_out
 from acl_gym.utils.compiling import njit
@@ -41,6 +40,8 @@ from acl_gym.utils.typing import (
 )
 
 _BITS = 62  # of a sum, beside its sign
+_PARTS = 4  # integers of a pair, see `_walk_back`
+_BLOCK_BITS = 6  # pairs are merged in blocks of 2 ** 6
 
 
 class WalkBack:
@@ -57,8 +58,8 @@ class WalkBack:
     def __init__(self, levels: FloatArray) -> None:
         self.levels = levels
         self.known: BoolArray = np.zeros(levels.shape, np.bool_)
-        self._laid: IntArray = np.zeros((levels.size, 4), np.int64)
-        self._touched: IntArray = np.zeros(levels.size, np.int64)
+        self._laid: IntArray = np.zeros(levels.size * _PARTS, np.int64)
+        self._visited: BoolArray = np.zeros((levels.size >> _BLOCK_BITS) + 1, np.bool_)
 
     def walk(
         self,
@@ -91,7 +92,7 @@ class WalkBack:
         """
         first, last = memory.first[paths], memory.last[paths]
         scale = self._scale(memory, first, last, discount * mix)
-        count = _walk_back(
+        _walk_back(
             first,
             last,
             memory.terminated[paths],
@@ -108,10 +109,10 @@ class WalkBack:
             scale,
             float(UNITS),
             self._laid,
-            self._touched,
+            self._visited,
         )
         _merge(
-            self._touched[:count],
+            self._visited,
             self._laid,
             memory.evidence,
             scale,
@@ -133,8 +134,7 @@ class WalkBack:
         """
         longest = int((last - first).max(initial=1))
         steps = longest if kept == 1.0 else min(longest, 1.0 / (1.0 - kept))
-        rows = memory.reward[int(first.min()) : int(last.max())]
-        reward = max(abs(rows.min(initial=0.0)), abs(rows.max(initial=0.0)))
+        reward = memory.largest_reward
         level = max(abs(self.levels.min()), abs(self.levels.max()))
         bound = (reward + 2.0 * level) * (steps + 1) * int((last - first).sum() + 1)
         if not bound < 2.0**1000:
@@ -163,9 +163,13 @@ def _walk_back(
     scale: float,
     units: float,
     laid: IntArray,
-    touched: IntArray,
-) -> int:
+    visited: BoolArray,
+) -> None:
     """Add up what ants lay on each pair.
+
+    V and Q are those of `best_value`, with the same sums. They are written out here,
+    once: a function that takes arrays, called in a loop, may have them counted as used
+    and not used again in each pass, which takes longer than the sums do.
 
     Args:
         first: row of the first state of each path.
@@ -173,7 +177,7 @@ def _walk_back(
         terminated: whether that is a terminal state.
         index: cells of the states, `(rows, k)`.
         degree: their degrees, `(rows, k)`.
-        action: what was done, `(rows,)`.
+        action: what was done, `(rows,)`; anything that can be done in last states.
         reward: what that gave, `(rows,)`.
         allowed: U_q, `(rows, n_actions)`, or empty.
         levels: `(n_cells, n_actions)`.
@@ -184,52 +188,67 @@ def _walk_back(
         scale: of the sums of deposits.
         units: of the sums of degrees.
         laid: for each pair the sum of the deposits times their degrees, the sum of the
-            degrees, and the largest degree, all integers, `(n_pairs, 4)`; side by side,
-            since most of the time goes into fetching them. Zeros before.
-        touched: receives the pairs that were visited, `(>= n_pairs,)`.
-
-    Returns:
-        How many pairs were visited.
+            degrees, and the largest degree, all integers, side by side, since it takes
+            time to fetch them, and one to spare, `(n_pairs * _PARTS,)`. Zeros before.
+        visited: receives in which blocks of 2 ** `_BLOCK_BITS` pairs some were visited.
+            To note each pair that is visited first takes a branch that is hard to
+            predict.
     """
-    n_actions, count = np.uint64(levels.shape[1]), 0
+    n_actions, parts = np.uint64(levels.shape[1]), np.uint64(_PARTS)
     own, promised = discount * mix, discount * (1.0 - mix)
+    masked = allowed.size > 0
     for path in range(first.size):
         end = last[path]
-        value = 0.0
-        if not terminated[path]:
-            value = best_value(levels, index, degree, end, allowed, corners, choices)
-        expected = value
-        for row in range(end - 1, first[path] - 1, -1):
-            expected = reward[row] + own * expected + promised * value
-            place = np.uint64(row)
+        expected = value = 0.0
+        for row in range(end, first[path] - 1, -1):
+            place = np.uint64(row)  # unsigned: no check for indices from the end
+            best = -np.inf
+            if masked:
+                for u in range(len(choices) or levels.shape[1]):
+                    promise = 0.0
+                    for c in range(len(corners) or index.shape[1]):
+                        cell = np.uint64(index[place, np.uint64(c)])
+                        promise += (
+                            degree[place, np.uint64(c)] * levels[cell, np.uint64(u)]
+                        )
+                    if allowed[place, np.uint64(u)]:
+                        best = max(best, promise)
+            else:
+                for u in range(len(choices) or levels.shape[1]):
+                    promise = 0.0
+                    for c in range(len(corners) or index.shape[1]):
+                        cell = np.uint64(index[place, np.uint64(c)])
+                        promise += (
+                            degree[place, np.uint64(c)] * levels[cell, np.uint64(u)]
+                        )
+                    best = promise if promise > best else best
+            if row == end:
+                expected = value = 0.0 if terminated[path] else best
+                continue
             taken = np.uint64(action[place])
             said = 0.0
             for c in range(len(corners) or index.shape[1]):
                 cell = np.uint64(index[place, np.uint64(c)])
                 said += degree[place, np.uint64(c)] * levels[cell, taken]
-            short = expected - said
+            expected = reward[place] + own * expected + promised * value
+            value, short = best, expected - said
             for c in range(len(corners) or index.shape[1]):
                 share = degree[place, np.uint64(c)]
                 if share > 0.0:
                     cell = np.uint64(index[place, np.uint64(c)])
                     pair = cell * n_actions + taken
                     weight = max(np.int64(np.rint(share * units)), 1)
-                    if laid[pair, 1] == 0:
-                        touched[count] = np.int64(pair)
-                        count += 1
-                    laid[pair, 0] += np.int64(np.rint(share * short * scale))
-                    laid[pair, 1] += weight
-                    laid[pair, 2] = max(laid[pair, 2], weight)
-            if row > first[path]:
-                value = best_value(
-                    levels, index, degree, row, allowed, corners, choices
-                )
-    return count
+                    visited[pair >> np.uint64(_BLOCK_BITS)] = True
+                    sums = pair * parts
+                    laid[sums] += np.int64(np.rint(share * short * scale))
+                    laid[sums + np.uint64(1)] += weight
+                    largest = sums + np.uint64(2)
+                    laid[largest] = max(laid[largest], weight)
 
 
-@njit
+@njit(error_model="numpy")
 def _merge(
-    touched: IntArray,
+    visited: BoolArray,
     laid: IntArray,
     evidence: IntArray,
     scale: float,
@@ -241,14 +260,23 @@ def _merge(
     levels: FloatArray,
     known: BoolArray,
 ) -> None:
-    """Move the level of each touched pair by its mean, and clear the sums."""
-    for j in range(touched.size):
-        pair = touched[j]
-        weight = laid[pair, 1]
-        mean = laid[pair, 0] / weight * (units / scale)
-        step = rate * laid[pair, 2] / units
-        if trust > 0.0:
-            step *= min(1.0, weight / max(evidence[pair], 1)) ** trust
-        levels[pair] = min(max(levels[pair] + step * mean, least), most)
-        known[pair] = True
-        laid[pair] = 0
+    """Move the level of each visited pair by its mean, and clear the sums."""
+    for block in range(visited.size):
+        if not visited[block]:
+            continue
+        visited[block] = False
+        begin = block << _BLOCK_BITS
+        for pair in range(begin, min(begin + (1 << _BLOCK_BITS), levels.size)):
+            sums = pair * _PARTS
+            weight = laid[sums + 1]
+            if weight == 0:
+                continue
+            mean = laid[sums] / weight * (units / scale)
+            step = rate * laid[sums + 2] / units
+            if trust > 0.0:
+                share = min(1.0, weight / max(evidence[pair], 1))
+                # A power takes longer than all the rest.
+                step *= share if trust == 1.0 else share**trust
+            levels[pair] = min(max(levels[pair] + step * mean, least), most)
+            known[pair] = True
+            laid[sums] = laid[sums + 1] = laid[sums + 2] = 0

@@ -42,8 +42,9 @@ PATHS = [
 def test_an_ant_may_make_several_paths() -> None:
     walk = walk_of_three()
     assert walk.steps == 12
+    states = walk.states()
     paths, rows = walk.rows()
-    assert len(walk.states()) == len(rows["seen"]) == 12 + 5
+    assert len(states) == len(rows["seen"]) == 12 + 5
     found = [
         (rows["seen"][first : last + 1, 0].tolist(), bool(terminated))
         for first, last, terminated in zip(*paths, strict=True)

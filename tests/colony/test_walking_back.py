@@ -229,3 +229,37 @@ def test_levels_that_cannot_be_added_up_are_refused() -> None:
             trust=1.0,
             bounds=NO_BOUNDS,
         )
+
+
+def test_rows_that_are_moved_stay_what_they_were(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A memory in little space moves its rows often; one with much space never does."""
+    colonies = []
+    for rows in (4, 4_096):
+        monkeypatch.setattr("acl_gym.colony.memory.FIRST_ROWS", rows)
+        rng = np.random.default_rng(3)
+        colonies.append(Colony(rng, SHAPES[2], masked=True, most=60))
+        colonies[-1].walk(ants=2, longest=3)
+    tight, roomy = (colony.memory for colony in colonies)
+    monkeypatch.setattr("acl_gym.colony.memory.FIRST_ROWS", 4)
+    most_rows = 0
+    for number in range(200):
+        then = {name: array.copy() for name, array in tight.arrays().items()}
+        copied = number % 7 == 0  # shared rows are not moved, but others are
+        kept = tight.copy() if copied else tight
+        for colony in colonies:
+            colony.walk(ants=2, longest=3)
+        for name, array in roomy.arrays().items():
+            np.testing.assert_array_equal(tight.arrays()[name], array, err_msg=name)
+            if copied:
+                np.testing.assert_array_equal(kept.arrays()[name], then[name])
+        np.testing.assert_array_equal(tight.evidence, roomy.evidence)
+        live = slice(int(tight.first[0]), int(tight.last[-1]) + 1)
+        other = slice(int(roomy.first[0]), int(roomy.last[-1]) + 1)
+        np.testing.assert_array_equal(tight.index[live], roomy.index[other])
+        np.testing.assert_array_equal(tight.degree[live], roomy.degree[other])
+        most_rows = max(most_rows, len(tight.action))
+    # At most 8 states are added at a time.
+    assert most_rows <= 1.25 * (60 + 8)
+    assert int(roomy.last[-1]) > 10 * most_rows

@@ -386,7 +386,7 @@ def test_parameters_that_no_agent_takes_together() -> None:
 
 
 def test_an_agent_that_parameters_have_chosen_is_named() -> None:
-    shown = invoke(*SMALL[:-2], "--param", "tau0=0.001")
+    shown = invoke(*SMALL[:-2], "--param", "selection=boltzmann")
     assert shown.exit_code == 0, shown.output
     assert "note: these parameters are those of --agent acl." in shown.stderr
     shown = invoke(*SMALL[:-2], "--param", "epsilon=0.3")

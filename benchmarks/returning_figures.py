@@ -33,7 +33,7 @@ from acl_gym.partitions.base import locate_all
 from acl_gym.plotting import draw_learning_curves, style
 from acl_gym.plotting.pendulum import OMEGA, THETA, handles
 
-from ablation import TASKS, without_ants  # isort: skip  # the script beside this one
+from ablation import TASKS, at_least_one, without_ants  # isort: skip  # the script beside this one
 
 OUT = Path(__file__).parent.parent / "docs" / "figures"
 PENDULUM = "acl_gym/Pendulum-v0"
@@ -193,7 +193,9 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--out", type=Path, default=OUT, help="a folder")
-    parser.add_argument("--seeds", type=int, default=5, help="runs of each curve")
+    parser.add_argument(
+        "--seeds", type=at_least_one, default=5, help="runs of each curve"
+    )
     parser.add_argument("--seed", type=int, default=0, help="of the growing colony")
     parser.add_argument("--only", choices=("growing", "curves"))
     options = parser.parse_args()

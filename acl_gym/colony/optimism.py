@@ -33,7 +33,7 @@ def promised_level(
     """
     sizes = memory.last - memory.first
     longest = int(sizes.max())
-    steps = longest if discount == 1.0 else (1 - discount**longest) / (1 - discount)
+    steps = longest if discount == 1.0 else 1 / (1 - discount)
     going, ending = _best_rewards(
         memory.first, memory.last, memory.terminated, memory.reward
     )

@@ -216,6 +216,7 @@ class Rollout:
         self.steps = 0
         self._stale = None
         self.returned: IntArray | None = None
+        self._due = self.max_steps
         if record:
             require_array(observation)
         self._record = _Record(observation, self._fresh) if record else None
@@ -268,25 +269,6 @@ class Rollout:
             reached: `(>= m,)`, receives whether they are in a terminal state.
             stopped: `(>= m,)`, receives whether their episodes are over.
         """
-        ants, m = self._ants, self._ants.size
-        given = self._act(actions)
-        left = self._count(given, cost, reached, stopped)
-        observation, reward, _, _, infos = given
-        if left.size < m:
-            self._ants = left
-            if self._mode is AutoresetMode.SAME_STEP and not self._waits:
-                observation = self._last_seen(ants[stopped[:m]], observation, infos)
-        if self.steps >= self.max_steps:
-            self._ants = ants[:0]
-            stopped.fill(True)
-        if self._ants is not ants and not self._ants.size:
-            self.returned = self._all
-        if self._record is not None:
-            self._record.append(observation, self._actions - self.first_action, reward)
-        return observation
-
-    def _act(self, actions: IntArray) -> Any:
-        """Let the walking ants act; return what the environment gave, checked."""
         if self._stepping:
             self._check_idle("step")
         ants, native = self._ants, self._native
@@ -328,16 +310,10 @@ class Rollout:
             self._read_mask(given[4])
         else:
             self._mask = given[4].get("action_mask")
-        return given
-
-    def _count(
-        self, given: Any, cost: FloatArray, reached: BoolArray, stopped: BoolArray
-    ) -> IntArray:
-        """Count a step, see `_take`; return the ants whose episodes are not over."""
-        ants = self._ants
-        _, reward, terminated, truncated, infos = given
+        observation, reward, terminated, truncated, infos = given
         self.steps += 1
-        left = np.empty(ants.size, np.int64)
+
+        left = np.empty(m, np.int64)
         n_left, bad = _account(
             ants,
             reward,
@@ -357,7 +333,35 @@ class Rollout:
             # Idle slots that finish another episode are reset with the others.
             done = np.logical_or(terminated, truncated)
             self._stale = done if done.any() else None
-        return left[:n_left]
+        if n_left < m or self.steps >= self._due:
+            observation = self._settle(given, stopped[:m], left[:n_left])
+        if self._record is not None:
+            self._record.append(observation, self._actions - self.first_action, reward)
+        return observation
+
+    def _settle(self, given: Any, stopped: BoolArray, left: IntArray) -> Any:
+        """Do what is due when episodes have ended, or `_due` steps were made.
+
+        Args:
+            given: by the environment in this step.
+            stopped: whether it has ended the episode of each ant, `(m,)`; receives also
+                whether T has.
+            left: the others.
+
+        Returns:
+            The observations of all slots after the step.
+        """
+        ants, (observation, _, _, _, infos) = self._ants, given
+        if left.size < ants.size:
+            self._ants = left
+            if self._mode is AutoresetMode.SAME_STEP and not self._waits:
+                observation = self._last_seen(ants[stopped], observation, infos)
+        if self.steps >= self.max_steps:
+            self._ants = ants[:0]
+            stopped.fill(True)
+        if not self._ants.size:
+            self.returned = self._all
+        return observation
 
     def set_out(self, observation: Any) -> Any:
         """Let the ants that are `returned` set out again, where they do not wait.

@@ -18,6 +18,9 @@ from acl_gym.evaluation.rollout import Outcome, Rollout
 from acl_gym.evaluation.rows import fixed, with_rows
 from acl_gym.utils.typing import BoolArray, FloatArray, IntArray
 
+_NEVER = 2**62
+"""A number of steps that is never made."""
+
 
 class _Back(NamedTuple):
     """Ants that have come back in the same step, `(m,)` each."""
@@ -117,31 +120,28 @@ class Stream(Rollout):
         self._on_first = np.ones(n, dtype=np.bool_)
         self._begun = np.zeros(n, dtype=np.int64)
         self._back: list[_Back] = []
-        self._n_steps = 0
         self._resting = self._all[:0]  # slots that the next step will reset
         self._anew: _Anew | None = None
-        self._stood: list[Any] = []  # where each step was made from, if recorded
-        if self._record is not None:
-            self._standing = self._record.observations[0]
+        # Where steps were made from, by their number, other than where the last one led.
+        self._set_out_from: dict[int, Any] = {}
+        self._look_ahead()
         return observation
 
-    def _take(
-        self,
-        actions: IntArray,
-        cost: FloatArray,
-        reached: BoolArray,
-        stopped: BoolArray,
-    ) -> Any:
-        """See `Rollout._take`."""
-        ants, resting = self._ants, self._resting
-        given = self._act(actions)
-        left = self._count(given, cost, reached, stopped)
-        observation, reward, terminated, truncated, infos = given
-        self._n_steps += ants.size
-        if not self._asks_to_wait and (self.length[ants] >= self.max_steps).any():
-            left = self._time_out(ants, stopped[: ants.size])
+    def _settle(self, given: Any, stopped: BoolArray, left: IntArray) -> Any:
+        """See `Rollout._settle`."""
+        ants, (observation, _, terminated, truncated, infos) = self._ants, given
+        if not self._asks_to_wait:
+            late = self.length[ants] >= self.max_steps
+            if not self._by_mask and (late & ~stopped).any():
+                raise ValueError(
+                    f"episodes must end after max_steps={self.max_steps} steps, the time "
+                    "limit of the environment, got a longer one in slot "
+                    f"{ants[np.argmax(late & ~stopped)]}; check the environment."
+                )
+            stopped |= late
+            left = ants[~stopped]
         if left.size < ants.size:
-            back = ants[stopped[: ants.size]]
+            back = ants[stopped]
             if self._mode is AutoresetMode.SAME_STEP and not self._waits:
                 reset = np.logical_or(terminated, truncated)
                 if reset[back].any():  # the others are timed out
@@ -150,27 +150,22 @@ class Stream(Rollout):
                     observation = self._last_seen(back[reset[back]], observation, infos)
             self._come_back(back)
             self._ants = left
-        if resting.size:
-            self._begun[resting] = self.steps
-            self._ants = _joined(self._ants, resting)
+        if self._resting.size:
+            self._begun[self._resting] = self.steps
+            self._ants = _joined(self._ants, self._resting)
             self._resting = self._all[:0]
-        if self._record is not None:
-            self._stood.append(self._standing)
-            self._record.append(observation, self._actions - self.first_action, reward)
-            self._standing = self._record.observations[-1]
+        self._look_ahead()
         return observation
 
-    def _time_out(self, ants: IntArray, stopped: BoolArray) -> IntArray:
-        """Stop the ants that have made T steps; return those that are left."""
-        late = self.length[ants] >= self.max_steps
-        if not self._by_mask and (late & ~stopped).any():
-            raise ValueError(
-                f"episodes must end after max_steps={self.max_steps} steps, the time "
-                "limit of the environment, got a longer one in slot "
-                f"{ants[np.argmax(late & ~stopped)]}; check the environment."
-            )
-        stopped |= late
-        return ants[~stopped]
+    def _look_ahead(self) -> None:
+        """Find out after which step there is something to settle for sure."""
+        if self._resting.size:
+            self._due = self.steps + 1
+        elif self._asks_to_wait or not self._ants.size:
+            self._due = _NEVER  # but when episodes end
+        else:
+            longest = int(self.length[self._ants].max())
+            self._due = self.steps + self.max_steps - longest
 
     def _come_back(self, ants: IntArray) -> None:
         """Note the episodes that have ended."""
@@ -187,6 +182,7 @@ class Stream(Rollout):
                 self.steps,
             )
         )
+        self.length[ants] = 0
 
     def set_out(self, observation: Any) -> Any:
         """Let the ants that are `returned` set out again, unless the trial ends.
@@ -209,7 +205,6 @@ class Stream(Rollout):
                 self._ants = self._all[:0]
             return observation
         self.cost[back] = 0.0
-        self.length[back] = 0
         self.terminated[back] = False
         if self._reported_success is not None:
             self._reported_success[back] = False
@@ -219,10 +214,13 @@ class Stream(Rollout):
             self._ants = _joined(self._ants, back)
         else:
             self._resting = back
-            if not self._ants.size:
-                observation = self._wait_for_resets()
+            self._look_ahead()
+            if not self._ants.size:  # nobody walks meanwhile
+                observation = self._take(self._ants, *self._scratch)
         if self._record is not None:
-            self._standing = observation if self._fresh else observation.copy()
+            kept = observation if self._fresh else observation.copy()
+            self._set_out_from[self.steps] = kept
+        self._look_ahead()
         return observation
 
     def _reset(self, slots: IntArray, observation: Any, anew: _Anew | None) -> Any:
@@ -246,12 +244,6 @@ class Stream(Rollout):
         )
         return with_rows(observation, received.observations(begun, n), mask)
 
-    def _wait_for_resets(self) -> Any:
-        """Make the step that resets all resting slots, where no ant walks."""
-        observation, *_ = self._act(self._ants)  # of no ant
-        self._ants, self._resting = self._resting, self._all[:0]
-        return observation
-
     def _set_mask(self, allowed: BoolArray | None, slots: BoolArray) -> None:
         """Take over what some slots may do now; None: everything."""
         if allowed is None and self._mask is None:
@@ -261,15 +253,20 @@ class Stream(Rollout):
         self._mask[slots] = True if allowed is None else allowed[slots]
 
     def outcome(self) -> Outcome:
-        """What the episodes that were finished since `start` came to."""
+        """What the episodes that were finished since `start` came to.
+
+        Where a trial ends before some ants have ever come back, also what theirs have
+        come to by then, as in a `Rollout`.
+        """
+        away, success = np.flatnonzero(self._on_first), self.success
         told = [
             np.zeros(each.ants.size, np.bool_) if each.success is None else each.success
             for each in self._back
         ]
         return Outcome(
-            np.concatenate([each.costs for each in self._back]),
-            None if self.success is None else np.concatenate(told),
-            self._n_steps,
+            np.concatenate([*(each.costs for each in self._back), self.cost[away]]),
+            None if success is None else np.concatenate([*told, success[away]]),
+            int(sum((b.ended - b.begun).sum() for b in self._back) + self.length.sum()),
         )
 
     def returned_episodes(self) -> Episodes:
@@ -291,7 +288,12 @@ class Stream(Rollout):
         ended = np.concatenate([np.full(b.ants.size, b.ended) for b in back])
         lengths = ended - begun
         during = slice(begun.min(), ended.max())
-        seen = np.stack(self._stood[during])
+        seen = np.stack(
+            [
+                self._set_out_from.get(step, record.observations[step])
+                for step in range(during.start, during.stop)
+            ]
+        )
         after = np.stack(record.observations[1:][during])
         # Rows beyond the end of an episode repeat its last one.
         times = begun + np.arange(lengths.max())[:, None]

@@ -382,6 +382,25 @@ def test_equal_lengths_are_one_synchronous_trial() -> None:
     assert stream.outcome().costs.tobytes() == rollout.outcome().costs.tobytes()
 
 
+def test_a_trial_that_is_broken_off_counts_who_has_never_been_back() -> None:
+    """As the synchronous one does; who has set out again counts with what it brought."""
+    env = WaitingVectorEnv([lambda: Corridor(9), lambda: Corridor(3, success=True)])
+    stream = Stream(env, 20, completes=False)
+    observation = stream.start(seed=0)
+    for _ in range(5):
+        step = stream.step(np.ones(2, dtype=np.int64))
+        observation = stream.set_out(step.observation)
+        if stream.steps == 2:
+            assert stream.outcome().costs.tolist() == [2.0, 2.0]
+            assert stream.outcome().success is None
+    assert observation[:, 0].tolist() == [5.0, 2.0]
+    outcome = stream.outcome()
+    assert outcome.costs.tolist() == [3.0, 5.0]
+    assert outcome.success is not None
+    assert outcome.success.tolist() == [True, False]
+    assert outcome.n_steps == 10
+
+
 @pytest.mark.parametrize("mode", ["NextStep", "SameStep"])
 @pytest.mark.parametrize("limit", [None, 50])
 def test_what_cannot_be_stopped_is_refused(mode: str, limit: int | None) -> None:

@@ -260,7 +260,7 @@ def _names(known: Iterable[str]) -> Callable[[str], list[str]]:
     return names
 
 
-def _at_least_one(text: str) -> int:
+def at_least_one(text: str) -> int:
     if not (text.isdecimal() and int(text) >= 1):
         raise argparse.ArgumentTypeError(f"must be an integer >= 1, got {text!r}")
     return int(text)
@@ -285,13 +285,13 @@ def main(arguments: list[str] | None = None) -> int:
     )
     parser.add_argument(
         "--seeds",
-        type=_at_least_one,
+        type=at_least_one,
         default=10,
         help="runs of each, with seeds 0, 1, ... (default: %(default)s)",
     )
     parser.add_argument(
         "--steps",
-        type=_at_least_one,
+        type=at_least_one,
         help="interactions of each run (default: those of the task)",
     )
     parser.add_argument("--json", action="store_true", help="print JSON, no table")

@@ -86,3 +86,15 @@ def test_ablation() -> None:
         assert row["best"] >= row["last"]
         assert row["runs"][0]["steps"] >= 1500
         assert row["reached_25"] == (row["steps_25"] is not None)
+
+
+def test_returning_figures(tmp_path: Path) -> None:
+    """The better the later; the last is within 25% of the best there is."""
+    script = str(FOLDER / "returning_figures.py")
+    command = [sys.executable, script, "--only", "growing", "--out", str(tmp_path)]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    costs = [float(line.rpartition(" ")[2]) for line in done.stdout.splitlines()]
+    assert len(costs) == 4
+    assert costs[0] > costs[-1]
+    assert 38.4 < costs[-1] < 1.25 * 38.4
+    assert (tmp_path / "growing.png").stat().st_size > 100_000

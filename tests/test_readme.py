@@ -53,25 +53,25 @@ def test_ten_lines_learn_the_pendulum_and_go_home(
 ) -> None:
     run(*BLOCKS[:2])
     cost = float(capsys.readouterr().out.split()[0])
-    assert cost < 1.25 * 38.4
+    assert cost < 1.2 * 38.4, "three seeds: 41.9 to 42.3"
     written = {"swing_up.npz", "policy.png", "swing_up.h", "swing_up_policy.npz"}
     assert set(os.listdir()) == written
 
 
 def test_a_plant_of_ones_own_is_controlled(capsys: pytest.CaptureFixture[str]) -> None:
-    """Five seeds have cost 55.5 to 58.7, and all starts succeed."""
+    """Five seeds have cost 53.4 to 53.8, and all starts succeed; 52 is about the best."""
     names = run(BLOCKS[2])
-    assert 50.0 < float(capsys.readouterr().out) < 62.0
+    assert 50.0 < float(capsys.readouterr().out) < 55.0
     result = acl_gym.evaluate_policy_cost(names["colony"], names["env"])
     assert result.success_rate == 1.0
     assert Path("rod.h").is_file()
 
 
 def test_a_newcomers_environment_is_learned() -> None:
-    """Five seeds take 21.6 to 26.1 steps, 98 to 100% arrive; 18 is about the best."""
+    """Five seeds take 15.5 to 15.7 steps, and all arrive."""
     result = run(BLOCKS[3])["result"]
     assert result.success_rate >= 0.95
-    assert result.cost < 30.0
+    assert result.cost < 17.0
 
 
 @pytest.mark.slow
@@ -82,19 +82,20 @@ def test_commands_of_the_shell_do_what_they_say() -> None:
     listed, *rest = commands
     assert "acl_gym/Pendulum-v0" in shell(listed)
     said = [json.loads(shell(f"{command} --json")) for command in rest]
-    trained, evaluated, resumed, filmed, balanced, continuous, returning = said
-    assert trained["trials"] == 50
-    assert trained["policy_cost"] < 1.35 * 38.4
+    trained, evaluated, resumed, filmed, continuous, thesis, balanced = said
+    # Five seeds: 41.2 to 43.0 after 6,800 to 7,400 interactions.
+    assert trained["agent"] == "returning"
+    assert trained["policy_cost"] < 46.0
+    assert trained["env_steps"] < 9_000
     assert evaluated["policy_cost"] == trained["policy_cost"]
-    assert resumed["trials"] == 100
-    assert resumed["best"]["policy_cost"] == filmed["policy_cost"] < 1.25 * 38.4
+    assert resumed["trials"] == 60
+    assert resumed["best"]["policy_cost"] == filmed["policy_cost"] < 46.0
     assert Path("swing_up.gif").stat().st_size > 0
+    assert continuous["trials"] == 5
+    assert thesis["agent"] == balanced["agent"] == "acl"
+    assert thesis["policy_cost"] < 1.35 * 38.4
     # The README states 500, 491 and 500 with three seeds.
     assert balanced["best"]["policy_return"] > 450.0
-    assert continuous["trials"] == 5
-    # Five seeds: 42.0 to 44.3 after 8,400 to 10,500 steps.
-    assert returning["best"]["policy_cost"] < 46.0
-    assert returning["rows"][-1]["env_steps"] < 12_000
 
 
 @pytest.mark.usefixtures("short_runs")

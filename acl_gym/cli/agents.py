@@ -12,7 +12,10 @@ from acl_gym.cli.errors import BadArgumentError, bad_arguments
 from acl_gym.cli.sources import class_node
 from acl_gym.utils.validation import Range
 
-OWN_OPTIONS = ("env", "partition", "max_steps", "seed", "n_actions", "heuristic")
+OWN_OPTIONS = (
+    *("env", "partition", "max_steps", "seed", "n_actions", "heuristic"),
+    *("workers", "executor"),
+)
 """Keywords of the constructors that have an option of their own, or none at all."""
 
 
@@ -39,13 +42,14 @@ class AgentKind(NamedTuple):
 
 
 AGENTS = {
-    "acl": AgentKind("acl_gym.agents.acl", "ACL", deposits=True),
     "returning": AgentKind(
         "acl_gym.agents.returning", "ReturningACL", deposits=False, grows=True
     ),
+    "acl": AgentKind("acl_gym.agents.acl", "ACL", deposits=True),
     "q-learning": AgentKind("acl_gym.agents.q_learning", "QLearning", deposits=False),
 }
-"""Value of `--agent` -> the agent. To add one, add an entry."""
+"""Value of `--agent` -> the agent; the first is the default, see `settings.agent_with`.
+To add one, add an entry."""
 
 
 CHOICES = {

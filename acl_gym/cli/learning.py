@@ -101,10 +101,7 @@ def begin(
     grows = settings.get("grows")
     if grows is None:
         grows = AGENTS[kind].grows
-    if ants is None and grows:
-        ants = FEW_ANTS
-    elif ants is None:
-        ants = ANTS if environment.is_own else FOREIGN_ANTS
+    ants = ants or _default_ants(environment, grows)
     env = environment.vector(ants)
     steps = max_steps or default_steps(env)
     with bad_arguments():
@@ -160,9 +157,8 @@ def go_on(
         BadArgumentError: a parameter is fixed, or the environment does not fit.
     """
     known = learner.metadata
-    ants = ants or _count(
-        known.get("ants"), ANTS if environment.is_own else FOREIGN_ANTS
-    )
+    few = AGENTS[name_of(learner)].grows or getattr(learner, "grows", False)
+    ants = ants or _count(known.get("ants"), _default_ants(environment, few))
     how = known.get("evaluation", {})
     how = how if isinstance(how, dict) else {}
     every = evaluate_every or _count(how.get("every"), EVALUATE_EVERY)
@@ -205,6 +201,18 @@ def _as_if_uninterrupted(learner: Any, evaluation: PolicyEvaluation) -> None:
             row.pop(name, None)
     else:
         evaluation.on_training_end(learner)
+
+
+def _default_ants(environment: Environment, few: bool) -> int:
+    """How many slots there are where the user does not say.
+
+    Args:
+        environment: where.
+        few: whether the agent learns from few.
+    """
+    if few:
+        return FEW_ANTS
+    return ANTS if environment.is_own else FOREIGN_ANTS
 
 
 def _count(value: Any, default: int) -> int:

@@ -18,7 +18,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import MISSING, Field, fields
 from typing import Any
 
-from acl_gym.cli.agents import CHOICES, Declared
+from acl_gym.cli.agents import AGENTS, CHOICES, Declared, parameters
 from acl_gym.cli.common import check_name, did_you_mean
 from acl_gym.cli.errors import BadArgumentError, in_words
 from acl_gym.colony import costs, deposits, schedules
@@ -193,6 +193,38 @@ def _parameter(option: str, name: str, text: str, declared: Declared) -> Any:
     return value
 
 
+def agent_with(option: str, texts: Iterable[str]) -> str:
+    """The agent that is meant where none is named: the first that takes what is set.
+
+    So `deposit=rank:5` alone is enough to have the agent whose ants deposit.
+
+    Args:
+        option: the option, for messages.
+        texts: parameters, each `name=value`.
+
+    Returns:
+        A key of `AGENTS`.
+
+    Raises:
+        BadArgumentError: a name is unknown, or no agent takes all of them.
+    """
+    of_each = {kind: parameters(kind) for kind in AGENTS}
+    ranges = {n: each.range for known in of_each.values() for n, each in known.items()}
+    pairs = parse_pairs(option, texts, ranges)
+    for kind, known in of_each.items():
+        if all(n in known and _takes(known[n], text) for n, text in pairs.items()):
+            return kind
+    raise BadArgumentError(
+        f"{option}: no agent takes all of {', '.join(pairs)} as given; `acl-gym train "
+        "--help` lists the parameters of each."
+    )
+
+
+def _takes(declared: Declared, text: str) -> bool:
+    """Whether a parameter takes values of this form: few may change by a schedule."""
+    return declared.scheduled or _kind_name(text.partition(":")[0]) not in SCHEDULES
+
+
 def parse_sum(option: str, text: str) -> costs.Cost:
     """A cost, or a sum of costs with factors and constants.
 
@@ -227,7 +259,7 @@ def _term(option: str, text: str, kinds: Kinds) -> Any:
     """`name:argument:field=argument` as an object."""
     name, *arguments = _split(option, text, ":")
     name = name.strip()
-    kind = kinds.get(name.lower().replace("-", "_"))
+    kind = kinds.get(_kind_name(name))
     if kind is None:
         choices = ", ".join(signature(each, kinds[each]) for each in kinds)
         raise BadArgumentError(
@@ -253,6 +285,11 @@ def _term(option: str, text: str, kinds: Kinds) -> Any:
         raise BadArgumentError(
             f"{option} must be {signature(name, kind)}, got {text!r}.{reason}"
         ) from error
+
+
+def _kind_name(text: str) -> str:
+    """The name of a kind of object, which may be written with capitals and hyphens."""
+    return text.strip().lower().replace("-", "_")
 
 
 def _tuples(value: Any) -> Any:

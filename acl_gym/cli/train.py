@@ -16,9 +16,15 @@ from acl_gym.cli.environments import (
     from_metadata,
     parse_bins,
 )
-from acl_gym.cli.errors import BadArgumentError, Command, bad_arguments
+from acl_gym.cli.errors import BadArgumentError, Command, bad_arguments, report
+from acl_gym.cli.targets import checked_file, free_name, name_after
 
 HELP = """Learn in an environment, print the progress, and save the agent.
+
+The agent is the returning colony: its ants walk back and remember, and its partition is
+chosen and grows. --agent acl is the colony of the thesis, --agent q-learning is
+Q-learning and Q(lambda). Without --agent, a parameter may choose: --param deposit=rank:5
+takes the colony of the thesis, the first that has deposits.
 
 ENV_ID is the id of any Gymnasium environment; "module:id" imports a module first, which
 may be in the working directory. Two files are written: NAME.npz, the agent as it is at
@@ -31,8 +37,9 @@ happened. The exit code is then 130, or 143. A second Ctrl-C ends the program at
 \b
 Examples:
   acl-gym train acl_gym/Pendulum-v0
-  acl-gym train acl_gym/Pendulum-v0 --ants 2000 --trials 50 --seed 3
   acl-gym train --resume Pendulum-v0.npz --trials 50            50 more trials
+  acl-gym train acl_gym/Pendulum-v0 --agent acl --ants 2000 --seed 3
+  acl-gym train acl_gym/GridSearch2D-v0 --param epsilon=0.2
   acl-gym train acl_gym/GridSearch2D-v0 --ants 86 --param tabu=true
   acl-gym train acl_gym/Pendulum-v0 --agent q-learning --param trace_decay=0.5
   acl-gym train acl_gym/Pendulum-v0 --partition crisp --param tau0=0.001
@@ -86,8 +93,8 @@ def train(
         str | None,
         typer.Option(
             metavar="NAME",
-            help=f"The learning algorithm: {', '.join(AGENTS)}.  [default: "
-            f"{next(iter(AGENTS))}]",
+            help=f"The learning algorithm: {', '.join(AGENTS)}.  [default: the first of "
+            "these that has each --param]",
             show_default=False,
         ),
     ] = None,
@@ -107,9 +114,9 @@ def train(
         typer.Option(
             min=1,
             metavar="M",
-            help="Number of ants: slots of the vector environment.  [default: 250, or 200 "
-            "in environments of other packages, or 5 of the returning colony; with "
-            "--resume: as before]",
+            help="Number of ants: slots of the vector environment.  [default: 5 of the "
+            "returning colony; of others 250, or 200 in environments of other packages; "
+            "with --resume: as before]",
             show_default=False,
         ),
     ] = None,
@@ -117,7 +124,8 @@ def train(
         Literal["auto", "fuzzy", "crisp"],
         typer.Option(
             help="How continuous observations are partitioned into cells; auto means "
-            "fuzzy. Missing bounds are estimated from random steps."
+            "fuzzy, with the returning colony coarse cells that grow. Missing bounds are "
+            "estimated from random steps, or from what the returning colony sees."
         ),
     ] = "auto",
     cells: Annotated[
@@ -125,7 +133,8 @@ def train(
         typer.Option(
             metavar="N,N,...",
             help="Cells of each variable, or one number for all.  "
-            "[default: those of the thesis, or a few thousand in total]",
+            "[default: those of the thesis, or a few thousand in total; with the "
+            "returning colony they grow]",
             show_default=False,
         ),
     ] = None,
@@ -247,7 +256,7 @@ def train(
     debug: DebugOption = False,
 ) -> None:
     """Learn; see `HELP`."""
-    from acl_gym.cli.settings import parse_parameters, parse_settings
+    from acl_gym.cli.settings import agent_with, parse_parameters, parse_settings
 
     # Names first: a wrong one is answered before anything slow is imported.
     if agent is not None:
@@ -258,13 +267,13 @@ def train(
     typed = None if env_id is None else Environment(env_id, arguments, bins)
     if typed is not None:
         typed.check_id()
-    kind = agent or next(iter(AGENTS))
     if resume is None:
         if typed is None:
             raise BadArgumentError(
                 "ENV_ID is missing: name an environment, see `acl-gym envs`, or a file "
                 "to go on with, --resume FILE."
             )
+        kind = agent or agent_with("--param", param or ())
         settings = parse_parameters("--param", param or (), parameters(kind))
         typed.import_module()
     from acl_gym import set_num_threads
@@ -274,7 +283,7 @@ def train(
         set_num_threads(threads)
     shown = learning.Shown(quiet, as_json)
     if resume is None and typed is not None:
-        target = _target(_free_name(typed.name) if out is None else out)
+        target = checked_file(free_name(typed.name) if out is None else out)
         plan = learning.begin(
             typed,
             kind,
@@ -287,6 +296,8 @@ def train(
             evaluate_every=evaluate_every,
             trials=trials or learning.TRIALS,
         )
+        if agent is None and kind != next(iter(AGENTS)) and shown.progress:
+            report("acl-gym", f"note: these parameters are those of --agent {kind}.")
     elif resume is not None:
         if cells is not None or partition != "auto":
             raise BadArgumentError(
@@ -300,7 +311,10 @@ def train(
             raise BadArgumentError(
                 f"--agent must be {known}, as in {resume}, got {agent!r}; leave it out."
             )
-        changes = parse_parameters("--param", param or (), parameters(known))
+        wanted = list(param or ())
+        if agent is None and not AGENTS[known].deposits:
+            wanted = _without_deposit(wanted, known)
+        changes = parse_parameters("--param", wanted, parameters(known))
         for option, value, now in (
             ("--seed", seed, learner.seed),
             ("--max-steps", max_steps, learner.max_steps),
@@ -309,11 +323,15 @@ def train(
                 raise BadArgumentError(
                     f"{option} must be {now}, as in {resume}, got {value}; leave it out."
                 )
-        target = _target(_name_after(resume, environment.name) if out is None else out)
+        target = checked_file(
+            name_after(resume, environment.name) if out is None else out
+        )
         plan = learning.go_on(
             environment, learner, changes, ants, evaluate_every, trials
         )
-    best = _target(target.with_name(f"{target.stem}-best.npz")) if keep_best else None
+    best = (
+        checked_file(target.with_name(f"{target.stem}-best.npz")) if keep_best else None
+    )
     if resume is not None and best is not None:
         from acl_gym.cli.keeping import take_over_best
 
@@ -327,6 +345,22 @@ def train(
         tensorboard=tensorboard,
         shown=shown,
     )
+
+
+def _without_deposit(param: list[str], known: str) -> list[str]:
+    """Leave out a deposit, with a word, where an agent goes on that needs none.
+
+    It says how ants turn costs into pheromone, and lets them learn from rewards of any
+    sign. Other agents do so without it, so that a script that always sets it still works.
+    """
+    kept = [each for each in param if each.partition("=")[0].strip() != "deposit"]
+    if len(kept) < len(param):
+        report(
+            "acl-gym",
+            f"note: --param deposit is left out: this file holds --agent {known}, which "
+            "takes rewards of any sign as they are.",
+        )
+    return kept
 
 
 def _cells(text: str | None) -> list[int] | None:
@@ -383,36 +417,3 @@ def _resumed_environment(
     untyped = {k: v for k, v in found.arguments.items() if k not in arguments}
     check_named_by_file(str(file), Environment(found.env_id, untyped, found.bins), "")
     return found
-
-
-def _target(path: Path) -> Path:
-    """A file that can be written when learning is over, checked before it begins."""
-    from acl_gym.utils import files
-
-    folder = path.name in ("", "..")
-    with bad_arguments():
-        target = (
-            path
-            if folder
-            else files.checked_target(
-                files.with_suffix(path), "name a file elsewhere with --out FILE.npz"
-            )
-        )
-    if folder or target.is_dir():
-        raise BadArgumentError(f"{target} is a folder; give the name of a file.")
-    return target
-
-
-def _free_name(env_id: str) -> Path:
-    """A file name that is not taken in this folder: Pendulum-v0.npz, -2, -3, ..."""
-    stem = env_id.rpartition("/")[2]
-    path, number = Path(f"{stem}.npz"), 1
-    while path.exists() or path.with_name(f"{path.stem}-best.npz").exists():
-        number += 1
-        path = Path(f"{stem}-{number}.npz")
-    return path
-
-
-def _name_after(resumed: Path, env_id: str) -> Path:
-    """The file that was resumed; but never a best policy, which others would replace."""
-    return _free_name(env_id) if resumed.stem.endswith("-best") else resumed

@@ -101,7 +101,7 @@ def stages_of(
         states = path.states
         if step is not None:
             states = _between(states, known)
-        kept.append((trial, known, _title(trial, known), states))
+        kept.append((trial, known, _title(agent.num_timesteps, known), states))
     last = kept[-1][1]
     step = getattr(last.system, "sampling_time", None)
     frame_time = _STEP if step is None else step / _BETWEEN
@@ -136,7 +136,10 @@ def draw_stage(panels: Sequence[Axes], stage: Stage) -> Callable[[int], list[Any
     )
     words = "" if not subject.variables else _plane(stage).words()
     curves = bool(subject.variables) and len(_plane(stage).shown) == 1
-    levels = "pheromone" if curves else "strongest pheromone"
+    positive = stage.limits[0] > 0.0
+    levels = "strongest pheromone" if positive else "value of the best action"
+    if curves:
+        levels = "pheromone" if positive else "value"
     left.set_title("\n".join(filter(None, ["policy", words])))
     middle.set_title("\n".join(filter(None, [levels, words])))
     if curves:  # both have names at their lines
@@ -292,10 +295,8 @@ def _limits(tables: Sequence[FloatArray]) -> tuple[float, float]:
     return low, high
 
 
-def _title(trial: int, subject: Subject) -> str:
-    name = f"after {trial} {'trial' if trial == 1 else 'trials'}"
-    if trial == 0:
-        name = "before learning"
+def _title(interactions: int, subject: Subject) -> str:
+    name = f"after {interactions:,} interactions" if interactions else "before learning"
     env = subject.vector_env()
     if env is None:
         return name

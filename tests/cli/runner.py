@@ -16,7 +16,7 @@ from acl_gym.cli.app import app
 ROOT = Path(__file__).resolve().parents[2]
 PENDULUM = "acl_gym/Pendulum-v0"
 SMALL = ["train", PENDULUM, "--ants", "10", "--cells", "6,7", "--trials", "5"]
-SMALL += ["--evaluate-every", "2"]
+SMALL += ["--evaluate-every", "2", "--agent", "acl"]
 COMMANDS = ("train", "evaluate", "envs", "compare", "reproduce", "report")
 
 

@@ -17,11 +17,20 @@ import numpy as np
 import pytest
 
 import acl_gym
-from acl_gym import ACL, Crisp, Fuzzy, PolicyEvaluation, QLearning, evaluate_policy_cost
+from acl_gym import (
+    ACL,
+    Crisp,
+    Fuzzy,
+    PolicyEvaluation,
+    QLearning,
+    ReturningACL,
+    evaluate_policy_cost,
+)
 from acl_gym.cli.agents import AGENTS
 from acl_gym.cli.agents import parameters as declared
 from acl_gym.cli.envs import describe, parameters
-from acl_gym.cli.settings import parse_settings
+from acl_gym.cli.errors import BadArgumentError
+from acl_gym.cli.settings import agent_with, parse_settings
 from acl_gym.envs import ENVIRONMENTS
 from acl_gym.envs.pendulum import Pendulum
 from acl_gym.utils.parameters import parameters_of
@@ -193,8 +202,10 @@ def test_partitions_and_cells() -> None:
         found = figures(*SMALL, "--partition", kind, "--trials", "1")
         assert found["partition"].startswith(start)
         assert "circular=[0]" in found["partition"]
-    default = figures("train", PENDULUM, "--ants", "2", "--trials", "1")
-    assert default["partition"] == "Fuzzy(40 x 41 cells, circular=[0])"
+    few = ["train", PENDULUM, "--ants", "2", "--trials", "1"]
+    for agent, cells in (("acl", "40 x 41"), ("returning", "10 x 9")):
+        default = figures(*few, "--agent", agent)
+        assert default["partition"] == f"Fuzzy({cells} cells, circular=[0])"
     one = figures(*SMALL, "--cells", "5", "--trials", "1")
     assert one["partition"] == "Fuzzy(5 x 5 cells, circular=[0])"
 
@@ -337,6 +348,49 @@ def test_values_are_json_where_they_are() -> None:
         **{"a": 1, "b": 0.5, "c": True, "d": [1, 2], "e": "word", "f": "", "g": "x=y"},
         "h": "1",
     }
+
+
+def test_the_default_is_the_returning_colony() -> None:
+    found = figures("train", PENDULUM, "--trials", "2", "--max-steps", "30")
+    assert (found["agent"], found["ants"]) == ("returning", 5)
+    agent = ReturningACL(gym.make_vec(PENDULUM, num_envs=5), max_steps=30, seed=0)
+    agent.learn(trials=2)
+    loaded = ReturningACL.load(found["file"])
+    assert loaded.table.tobytes() == agent.table.tobytes()
+    other = figures("train", PENDULUM, "--agent", "acl", "--trials", "1")
+    assert (other["agent"], other["ants"]) == ("acl", 250)
+
+
+@pytest.mark.parametrize(
+    ("texts", "agent"),
+    [
+        ([], "returning"),
+        (["epsilon=0.3"], "returning"),
+        (["schedule=asynchronous"], "returning"),
+        (["deposit=rank:5"], "acl"),
+        (["epsilon=0.3", "tabu=true"], "acl"),
+        (["epsilon=linear:0.3:0.01:50"], "acl"),
+        (["schedule=asynchronous", "deposit=rank:5"], "acl"),
+        (["epsilon=0.3", "trace_decay=0.5"], "q-learning"),
+    ],
+)
+def test_parameters_choose_the_agent(texts: list[str], agent: str) -> None:
+    assert agent_with("--param", texts) == agent
+
+
+def test_parameters_that_no_agent_takes_together() -> None:
+    with pytest.raises(BadArgumentError, match="no agent takes all of tabu, replay"):
+        agent_with("--param", ["tabu=true", "replay=5"])
+    with pytest.raises(BadArgumentError, match="Did you mean 'trace_decay'"):
+        agent_with("--param", ["trace_decy=0.5"])
+
+
+def test_an_agent_that_parameters_have_chosen_is_named() -> None:
+    shown = invoke(*SMALL[:-2], "--param", "selection=boltzmann")
+    assert shown.exit_code == 0, shown.output
+    assert "note: these parameters are those of --agent acl." in shown.stderr
+    shown = invoke(*SMALL[:-2], "--param", "epsilon=0.3")
+    assert "note:" not in shown.stderr
 
 
 @pytest.mark.parametrize("agent", list(AGENTS))

@@ -78,7 +78,7 @@ def test_memory_that_ends_before_the_first_walk_is_named(
         (["train", PENDULUM, "--trials", "0"], "--trials"),
         (["train", PENDULUM, "--ants", "many"], "--ants"),
         (["train", PENDULUM, "--seed", "-1"], "--seed"),
-        (["train", PENDULUM, "--agent", "sarsa"], "'acl', 'returning', 'q-learning'"),
+        (["train", PENDULUM, "--agent", "sarsa"], "'returning', 'acl', 'q-learning'"),
         (["train", PENDULUM, "--walk"], "No such option: --walk"),
         (["train", "acl_gym/Pendulm-v0"], "Did you mean 'acl_gym/Pendulum-v0'"),
         (["train", "no_such_module:X-v0"], "no_such_module"),

@@ -20,6 +20,7 @@ from acl_gym.cli.agents import load_agent
 from tests.cli.runner import MODULE, PENDULUM, figures, invoke, refused
 
 RUN = ["train", PENDULUM, "--ants", "10", "--cells", "6,7", "--evaluate-every", "3"]
+RUN += ["--agent", "acl"]
 CHANGING = ["--param", "epsilon=linear:0.5:0.01:8", "--param", "alpha=harmonic:3:20"]
 
 STARTED = (
@@ -148,6 +149,22 @@ def test_what_is_resumed_says_so_and_refuses_what_cannot_change() -> None:
     changed = figures("train", "--resume", "a.npz", "--param", "epsilon=0.3")
     assert changed["parameters"]["epsilon"] == 0.3
     assert changed["trials"] == 105, "100 more, for the run was complete"
+
+
+def test_a_deposit_is_left_out_where_an_agent_goes_on_that_needs_none() -> None:
+    """A script that always sets one still works with the default agent."""
+    arguments = ["train", "CartPole-v1", "--ants", "3", "--max-steps", "20"]
+    for more, said in (([], True), (["--param", "deposit=rank:2"], False)):
+        figures(*arguments, *more, "--trials", "1", "--out", "a")
+        resumed = ["train", "CartPole-v1", "--resume", "a.npz", "--trials", "1"]
+        shown = invoke(*resumed, "--param", "deposit=rank:5")
+        assert shown.exit_code == 0, shown.output
+        assert ("deposit is left out" in shown.stderr) is said
+    assert load_agent("a.npz").deposit.exponent == 5
+    figures(*arguments, "--trials", "1", "--out", "b")
+    resumed = ["train", "--resume", "b.npz", "--agent", "returning"]
+    line = refused(2, *resumed, "--param", "deposit=rank:5")
+    assert "--param has no 'deposit'" in line
 
 
 def test_agents_saved_from_python_are_resumed_where_the_user_says() -> None:

@@ -5,13 +5,14 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import gymnasium as gym
 import numpy as np
 import pytest
 from matplotlib.animation import FuncAnimation, writers
 from matplotlib.figure import Figure
 from PIL import Image
 
-from acl_gym import ACL, plant
+from acl_gym import ACL, QLearning, plant
 from acl_gym.plotting import animate, scenes
 from tests.plotting.agents import colony, pendulum, q_learning
 
@@ -71,6 +72,21 @@ def test_an_agent_that_has_learned_is_shown_as_it_is(
 def test_every_kind_of_agent_has_a_film(make: Any, start: Any, tmp_path: Path) -> None:
     path = animate(make(), tmp_path / "film.gif", start=start, **QUICK)
     assert len(pictures(path)) > 1
+
+
+def test_stages_say_how_much_was_learned_from_and_what_is_shown() -> None:
+    env = gym.make_vec("acl_gym/Pendulum-v0", num_envs=3)
+    for kind, levels in (
+        (ACL, "strongest pheromone"),
+        (QLearning, "value of the best"),
+    ):
+        agent = kind(env, max_steps=20, seed=0)
+        stages = scenes.stages_of(agent, [0, 1], 0.2, None, None, LOOKS)
+        assert stages[0].title.startswith("before learning\n")
+        assert stages[1].title.startswith("after 60 interactions\npolicy cost ")
+        panels = Figure().subplots(1, 3)
+        scenes.draw_stage(panels, stages[1])
+        assert panels[1].get_title().startswith(levels)
 
 
 def test_a_film_of_one_state_variable(tmp_path: Path) -> None:

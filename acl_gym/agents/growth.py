@@ -75,7 +75,8 @@ class Growth:
             partition: the present one.
             evidence: how often each pair was tried: sums of degrees, in units of
                 1 / `UNITS`, `(n_pairs,)`.
-            visits_to_grow: how often the median pair of those tried must have been.
+            visits_to_grow: how many tries there must be for each pair and state variable:
+                the more variables, the more cells share a try.
             max_cells: the partition does not become finer than this.
 
         Returns:
@@ -91,9 +92,8 @@ class Growth:
         halved = size - 1 if partition.periods[axis] is None else size
         if partition.n_cells // size * (size + halved) > max_cells:
             return None  # first, since a look at the evidence takes longer
-        tried = evidence[evidence > 0]
-        tries = float(np.median(tried)) / UNITS * partition.cells_per_state
-        if tries <= visits_to_grow:
+        tries = float(evidence.mean()) / UNITS
+        if tries <= visits_to_grow * len(partition.centres):
             return None
         self.splits += 1
         return partition.refined(axis)

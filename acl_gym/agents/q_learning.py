@@ -76,7 +76,7 @@ class QLearning(RememberingAgent):
         optimism: in [0, 1], what pairs promise that were never tried: with 0 the value
             of a good state, with 1 the most that could be had. None: they stay at 0.
         grows: whether the partition becomes wider and finer.
-        visits_to_grow: how often the median pair of those tried must have been tried
+        visits_to_grow: how many steps must be remembered for each pair and state variable
             before the partition becomes finer along one variable, > 0.
         max_cells: the partition does not become finer than this, in [1, 2e9].
         max_steps: the longest an episode may last, >= 1. None takes the time limit of
@@ -126,7 +126,7 @@ class QLearning(RememberingAgent):
         at_most=1_000_000_000,
     )
     visits_to_grow = Parameter(
-        "Tries of the median pair before cells are split", above=0
+        "Steps for each pair and state variable before cells are split", above=0
     )
     max_cells = Parameter(
         "The most cells of a partition that grows",
@@ -151,7 +151,7 @@ class QLearning(RememberingAgent):
         memory_size: int = 100_000,
         optimism: float | None = None,
         grows: bool = False,
-        visits_to_grow: float = 20.0,
+        visits_to_grow: float = 5.0,
         max_cells: int = 20_000,
         max_steps: int | None = None,
         seed: int | None = None,

@@ -50,7 +50,7 @@ class RememberingAgent(TabularAgent):
     """The partition does not become finer than this."""
 
     visits_to_grow: Parameter
-    """How often the median pair must have been tried before cells are split."""
+    """Steps that are remembered for each pair and state variable before cells are split."""
 
     def __init__(
         self,

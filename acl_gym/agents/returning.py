@@ -69,7 +69,7 @@ class ReturningACL(RememberingAgent, ColonyAgent):
         steps_per_walk: after how many steps of all ants together they walk back, >= 1.
             Ants that have not finished go on from where they are.
         memory_size: how many states are remembered, >= 1.
-        visits_to_grow: how often the median pair of those tried must have been tried
+        visits_to_grow: how many steps must be remembered for each pair and state variable
             before the partition becomes finer along one variable, > 0.
         max_cells: the partition does not become finer than this, >= 1.
         grows: whether the partition becomes wider and finer. None: if it was chosen for
@@ -149,7 +149,7 @@ class ReturningACL(RememberingAgent, ColonyAgent):
         at_most=2_000_000_000,
     )
     visits_to_grow = Parameter(
-        "Tries of the median pair before cells are split", above=0
+        "Steps for each pair and state variable before cells are split", above=0
     )
 
     def __init__(
@@ -167,7 +167,7 @@ class ReturningACL(RememberingAgent, ColonyAgent):
         older_steps: int = 10_000,
         steps_per_walk: int = 300,
         memory_size: int = 100_000,
-        visits_to_grow: float = 20.0,
+        visits_to_grow: float = 5.0,
         max_cells: int = 20_000,
         grows: bool | None = None,
         restart_after: int | None = None,

@@ -110,7 +110,7 @@ def _legend(figure: Figure, experiment: Experiment) -> None:
         Line2D([], [], marker=LOOKS[key].marker, **LOOKS[key].line, label=LABELS[key])
         for key in next(iter(experiment.options["rows"].values()))
     ]
-    style.legend(figure, handles, ncols=len(handles))
+    style.legend(figure, handles, ncols=min(4, len(handles)))
 
 
 def summary(experiment: Experiment, results: Results) -> Figure:

@@ -209,9 +209,7 @@ def run(task: Task, seed: int, evaluations: int = 50) -> Row:
             self._seed: int | None = seed
             box = spaces.Box(*ranges)
             actions = spaces.Discrete(n_actions)
-            super().__init__(
-                MDPInfo(box, actions, settings.discount, settings.horizon)
-            )
+            super().__init__(MDPInfo(box, actions, settings.discount, settings.horizon))
 
         def reset(self, state: Any = None) -> NDArray[np.float64]:
             observation, _ = self._env.reset(seed=self._seed)
@@ -223,7 +221,7 @@ def run(task: Task, seed: int, evaluations: int = 50) -> Row:
             observation, reward, terminated = found[:3]
             return within(observation, ranges), float(reward), bool(terminated), {}
 
-    np.random.seed(seed)  # MushroomRL draws from NumPy's global generator
+    np.random.seed(seed)  # noqa: NPY002 - MushroomRL draws from the global generator
     low, high = ranges
     tilings = Tiles.generate(
         settings.n_tilings, [settings.tiles] * low.size, low, high, uniform=False
@@ -281,7 +279,9 @@ def table(name: str, runs: Sequence[Row]) -> str:
             middle = statistics.median(values)
             cells.append("never" if middle == np.inf else f"{middle:,.4g}")
         cells[-2] += f" ({len(known)} of {len(runs)})" * (len(known) < len(runs))
-    cells += [f"{statistics.median(run[key] for run in runs):.4g}" for key in ("last", "best")]
+    cells += [
+        f"{statistics.median(run[key] for run in runs):.4g}" for key in ("last", "best")
+    ]
     cells.append(f"{statistics.median(run['rows'][-1]['seconds'] for run in runs):.3g}")
     return f"| {' | '.join(cells)} |"
 
@@ -310,17 +310,19 @@ def search(task: Task, evaluations: int) -> Row:
     for _ in tqdm(range(evaluations), unit="evaluation"):
         trial = study.ask()
         found = {
-            "tiles": trial.suggest_int("tiles", 4, 16 if len(task.ranges()[0]) < 3 else 7),
-            "learning_rate": trial.suggest_float("learning_rate", 0.03, 1.5, log=True),
-            "discount": trial.suggest_categorical(
-                "discount", (0.95, 0.98, 0.99, 1.0)
+            "tiles": trial.suggest_int(
+                "tiles", 4, 16 if len(task.ranges()[0]) < 3 else 7
             ),
+            "learning_rate": trial.suggest_float("learning_rate", 0.03, 1.5, log=True),
+            "discount": trial.suggest_categorical("discount", (0.95, 0.98, 0.99, 1.0)),
             "trace_decay": trial.suggest_float("trace_decay", 0.1, 0.98),
             "epsilon": trial.suggest_float("epsilon", 0.0, 0.3),
         }
         other = replace(task, settings=replace(task.settings, **found))
         costs = [run(other, seed)["last"] for seed in SEARCH_SEEDS]
-        tried.append({"settings": found, "costs": costs, "value": float(np.mean(costs))})
+        tried.append(
+            {"settings": found, "costs": costs, "value": float(np.mean(costs))}
+        )
         study.tell(trial, tried[-1]["value"])
     return {"best": min(tried, key=lambda each: each["value"]), "tried": tried}
 
@@ -334,7 +336,9 @@ def changed(task: Task, pairs: Iterable[str], steps: int | None) -> Task:
     found: dict[str, float | int] = {}
     for pair in pairs:
         name, _, text = pair.partition("=")
-        kinds = {each: type(getattr(task.settings, each)) for each in vars(task.settings)}
+        kinds = {
+            each: type(getattr(task.settings, each)) for each in vars(task.settings)
+        }
         if name not in kinds:
             raise ValueError(
                 f"--set must name one of {', '.join(kinds)}, got {pair!r}; for instance "

@@ -158,7 +158,9 @@ def compare(
     if agents is not None:
         wanted = [name.strip() for name in agents.split(",") if name.strip()]
         for name in wanted or [""]:
-            check_name("--agents", name, {**dict.fromkeys(agent_names(False)), **METHODS})
+            check_name(
+                "--agents", name, {**dict.fromkeys(agent_names(False)), **METHODS}
+            )
     if chosen is not None:
         chosen.import_module()
     from acl_gym.experiments.comparison.compare import compare as run_comparison

@@ -168,9 +168,7 @@ def test_several_tasks(name: str) -> None:
     assert {
         (each["where"], each["method"], each["rival"]): each["verdict"]
         for each in found.comparisons
-    } == {
-        (where, *pair): said for where in rows for pair, said in wanted.items()
-    }
+    } == {(where, *pair): said for where in rows for pair, said in wanted.items()}
 
 
 def test_what_the_most_slots_cost() -> None:

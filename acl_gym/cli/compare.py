@@ -177,8 +177,8 @@ def compare(
         for name in wanted:
             if not agents_called(name, names):
                 check_name(f"--agents for {env}", name, names)
-        found = [each for name in wanted for each in agents_called(name, names)]
-        names = list(dict.fromkeys(found))
+        called = [each for name in wanted for each in agents_called(name, names)]
+        names = list(dict.fromkeys(called))
     _check_packages(names)
     terminal = console(stderr=as_json)
     try:

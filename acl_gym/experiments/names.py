@@ -140,3 +140,7 @@ EXPERIMENTS: tuple[str, ...] = (
     "versus-order",
 )
 """What `acl-gym reproduce` runs, in the order of the thesis."""
+
+GROUPS = ("all", "claims", "comparison")
+"""Names that stand for all of them, for those that decide a claim of the thesis, and for
+those that hold methods against each other."""

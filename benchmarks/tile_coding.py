@@ -183,9 +183,13 @@ class TilePolicy:
 
 
 def within(states: NDArray[Any], ranges: Arrays) -> NDArray[np.float64]:
-    """States clipped to what the tilings cover, the highest value excluded."""
+    """States clipped to what the tilings cover.
+
+    The highest value belongs to no tile of some tilings; a number just below it might be
+    rounded up to it where its tile is computed.
+    """
     low, high = ranges
-    return np.clip(states, low, np.nextafter(high, low)).astype(np.float64)
+    return np.clip(states, low, high - 1e-9 * (high - low)).astype(np.float64)
 
 
 def run(task: Task, seed: int, evaluations: int = 50) -> Row:

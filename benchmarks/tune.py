@@ -327,7 +327,8 @@ def chosen(names: Sequence[str] | None) -> list[tuple[str, str]]:
         if each not in known:
             raise ValueError(
                 f"--only must be tasks, methods or task-method, got {each!r}; tasks are "
-                f"{', '.join(TASKS)}, methods {', '.join(METHODS)}."
+                f"{', '.join(TASKS)}, methods "
+                f"{', '.join(dict.fromkeys(method for _, method in PAIRS))}."
             )
     wanted = set(names)
     return [

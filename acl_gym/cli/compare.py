@@ -74,7 +74,8 @@ class CompareCommand(Command):
             f"\b\nPresets:\n{presets}\n\n\b\nMethods:\n{methods}\n\n"
             "The name of a method alone, such as acl, stands for its fuzzy and its crisp "
             "partition; returning and q-replay for one that they choose and that grows. "
-            f"PPO and A2C get {ON_POLICY} times the steps of DQN.\n\n"
+            f"PPO and A2C get {ON_POLICY} times the steps of DQN, which take as long, or in "
+            "the quick preset twice its steps.\n\n"
             f"\b\nEnvironments, and the methods that they have:\n{environments}"
         )
         super().format_help(ctx, formatter)

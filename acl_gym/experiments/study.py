@@ -194,7 +194,7 @@ class Study:
         if self.method == "planning":
             return replace(self, settings={**self.settings, "max_iterations": 1})
         if self.method in NETWORKS:
-            few = {"learning_starts": 16} if self.method == "dqn" else {"n_steps": 4}
+            few = {"learning_starts": 16} if self.method == "dqn" else {"n_steps": 8}
             settings = {**self.settings, **few}
             return replace(self, settings=settings, steps=64, evaluate_every=32)
         # Episodes of full length: some kernels are needed only where ants have arrived.

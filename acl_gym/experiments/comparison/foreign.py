@@ -65,7 +65,9 @@ _SETTINGS: dict[str, dict[str, Any]] = {
 
 _BUDGETS = {
     "smoke": Budget(2, dqn_steps=1_200, evaluate_every=600, memory_steps=1_200),
-    "quick": Budget(60, dqn_steps=30_000, evaluate_every=1_500, memory_steps=60_000),
+    "quick": Budget(
+        60, dqn_steps=30_000, evaluate_every=1_500, memory_steps=60_000, on_policy=2
+    ),
     "full": Budget(100, dqn_steps=100_000, evaluate_every=2_500, memory_steps=200_000),
 }
 _SLOTS = 200

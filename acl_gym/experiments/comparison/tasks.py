@@ -65,11 +65,12 @@ class Budget(NamedTuple):
 
     Attributes:
         trials: K of the methods with a table.
-        dqn_steps: interactions of DQN; PPO and A2C get `ON_POLICY` times as many.
+        dqn_steps: interactions of DQN.
         evaluate_every: interactions between two evaluations of DQN.
         memory_steps: interactions of methods with a table that remember.
         cells: on which the reference is found, see `Task.make_partition`; None where a
             state is a cell.
+        on_policy: how many times the interactions of DQN PPO and A2C get.
         length: of the runs of DQN; where it is "long" DQN has its settings for that.
     """
 
@@ -78,6 +79,7 @@ class Budget(NamedTuple):
     evaluate_every: int
     memory_steps: int
     cells: Any = None
+    on_policy: int = ON_POLICY
     length: str = "short"
 
 
@@ -156,8 +158,10 @@ class System:
         budget, task = self.budgets[preset], self.task
         if method in NETWORKS:
             settings = self.settings_of(method, budget.length)
-            every = budget.evaluate_every
-            return _network(task, method, settings, budget.dqn_steps, every)
+            more = 1 if method == "dqn" else budget.on_policy
+            return _network(
+                task, method, settings, budget.dqn_steps, budget.evaluate_every, more
+            )
         study = replace(
             self.colony,
             task=task,
@@ -186,9 +190,13 @@ class System:
 
 
 def _network(
-    task: Task, method: str, settings: dict[str, Any], dqn_steps: int, every: int
+    task: Task,
+    method: str,
+    settings: dict[str, Any],
+    dqn_steps: int,
+    every: int,
+    more: int,
 ) -> Study:
-    more = 1 if method == "dqn" else ON_POLICY
     return Study(
         task=task,
         method=method,
@@ -299,8 +307,10 @@ class TunedTask:
         if method in NETWORKS:
             if "learning_rate" in settings:
                 settings["final_learning_rate"] = settings["learning_rate"]
-            every = self.evaluate_every
-            return _network(self.task, method, settings, self.dqn_steps, every)
+            more = 1 if method == "dqn" else ON_POLICY
+            return _network(
+                self.task, method, settings, self.dqn_steps, self.evaluate_every, more
+            )
         steps, spacing = self.steps, self.spacing
         if method in REMEMBERING:
             steps, spacing = min(steps, MOST_REMEMBERED), min(spacing, MEMORY_SPACING)

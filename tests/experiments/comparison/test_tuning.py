@@ -156,7 +156,7 @@ def test_the_command(tmp_path: Path) -> None:
     assert [path.name for path in tmp_path.iterdir()] == ["row-q.json"]
     wrong = tune("--only", "moon")
     assert wrong.returncode == 2
-    assert "--only must be tasks or task-method, got 'moon'" in wrong.stderr
+    assert "--only must be tasks, methods or task-method, got 'moon'" in wrong.stderr
     partly = tune("--write", "--out", str(tmp_path))
     assert partly.returncode == 1
     assert "search of row-acl must have an evaluation, got none" in partly.stderr

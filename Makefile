@@ -3,7 +3,7 @@
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help install compare bench bench-peers test lint format build check-wheel clean distclean
+.PHONY: help install compare bench bench-peers peers-mushroom test lint format build check-wheel clean distclean
 
 VENV := .venv
 BIN := $(VENV)/bin
@@ -11,6 +11,8 @@ STAMP := $(VENV)/.installed
 WHEEL_VENV := build/wheel-venv
 PEERS_VENV := .venv-peers
 PEERS_STAMP := $(PEERS_VENV)/.installed
+MUSHROOM_VENV := .venv-mushroom
+MUSHROOM_STAMP := $(MUSHROOM_VENV)/.installed
 
 # The first interpreter that works, is recent enough and can make an environment.
 PYTHON ?= $(shell for python in python3.11 python3; do \
@@ -47,7 +49,7 @@ $(STAMP): requirements.lock pyproject.toml
 	@$(BIN)/python -m pip check --disable-pip-version-check
 	@touch $@
 
-compare: $(STAMP) ## Compare ACL, Q-learning and DQN on one task
+compare: $(STAMP) ## Compare both colonies, Q-learning, DQN, PPO and A2C on one task
 	$(BIN)/python benchmarks/compare_acl_rl.py --env $(ENV_ID) --preset $(PRESET) \
 		$(if $(OUT),--out $(OUT)) $(ARGS)
 
@@ -62,6 +64,19 @@ $(PEERS_STAMP): benchmarks/peers-requirements.txt
 	@$(BIN)/python -m venv $(PEERS_VENV)
 	@echo "Installing EnvPool and gymnax into $(PEERS_VENV): a few minutes, once"
 	@$(PEERS_VENV)/bin/python $(PIP_INSTALL) -r benchmarks/peers-requirements.txt
+	@touch $@
+
+peers-mushroom: $(STAMP) $(MUSHROOM_STAMP) ## Learn with MushroomRL's Sarsa(lambda)
+	$(MUSHROOM_VENV)/bin/python benchmarks/tile_coding.py $(ARGS)
+
+$(MUSHROOM_STAMP): requirements.lock benchmarks/mushroom-requirements.txt
+	@rm -rf $(MUSHROOM_VENV)
+	@$(BIN)/python -m venv $(MUSHROOM_VENV)
+	@echo "Installing MushroomRL into $(MUSHROOM_VENV): a few minutes, once"
+	@$(MUSHROOM_VENV)/bin/python $(PIP_INSTALL) -r requirements.lock
+	@$(MUSHROOM_VENV)/bin/python $(PIP_INSTALL) --no-deps \
+		-r benchmarks/mushroom-requirements.txt
+	@$(MUSHROOM_VENV)/bin/python $(PIP_INSTALL) --no-deps --no-build-isolation -e .
 	@touch $@
 
 test: $(STAMP) ## Run every test
@@ -96,4 +111,4 @@ clean: ## Remove builds and caches, including compiled kernels
 		-exec rm -rf {} +
 
 distclean: clean ## Remove .venv as well
-	rm -rf $(VENV) $(PEERS_VENV)
+	rm -rf $(VENV) $(PEERS_VENV) $(MUSHROOM_VENV)

@@ -1,10 +1,16 @@
-"""Measure ACL, Q-learning and DQN on environments that Gymnasium brings itself.
+"""Measure colonies, Q-learning, DQN, PPO and A2C on environments that Gymnasium brings.
 
 Every run trains once, with the settings of gymnasium_settings.py and one seed. Its
 final policy, and the best of those that were seen on the way, are then followed,
 without exploring, through the same fresh episodes for all methods. The figures go to
 results.json and, as a Markdown table, to table.md in the folder of --out; each run is
 kept there as soon as it is done, so that a command that was stopped goes on where it was.
+The returning colony and Q-learning with replay have one setting for all environments.
+
+examples:
+  python benchmarks/gymnasium_envs.py                        the published table, 3 seeds
+  python benchmarks/gymnasium_envs.py --seeds 10             the same with seeds 0 to 9
+  python benchmarks/gymnasium_envs.py --agents returning,q-replay --env Taxi-v4,CartPole-v1
 """
 
 from __future__ import annotations
@@ -23,9 +29,18 @@ import numpy as np
 from gymnasium.vector import VectorEnv
 from gymnasium_settings import ENVIRONMENTS, Candidate, Environment
 
-from acl_gym import ACL, Crisp, Fuzzy, PolicyEvaluation, QLearning, WaitingVectorEnv
+from acl_gym import (
+    ACL,
+    Crisp,
+    Fuzzy,
+    PolicyEvaluation,
+    QLearning,
+    ReturningACL,
+    WaitingVectorEnv,
+)
 from acl_gym.agents.acl import PheromoneBoundWarning
 from acl_gym.colony.episodes import Episode
+from acl_gym.envs.wrappers.scaling import ScaledVectorObservation
 from acl_gym.evaluation import Predictor, evaluate_policy_cost
 from acl_gym.experiments.provenance import circumstances, code_of_runs, versions
 from acl_gym.partitions.automatic import automatic_partition
@@ -35,15 +50,38 @@ from acl_gym.utils.text import replace_unprintable_letters
 
 Run = dict[str, Any]
 
-METHODS = {"acl": "ACL", "q-learning": "Q-learning", "dqn": "DQN"}
+METHODS = {
+    "acl": "ACL",
+    "returning": "Returning ACL",
+    "q-learning": "Q-learning",
+    "q-replay": "Q-learning, replay",
+    "dqn": "DQN",
+    "ppo": "PPO",
+    "a2c": "A2C",
+}
+NETWORKS = ("dqn", "ppo", "a2c")
+AGENTS: dict[str, type[ACL | ReturningACL | QLearning]] = {
+    "acl": ACL,
+    "returning": ReturningACL,
+    "q-learning": QLearning,
+    "q-replay": QLearning,
+}
 CHOOSING_SEED, TABLE_SEED = 20_000, 10_000
 """Slot i of an evaluation is seeded with this + i; training seeds are drawn anew."""
 
 
 def make_env(
-    environment: Environment, slots: int, angles: bool = False
-) -> WaitingVectorEnv:
-    """Gymnasium's own environment in so many slots; `angles` is for Acrobot's."""
+    environment: Environment, slots: int, angles: bool = False, scaled: bool = False
+) -> VectorEnv[Any, Any, Any]:
+    """Gymnasium's own environment in so many slots; `angles` is for Acrobot's.
+
+    With `scaled`, observations are scaled to [-1, 1]; they must have bounds.
+    """
+    env = _with_slots(environment, slots, angles)
+    return ScaledVectorObservation(env) if scaled else env
+
+
+def _with_slots(environment: Environment, slots: int, angles: bool) -> WaitingVectorEnv:
     kwargs = dict(environment.kwargs)
     if environment.limit is not None:
         kwargs["max_episode_steps"] = environment.limit
@@ -72,10 +110,13 @@ def time_limit(environment: Environment) -> int:
 
 
 def follow(
-    policy: Predictor, environment: Environment, angles: bool = False
+    policy: Predictor,
+    environment: Environment,
+    angles: bool = False,
+    scaled: bool = False,
 ) -> dict[str, float]:
     """The mean return over the episodes of the table."""
-    env = make_env(environment, environment.episodes, angles)
+    env = make_env(environment, environment.episodes, angles, scaled)
     limit = time_limit(environment)
     result = evaluate_policy_cost(policy, env, max_steps=limit, seed=TABLE_SEED)
     env.close()
@@ -102,7 +143,7 @@ def run(name: str, method: str, candidate: Candidate, seed: int) -> Run:
     if "episodes" in settings:
         episodes = settings.pop("episodes")
         environment = replace(environment, episodes=episodes, choosing=episodes)
-    train = train_dqn if method == "dqn" else train_tabular
+    train = train_network if method in NETWORKS else train_tabular
     result = train(environment, method, settings, seed)
     return {"env": name, "method": method, "seed": seed, **result}
 
@@ -113,21 +154,23 @@ def train_tabular(
     settings: Candidate,
     seed: int,
 ) -> Run:
-    """ACL or Q-learning; Numba has compiled before the clock starts."""
-    slots, trials, every, kind, cells, bounds, angles = (
-        settings.pop(key, None)
-        for key in ("slots", "trials", "every", "kind", "cells", "bounds", "angles")
+    """A colony or Q-learning; Numba has compiled before the clock starts."""
+    keys = ("slots", "trials", "total", "every", "kind", "cells", "bounds", "angles")
+    slots, trials, total, every, kind, cells, bounds, angles = (
+        settings.pop(key, None) for key in keys
     )
     angles = bool(angles)
     env: VectorEnv[Any, Any, Any] = make_env(environment, slots, angles)
     if gym.spec(environment.env_id).vector_entry_point is not None:
         env = gym.make_vec(environment.env_id, num_envs=slots)  # native, and faster
-    partition = automatic_partition(
-        env, kind=Crisp if kind == "crisp" else Fuzzy, cells=cells, bounds=bounds
-    )
+    partition = None  # the agent chooses one, which grows
+    if kind != "growing":
+        partition = automatic_partition(
+            env, kind=Crisp if kind == "crisp" else Fuzzy, cells=cells, bounds=bounds
+        )
     if "cost" in settings:
         settings["cost"] = COSTS[settings["cost"]]
-    make = ACL if method == "acl" else QLearning
+    make = AGENTS[method]
     steps = time_limit(environment)
     warm = make(
         make_env(environment, 2, angles), partition, max_steps=2, seed=0, **settings
@@ -140,20 +183,24 @@ def train_tabular(
         max_steps=time_limit(environment),
         seed=CHOOSING_SEED,
     )
-    agent.learn(trials=trials, callback=watch)
+    agent.learn(total, trials, callback=watch)
     rows = [row for row in agent.history if "policy_cost" in row]
     return outcome(agent.policy, watch.best_policy, rows, environment, angles)
 
 
-def train_dqn(
+def train_network(
     environment: Environment,
     method: str,
     settings: Candidate,
     seed: int,
 ) -> Run:
-    """DQN of Stable-Baselines3; discrete observations become one-hot there."""
+    """A model of Stable-Baselines3; discrete observations become one-hot there.
+
+    With `scaled`, it sees observations scaled to [-1, 1] and normalised rewards.
+    """
     import torch
-    from stable_baselines3 import DQN
+    from stable_baselines3 import A2C, DQN, PPO
+    from stable_baselines3.common.vec_env import VecNormalize
 
     from acl_gym.sb3.adapter import VectorEnvAdapter
     from acl_gym.sb3.callback import PolicyCostCallback
@@ -162,27 +209,32 @@ def train_dqn(
     slots, steps, every, net_arch = (
         settings.pop(key) for key in ("slots", "steps", "every", "net_arch")
     )
-    model = DQN(
+    scaled, policy = settings.pop("scaled", False), {"net_arch": list(net_arch)}
+    if method == "dqn":
+        policy["optimizer_kwargs"] = {"fused": True}
+    learns_in = VectorEnvAdapter(make_env(environment, slots, scaled=scaled))
+    if scaled:
+        learns_in = VecNormalize(
+            learns_in, norm_obs=False, gamma=settings.get("gamma", 0.99)
+        )
+    model = {"dqn": DQN, "ppo": PPO, "a2c": A2C}[method](
         "MlpPolicy",
-        VectorEnvAdapter(make_env(environment, slots)),
+        learns_in,
         seed=seed,
         device="cpu",
-        policy_kwargs={
-            "net_arch": list(net_arch),
-            "optimizer_kwargs": {"fused": True},
-        },
+        policy_kwargs=policy,
         **settings,
     )
     watch = PolicyCostCallback(
-        make_env(environment, environment.choosing),
+        make_env(environment, environment.choosing, scaled=scaled),
         every=every,
         max_steps=time_limit(environment),
         seed=CHOOSING_SEED,
     )
     model.learn(steps, callback=watch)
-    final = follow(model, environment)
+    final = follow(model, environment, scaled=scaled)
     watch.restore_best()
-    result = outcome(model, model, watch.history, environment)
+    result = outcome(model, model, watch.history, environment, scaled=scaled)
     return {**result, "final": final}
 
 
@@ -192,16 +244,23 @@ def outcome(
     rows: list[dict[str, float]],
     environment: Environment,
     angles: bool = False,
+    scaled: bool = False,
 ) -> Run:
     """What a run comes to, in JSON types."""
     cheapest = min(rows, key=lambda row: row["policy_cost"])
+    target = environment.on_the_way
+    target = environment.target if target is None else target
+    good = (row for row in rows if row["policy_return"] >= target)
+    first: dict[str, float] = next(good, {})
     return {
-        "final": follow(final, environment, angles),
-        "best": follow(best, environment, angles),
+        "final": follow(final, environment, angles, scaled),
+        "best": follow(best, environment, angles, scaled),
         "steps": rows[-1]["env_steps"],
         "seconds": rows[-1]["seconds"],
         "best_steps": cheapest["env_steps"],
         "best_seconds": cheapest["seconds"],
+        "target_steps": first.get("env_steps"),
+        "target_seconds": first.get("seconds"),
         "curve": [[row["env_steps"], row["policy_return"]] for row in rows],
     }
 
@@ -223,6 +282,8 @@ COSTS: dict[str, Callable[[Episode], float]] = {"highest_point": highest_point}
 SMOKE: dict[str, Candidate] = {
     "acl": {"slots": 10, "trials": 2, "every": 1, "episodes": 2},
     "q-learning": {"slots": 5, "trials": 2, "every": 1, "episodes": 2},
+    "returning": {"slots": 5, "total": 100, "every": 1, "episodes": 2},
+    "q-replay": {"slots": 5, "total": 100, "every": 1, "episodes": 2},
     "dqn": {
         "episodes": 2,
         "steps": 400,
@@ -230,6 +291,8 @@ SMOKE: dict[str, Candidate] = {
         "learning_starts": 100,
         "train_freq": 4,
     },
+    "ppo": {"episodes": 2, "steps": 400, "every": 200, "n_steps": 16, "batch_size": 32},
+    "a2c": {"episodes": 2, "steps": 400, "every": 200},
 }
 """To see that all of it works; its figures mean nothing."""
 
@@ -313,6 +376,10 @@ def summarise(done: Sequence[tuple[Task, Run]]) -> list[dict[str, Any]]:
             }
         for measure in ("steps", "seconds", "best_steps", "best_seconds"):
             row[measure] = statistics.median(result[measure] for result in runs)
+        for measure in ("target_steps", "target_seconds"):  # None: not reached
+            known = [result.get(measure) for result in runs]
+            middle = statistics.median(np.inf if x is None else x for x in known)
+            row[measure] = None if np.isinf(middle) else middle
         rows.append(row)
     return rows
 
@@ -321,8 +388,8 @@ def as_markdown(rows: Sequence[dict[str, Any]]) -> str:
     """The table of docs/gymnasium.md."""
     lines = [
         "| environment (target) | method | final policy | best policy seen "
-        "| steps | seconds |",
-        "| --- | --- | --- | --- | --- | --- |",
+        "| steps to the target | seconds | all steps | seconds |",
+        "| --- | --- | --- | --- | --- | --- | --- | --- |",
     ]
     for row in rows:
         candidate = f", candidate {row['candidate']}" if row["candidate"] else ""
@@ -330,11 +397,17 @@ def as_markdown(rows: Sequence[dict[str, Any]]) -> str:
             f"{row['env']} ({ENVIRONMENTS[row['env']].target:g})",
             METHODS[row["method"]] + candidate,
             *(_cell(row[which], len(row["seeds"])) for which in ("final", "best")),
+            _number(row["target_steps"], ",.0f"),
+            _number(row["target_seconds"], ".2g"),
             f"{row['steps']:,.0f}",
-            f"{row['seconds']:.0f}",
+            f"{row['seconds']:.3g}",
         ]
         lines.append(f"| {' | '.join(cells)} |")
     return "\n".join(lines) + "\n"
+
+
+def _number(value: float | None, form: str) -> str:
+    return "-" if value is None else format(value, form)
 
 
 def _cell(figures: dict[str, float], seeds: int) -> str:
@@ -348,9 +421,9 @@ def _cell(figures: dict[str, float], seeds: int) -> str:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run, write and print; returns the exit code."""
     options = _parser().parse_args(arguments)
-    seeds = options.seeds
-    if seeds is None:
-        seeds = {"smoke": [0], "search": [100], "full": [0, 1, 2]}[options.preset]
+    first, count = {"smoke": (0, 1), "search": (100, 1), "full": (0, 3)}[options.preset]
+    first = first if options.seed is None else options.seed
+    seeds = range(first, first + (options.seeds or count))
     tasks = list_tasks(options.env, options.agents, seeds, options.preset)
     folder = options.out / "runs"
     done = (kept_runs if options.table_only else run_tasks)(tasks, folder)
@@ -392,7 +465,7 @@ def _parser() -> argparse.ArgumentParser:
         choices=("smoke", "search", "full"),
         default="full",
         help="smoke: seconds, figures without meaning. full: the chosen settings with "
-        "seeds 0, 1 and 2; about half an hour of one core. search: every candidate of "
+        "seeds 0, 1 and 2; HOURS of one core. search: every candidate of "
         "gymnasium_settings.py with seed 100 (default: %(default)s)",
     )
     parser.add_argument(
@@ -409,8 +482,15 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument(
         "--seeds",
-        type=lambda text: [int(seed) for seed in text.split(",")],
-        help="seeds of training, such as 0,1,2 (default: those of the preset)",
+        type=_at_least(1),
+        metavar="N",
+        help="runs of each (default: 3, of the other presets 1)",
+    )
+    parser.add_argument(
+        "--seed",
+        type=_at_least(0),
+        metavar="N",
+        help="of the first run; the others follow it (default: 0, in a search 100)",
     )
     parser.add_argument(
         "--out",
@@ -424,6 +504,17 @@ def _parser() -> argparse.ArgumentParser:
         help="make no runs, only the table of those that are kept",
     )
     return parser
+
+
+def _at_least(least: int) -> Callable[[str], int]:
+    def whole(text: str) -> int:
+        if not (text.isdecimal() and int(text) >= least):
+            raise argparse.ArgumentTypeError(
+                f"must be an integer >= {least}, got {text!r}"
+            )
+        return int(text)
+
+    return whole
 
 
 def _names(known: Iterable[str]) -> Callable[[str], list[str]]:

@@ -13,10 +13,11 @@ from acl_gym.colony.deposits import InverseCost, Rank
 from acl_gym.colony.schedules import Linear
 
 Candidate = dict[str, Any]
-"""Settings of one method. For "acl" and "q-learning": `slots`, `trials`, `every`
-(trials between evaluations), and as needed `cells`, `bounds`, `kind` ("crisp"),
-`limit` (steps of an episode in training); the rest goes to the agent. For "dqn":
-`slots`, `steps`, `every` (steps), `net_arch`; the rest goes to it."""
+"""Settings of one method. For those with a table: `slots`, `trials` or `total` (steps of
+all slots), `every` (trials between evaluations), and as needed `cells`, `bounds`, `kind`
+("crisp", or "growing": the agent chooses); the rest goes to the agent. For networks:
+`slots`, `steps`, `every` (steps), `net_arch`, and `scaled` where they see scaled
+observations and rewards; the rest goes to the model."""
 
 
 @dataclass(frozen=True)
@@ -31,6 +32,8 @@ class Environment:
         episodes: evaluated for the table; one where all episodes are the same.
         choosing: evaluated, on other seeds, to choose the best policy.
         limit: steps of an episode, where Gymnasium has no limit of its own.
+        on_the_way: the target of the episodes that choose the best policy, which also say
+            when it was reached; None: the same.
         candidates: method -> settings; the first is the chosen one.
     """
 
@@ -41,6 +44,7 @@ class Environment:
     episodes: int = 100
     choosing: int = 50
     limit: int | None = None
+    on_the_way: float | None = None
     candidates: dict[str, list[Candidate]] = field(default_factory=dict)
 
 
@@ -110,10 +114,75 @@ _TOY_DQN: Candidate = {
     "exploration_final_eps": 0.05,
 }
 
+# Also from the zoo, whose normalised observations are scaled ones here.
+_CARTPOLE_PPO: Candidate = {
+    "slots": 8,
+    "steps": 100_000,
+    "every": 4_000,
+    "net_arch": (64, 64),
+    "n_steps": 32,
+    "batch_size": 256,
+    "gae_lambda": 0.8,
+    "gamma": 0.98,
+    "n_epochs": 20,
+    "ent_coef": 0.0,
+    "learning_rate": 1e-3,
+    "clip_range": 0.2,
+}
+_MOUNTAIN_PPO: Candidate = {
+    "slots": 16,
+    "steps": 300_000,
+    "every": 12_000,
+    "net_arch": (64, 64),
+    "n_steps": 16,
+    "batch_size": 64,
+    "gae_lambda": 0.98,
+    "gamma": 0.99,
+    "n_epochs": 4,
+    "ent_coef": 0.0,
+    "scaled": True,
+}
+_ACROBOT_PPO: Candidate = {
+    **_MOUNTAIN_PPO,
+    "n_steps": 256,
+    "gae_lambda": 0.94,
+}
+_TOY_PPO: Candidate = {
+    "slots": 8,
+    "steps": 100_000,
+    "every": 5_000,
+    "net_arch": (64, 64),
+    "n_steps": 128,
+    "batch_size": 256,
+    "learning_rate": 1e-3,
+    "ent_coef": 0.01,
+}
+_A2C: Candidate = {
+    "slots": 8,
+    "steps": 200_000,
+    "every": 10_000,
+    "net_arch": (64, 64),
+    "ent_coef": 0.0,
+}
+_TOY_A2C: Candidate = {**_A2C, "ent_coef": 0.01}
+
 _POLE = {0: (-2.4, 2.4), 1: (-3.0, 3.0), 2: (-0.21, 0.21), 3: (-3.5, 3.5)}
 _CAR = {1: (-0.05, 0.05)}
 # Only the few best ants of a trial count, and the colony commits itself slowly.
 _ELITE: Candidate = {"deposit": Rank(20), "alpha": 1.5, "global_decay": 0.2}
+
+
+def _remembering(total: int, every: int = 1) -> dict[str, list[Candidate]]:
+    """The methods that remember, everywhere alike but for the length of a run.
+
+    The returning colony has its defaults. Q-learning has the discount, epsilon, replays and
+    optimism of these, and the rate and lambda of ablation.py.
+    """
+    common = {"slots": 5, "total": total, "every": every, "kind": "growing"}
+    q = {"learning_rate": 0.3, "discount": 0.99, "epsilon": 0.1, "trace_decay": 0.6}
+    replay = {"replay": 10, "optimism": 1.0, "grows": True}
+    return {"returning": [common], "q-replay": [{**common, **q, **replay}]}
+
 
 ENVIRONMENTS: dict[str, Environment] = {
     "CartPole-v1": Environment(
@@ -121,6 +190,9 @@ ENVIRONMENTS: dict[str, Environment] = {
         475,
         "Gymnasium's threshold",
         candidates={
+            **_remembering(30_000, 2),
+            "ppo": [_CARTPOLE_PPO],
+            "a2c": [{**_A2C, "steps": 100_000}],
             "acl": [
                 {
                     "slots": 200,
@@ -154,6 +226,9 @@ ENVIRONMENTS: dict[str, Environment] = {
         -110,
         "Gymnasium's threshold",
         candidates={
+            **_remembering(100_000, 2),
+            "ppo": [_MOUNTAIN_PPO],
+            "a2c": [{**_A2C, "slots": 16, "scaled": True}],
             "acl": [
                 {
                     "slots": 100,
@@ -187,6 +262,9 @@ ENVIRONMENTS: dict[str, Environment] = {
         -100,
         "Gymnasium's threshold",
         candidates={
+            **_remembering(100_000, 2),
+            "ppo": [_ACROBOT_PPO],
+            "a2c": [{**_A2C, "slots": 16, "scaled": True}],
             "acl": [
                 {
                     "slots": 50,
@@ -254,6 +332,9 @@ ENVIRONMENTS: dict[str, Environment] = {
         episodes=1,
         choosing=1,
         candidates={
+            **_remembering(10_000, 2),
+            "ppo": [_TOY_PPO],
+            "a2c": [_TOY_A2C],
             "acl": [{"slots": 50, "trials": 30, "every": 2, "deposit": "return"}],
             "q-learning": [
                 {"slots": 10, "trials": 60, "every": 2, "discount": 0.95},
@@ -279,6 +360,9 @@ ENVIRONMENTS: dict[str, Environment] = {
         episodes=500,
         choosing=100,
         candidates={
+            **_remembering(40_000, 10),
+            "ppo": [_TOY_PPO],
+            "a2c": [_TOY_A2C],
             "acl": [
                 {
                     "slots": 500,
@@ -315,6 +399,9 @@ ENVIRONMENTS: dict[str, Environment] = {
         episodes=1,
         choosing=1,
         candidates={
+            **_remembering(20_000, 1),
+            "ppo": [_TOY_PPO],
+            "a2c": [_TOY_A2C],
             "acl": [
                 {
                     "slots": 100,
@@ -341,7 +428,11 @@ ENVIRONMENTS: dict[str, Environment] = {
         8.0,
         "the optimum is 8.05 from the starts of the table, 7.93 over all",
         choosing=100,
+        on_the_way=7.5,  # the optimum from these is 7.58
         candidates={
+            **_remembering(40_000, 3),
+            "ppo": [_TOY_PPO],
+            "a2c": [_TOY_A2C],
             "acl": [
                 {
                     "slots": 200,

@@ -1,9 +1,10 @@
 """Search for the settings of every method, alike: what the comparison `versus` runs with.
 
-On each task (a system as it is, or made harder) each method gets the same number of
-evaluations by Optuna's TPE sampler, the first of them its defaults. An evaluation is one
-run for each tuning seed; its value is the mean cost of the last policies, so that a policy
-that fails counts as what it costs. The search is logged after every evaluation, in one
+On each task (a system as it is, or made harder) each method but the returning colony,
+which has its defaults everywhere, gets the same number of evaluations by Optuna's TPE
+sampler, the first of them its defaults. An evaluation is one run for each tuning seed; its
+value is the mean cost of the last policies, so that a policy that fails counts as what it
+costs. The search is logged after every evaluation, in one
 JSON file for each task and method: a search that was stopped goes on where it was, and
 ends as if it had not been stopped: a proposal is a function of the sampler's seed and of
 the values before it. One process, one thread; needs Optuna (extra `dev`).
@@ -12,6 +13,7 @@ examples:
   python benchmarks/tune.py                        everything, an hour or so
   python benchmarks/tune.py --only pendulum-acl    one method on one task
   python benchmarks/tune.py --only grid            every method on one task
+  python benchmarks/tune.py --only q-replay        one method on every task
   python benchmarks/tune.py --table                what was found, as Markdown
   python benchmarks/tune.py --write                the comparison takes what was found
 """
@@ -45,9 +47,10 @@ from acl_gym.experiments.comparison.tasks import (
     SETTINGS_FILE,
     TASKS,
     TunedTask,
+    is_tuned,
 )
 from acl_gym.experiments.methods import run
-from acl_gym.experiments.names import METHODS
+from acl_gym.experiments.names import GROWING, METHODS, NETWORKS, REMEMBERING
 from acl_gym.experiments.provenance import versions
 from acl_gym.experiments.study import Study
 from acl_gym.utils.files import write_atomically
@@ -62,32 +65,56 @@ SEEDS = (1000, 1001)
 SAMPLER: dict[str, Any] = {"name": "TPE, multivariate", "seed": 0, "startup": 6}
 """So many evaluations are drawn evenly before the sampler begins to learn from them."""
 
-PAIRS = [(name, method) for name, task in TASKS.items() for method in task.methods]
+PAIRS = [
+    (name, method)
+    for name, task in TASKS.items()
+    for method in task.methods
+    if method != "returning"
+]
 """Every search: the name of a task and of a method."""
 
 Log = dict[str, Any]
 """A search as its file holds it; `evaluations` are in the order in which they were made."""
 
 
+_LEARNING: dict[str, BaseDistribution] = {
+    "learning_rate": Real(2e-4, 4e-3, log=True),
+    "discount": Choice((0.95, 0.98, 0.99, 1.0)),
+    "reward_scale": Real(0.1, 2.0, log=True),
+}
+_ACTOR_CRITIC: dict[str, BaseDistribution] = {
+    "trace_decay": Real(0.8, 1.0),
+    "entropy_weight": Real(0.0, 0.05),
+    "max_episode_steps": Choice((50, 100, 300)),
+}
+_OF_NETWORK: dict[str, dict[str, BaseDistribution]] = {
+    "dqn": {
+        "target_update_interval": Whole(50, 800, log=True),
+        "exploration_fraction": Real(0.05, 0.5),
+        "exploration_final": Real(0.01, 0.2),
+        "max_episode_steps": Choice((50, 100, 300)),
+    },
+    "ppo": {"n_steps": Choice((16, 32, 64, 128, 256)), **_ACTOR_CRITIC},
+    "a2c": {"n_steps": Choice((5, 8, 16, 32, 64)), **_ACTOR_CRITIC},
+}
+"""As many settings of each network are searched."""
+
+
 def space_of(task: TunedTask, method: str) -> dict[str, BaseDistribution]:
     """The settings of a method that are searched on a task, and their ranges."""
-    if method == "dqn":
-        return {
-            "learning_rate": Real(2e-4, 4e-3, log=True),
-            "discount": Choice((0.95, 0.98, 0.99, 1.0)),
-            "reward_scale": Real(0.1, 2.0, log=True),
-            "target_update_interval": Whole(50, 800, log=True),
-            "exploration_fraction": Real(0.05, 0.5),
-            "exploration_final": Real(0.01, 0.2),
-            "max_episode_steps": Choice((50, 100, 300)),
-        }
-    slots, longest = task.system.colony.slots, (task.max_steps or task.system.max_steps)
+    if method in NETWORKS:
+        return {**_LEARNING, **_OF_NETWORK[method]}
+    slots: int = task.defaults(method)["slots"]
+    longest = task.max_steps or task.system.max_steps
     space: dict[str, BaseDistribution] = {
         "slots": Whole(max(2, slots // 5), 4 * slots, log=True),
         "max_steps": Choice((longest // 3, 2 * longest // 3, longest)),
     }
     if not task.system.finite:
-        space["kind"] = Choice(("fuzzy", "crisp"))
+        kinds = ("fuzzy", "crisp")
+        if method in REMEMBERING and task.cells is None:
+            kinds = (*kinds, GROWING)
+        space["kind"] = Choice(kinds)
     if method == "acl":
         space["global_decay"] = Real(1e-3, 1.0, log=True)
         space["local_decay"] = Real(0.0, 0.2)
@@ -101,6 +128,9 @@ def space_of(task: TunedTask, method: str) -> dict[str, BaseDistribution]:
     space["epsilon"] = Real(0.0, 0.3)
     if method == "q-lambda":
         space["trace_decay"] = Real(0.1, 0.95)
+    if method == "q-replay":
+        space["trace_decay"] = Real(0.0, 0.95)
+        space["optimism"] = Real(0.0, 1.0)
     if task.task.cost is not None:
         # No reward expresses the cost: the closest of those that there are.
         space["reward"] = Choice(("stage", "steps"))
@@ -114,10 +144,10 @@ def starts(task: TunedTask, method: str) -> list[dict[str, Any]]:
     failed by chance may not be chosen again.
     """
     defaults = task.defaults(method)
-    if method == "dqn":
-        from acl_gym.sb3.dqn import DQNSettings
+    if method in NETWORKS:
+        from acl_gym.sb3.models import MODELS
 
-        defaults = asdict(DQNSettings(**defaults))
+        defaults = asdict(MODELS[method].settings(**defaults))
     found = [defaults]
     if method == "acl" and task.system.finite:
         found.append({**defaults, "tabu": False, "local_decay": 0.0})
@@ -267,9 +297,17 @@ def open_log(
 
 
 def found_in(folder: Path) -> dict[str, dict[str, dict[str, Any]]]:
-    """The best settings of all logs: task -> method -> settings."""
+    """The best settings of all logs: task -> method -> settings.
+
+    A method of which there was no search on a task has its defaults there.
+
+    Raises:
+        ValueError: a log is missing from which the settings of now have come.
+    """
     found: dict[str, dict[str, dict[str, Any]]] = {}
     for name, method in PAIRS:
+        if not (is_tuned(name, method) or path_of(name, method, folder).is_file()):
+            continue
         best = best_of(open_log(name, method, folder))
         found.setdefault(name, {})[method] = best["parameters"]
     return found
@@ -283,18 +321,20 @@ def chosen(names: Sequence[str] | None) -> list[tuple[str, str]]:
     """
     if names is None:
         return PAIRS
-    known = {*TASKS, *(f"{name}-{method}" for name, method in PAIRS)}
+    pairs = {f"{name}-{method}" for name, method in PAIRS}
+    known = {*TASKS, *pairs, *(method for _, method in PAIRS)}
     for each in names:
         if each not in known:
             raise ValueError(
-                f"--only must be tasks or task-method, got {each!r}; tasks are "
-                f"{', '.join(TASKS)}, methods {', '.join(METHODS)}."
+                f"--only must be tasks, methods or task-method, got {each!r}; tasks are "
+                f"{', '.join(TASKS)}, methods "
+                f"{', '.join(dict.fromkeys(method for _, method in PAIRS))}."
             )
     wanted = set(names)
     return [
         (name, method)
         for name, method in PAIRS
-        if name in wanted or f"{name}-{method}" in wanted
+        if {name, method, f"{name}-{method}"} & wanted
     ]
 
 
@@ -329,7 +369,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "--only",
         nargs="+",
         metavar="NAME",
-        help=f"tasks, or task-method; tasks: {', '.join(TASKS)}",
+        help=f"tasks, methods, or task-method; tasks: {', '.join(TASKS)}; methods: "
+        f"{', '.join(dict.fromkeys(method for _, method in PAIRS))}",
     )
     parser.add_argument(
         "--evaluations",
@@ -366,6 +407,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
             text = json.dumps(found_in(options.out), indent=1)
             write_atomically(SETTINGS_FILE, f"{text}\n".encode())
             print(f"Written: {SETTINGS_FILE}")
+            lacking = [
+                f"{name}-{method}"
+                for name, method in PAIRS
+                if not path_of(name, method, options.out).is_file()
+            ]
+            if lacking:
+                print(f"With the defaults, for want of a search: {', '.join(lacking)}.")
             return 0
         if not options.table:
             total = len(pairs) * options.evaluations

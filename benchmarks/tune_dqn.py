@@ -1,8 +1,16 @@
-"""Measure settings of DQN on the pendulum: what docs/dqn-tuning.md was made with.
+"""Measure settings of DQN, PPO or A2C on the pendulum; docs/dqn-tuning.md has DQN's.
 
-Each candidate is a number of changes to where the search began. Every run is one line
-of a JSON Lines file; runs that are already in it are not made again, so the search can
-be stopped and resumed. The table at the end is Markdown.
+Each candidate is a number of changes to where the search began. Those of DQN were chosen
+by hand, one after the other. PPO and A2C get as many: their defaults, and settings that are
+drawn evenly from the ranges that benchmarks/tune.py searches. Every run is one line of a
+JSON Lines file; runs that are already in it are not made again, so the search can be
+stopped and resumed. The table at the end is Markdown.
+
+examples:
+  python benchmarks/tune_dqn.py                                 DQN
+  python benchmarks/tune_dqn.py --agent ppo --steps 100000      PPO, which takes a fifth
+                                                                of the time for a step
+  python benchmarks/tune_dqn.py --agent a2c --only defaults "drawn 3" --seeds 5
 """
 
 from __future__ import annotations
@@ -12,15 +20,17 @@ import json
 import statistics
 import time
 from collections.abc import Iterable
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import torch
 from tqdm import tqdm
 
+from acl_gym.experiments.comparison.tasks import TASKS
+from acl_gym.experiments.names import NETWORKS
 from acl_gym.sb3.callback import PolicyCostCallback
-from acl_gym.sb3.dqn import DQNSettings, make_dqn, scaled_env
+from acl_gym.sb3.dqn import scaled_env
+from acl_gym.sb3.models import MODELS
 from acl_gym.utils.text import replace_unprintable_letters
 
 ENV_ID = "acl_gym/Pendulum-v0"
@@ -35,7 +45,7 @@ START: Changes = {"num_envs": 8, "reward_scale": 1.0, "max_episode_steps": 300}
 SHORT: Changes = {"num_envs": 4, "reward_scale": 0.5, "max_episode_steps": 100}
 LONG: Changes = {**SHORT, "exploration_fraction": 0.02, "final_learning_rate": 1e-5}
 
-CANDIDATES: dict[str, Changes] = {
+OF_DQN: dict[str, Changes] = {
     "start": {},
     "discount 0.98": {"discount": 0.98},
     "discount 0.995": {"discount": 0.995},
@@ -94,16 +104,37 @@ CANDIDATES: dict[str, Changes] = {
 }
 
 
-def measure(name: str, seed: int, steps: int, evaluations: int) -> Run:
+def candidates_of(agent: str) -> dict[str, Changes]:
+    """The settings that are tried, by name: what differs from the defaults."""
+    if agent == "dqn":
+        return {name: {**START, **changes} for name, changes in OF_DQN.items()}
+    import optuna
+    from tune import space_of
+
+    optuna.logging.set_verbosity(optuna.logging.WARNING)
+    study = optuna.create_study(sampler=optuna.samplers.RandomSampler(seed=0))
+    space, found = space_of(TASKS["pendulum"], agent), {"defaults": {}}
+    for number in range(1, len(OF_DQN)):
+        drawn = study.ask(space).params
+        drawn["final_learning_rate"] = drawn["learning_rate"]
+        found[f"drawn {number}"] = drawn
+    return found
+
+
+def measure(
+    agent: str, name: str, changes: Changes, seed: int, steps: int, evaluations: int
+) -> Run:
     """Train once, and evaluate the policy so many times on the way."""
-    settings = replace(DQNSettings(), **{**START, **CANDIDATES[name]})
-    model = make_dqn(ENV_ID, settings, seed)
+    kind = MODELS[agent]
+    model = kind.make(ENV_ID, kind.settings(**changes), seed)
     every = max(1, steps // evaluations)
     costs = PolicyCostCallback(scaled_env(ENV_ID), every=every)
     cpu = time.process_time()
     model.learn(steps, callback=costs, log_interval=steps)
     return {
+        "agent": agent,
         "name": name,
+        "settings": changes,
         "steps": steps,
         "seed": seed,
         "cpu_seconds": time.process_time() - cpu,
@@ -111,8 +142,9 @@ def measure(name: str, seed: int, steps: int, evaluations: int) -> Run:
     }
 
 
-def key(run: Run) -> tuple[str, int, int]:
-    return run["name"], run["steps"], run["seed"]
+def key(run: Run) -> tuple[str, str, int, int]:
+    # The files that there were before PPO and A2C do not name the agent.
+    return run.get("agent", "dqn"), run["name"], run["steps"], run["seed"]
 
 
 def summary(runs: Iterable[Run]) -> str:
@@ -130,22 +162,37 @@ def summary(runs: Iterable[Run]) -> str:
     return " | ".join(", ".join(column) for column in (best, late, last, near, seconds))
 
 
-def table(runs: list[Run], names: Iterable[str]) -> str:
+def words(name: str, changes: Changes) -> str:
+    """A candidate's name, with its settings where these say more."""
+    if not name.startswith("drawn"):
+        return name
+    shown = (
+        f"{key} {value:.3g}" if isinstance(value, float) else f"{key} {value}"
+        for key, value in changes.items()
+        if key != "final_learning_rate"
+    )
+    return f"{name}: {', '.join(shown)}"
+
+
+def table(runs: list[Run], candidates: dict[str, Changes]) -> str:
     lines = [
         "| setting | best | median of the second half | last "
         f"| thousand steps to {NEAR_OPTIMUM:.1f} | seconds |",
         "| --- | --- | --- | --- | --- | --- |",
     ]
-    for name in names:
+    for name, changes in candidates.items():
         mine = sorted((r for r in runs if r["name"] == name), key=key)
         if mine:
-            lines.append(f"| {name} | {summary(mine)} |")
+            lines.append(f"| {words(name, changes)} | {summary(mine)} |")
     return "\n".join(lines)
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument(
+        "--agent", choices=NETWORKS, default="dqn", help="default: %(default)s"
     )
     parser.add_argument("--steps", type=int, default=20_000, help="of each run")
     parser.add_argument("--seeds", type=int, default=2, help="runs of each candidate")
@@ -156,32 +203,41 @@ def main() -> None:
         "--only",
         nargs="+",
         metavar="NAME",
-        choices=list(CANDIDATES),
-        default=list(CANDIDATES),
-        help="some candidates: " + "; ".join(map(repr, CANDIDATES)),
+        help="some candidates; of PPO and A2C 'defaults', 'drawn 1' and so on; of DQN "
+        + "; ".join(map(repr, OF_DQN)),
     )
     parser.add_argument(
         "--out",
         type=Path,
-        default=Path("results/dqn-tuning.jsonl"),
-        help="file of the runs, added to (default: results/dqn-tuning.jsonl)",
+        help="file of the runs, added to (default: results/AGENT-tuning.jsonl)",
     )
     args = parser.parse_args()
+    candidates = candidates_of(args.agent)
+    for name in args.only or ():
+        if name not in candidates:
+            parser.error(
+                f"--only must be among {', '.join(map(repr, candidates))}, got {name!r}."
+            )
+    candidates = {name: candidates[name] for name in args.only or candidates}
+    args.out = args.out or Path(f"results/{args.agent}-tuning.jsonl")
     torch.set_num_threads(1)
     args.out.parent.mkdir(parents=True, exist_ok=True)
     lines = args.out.read_text().splitlines() if args.out.exists() else []
     runs: list[Run] = [json.loads(line) for line in lines]
     done = {key(run) for run in runs}
     wanted = [
-        (name, args.steps, seed) for name in args.only for seed in range(args.seeds)
+        (args.agent, name, args.steps, seed)
+        for name in candidates
+        for seed in range(args.seeds)
     ]
     with args.out.open("a") as file:
-        for name, steps, seed in tqdm([w for w in wanted if w not in done], unit="run"):
-            run = measure(name, seed, steps, args.evaluations)
+        for each in tqdm([w for w in wanted if w not in done], unit="run"):
+            agent, name, steps, seed = each
+            run = measure(agent, name, candidates[name], seed, steps, args.evaluations)
             runs.append(run)
             file.write(json.dumps(run) + "\n")
             file.flush()
-    print(table([run for run in runs if key(run) in set(wanted)], args.only))
+    print(table([run for run in runs if key(run) in set(wanted)], candidates))
 
 
 if __name__ == "__main__":

@@ -113,7 +113,7 @@ main()
 
 @pytest.mark.parametrize(
     ("options", "remedy"),
-    [([], ", or leave it out: --agents acl-fuzzy,"), (["--agents", "dqn"], ".")],
+    [([], ", or leave them out: --agents acl-fuzzy,"), (["--agents", "dqn"], ".")],
 )
 def test_a_comparison_with_dqn_is_refused_before_it_starts(
     options: list[str], remedy: str, tmp_path: Path

@@ -25,10 +25,11 @@ if TYPE_CHECKING:
     from acl_gym.experiments.results import Results
     from acl_gym.experiments.study import Experiment
 
-HELP = """Compare ACL with reinforcement learning on one task.
+HELP = """Compare both colonies with reinforcement learning on one task.
 
-Trains ACL, Q-learning, Q(lambda) and Stable-Baselines3's DQN over several seeds,
-evaluates them alike, and writes results.json, results.parquet, figures and report.html.
+Trains ACL, the returning colony, Q-learning, Q(lambda), Q-learning with replay, and DQN,
+PPO and A2C of Stable-Baselines3 over several seeds, evaluates them alike, and writes
+results.json, results.parquet, figures and report.html.
 A run that was killed goes on where it stopped when the same command is given again.
 
 The environment may be any with Discrete actions, also "module:id", which imports a
@@ -39,7 +40,7 @@ negative costs. Policies are then judged by their return in 100 random episodes.
 \b
 Examples:
   acl-gym compare
-  acl-gym compare --agents acl-fuzzy,q-fuzzy --seeds 5 --out results/tables
+  acl-gym compare --agents returning,acl,q-fuzzy --seeds 5 --out results/tables
   acl-gym compare --env acl_gym/GridSearch2D-v0 --out results/grid
   acl-gym compare --env CartPole-v1 --seeds 3
   acl-gym compare --preset full --out results/full
@@ -51,7 +52,7 @@ class CompareCommand(Command):
 
     def format_help(self, ctx: Any, formatter: Any) -> None:
         """Write the help."""
-        from acl_gym.experiments.comparison.tasks import SYSTEMS
+        from acl_gym.experiments.comparison.tasks import ON_POLICY, SYSTEMS
         from acl_gym.experiments.names import PRESETS
 
         presets = "\n".join(
@@ -64,12 +65,17 @@ class CompareCommand(Command):
         )
         environments = "\n".join(
             f"  {system.env_id}\n    trials: {system.budgets['quick'].trials}, steps of "
-            f"DQN: {system.budgets['quick'].dqn_steps:,} (quick)\n"
+            f"DQN: {system.budgets['quick'].dqn_steps:,}, of\n    methods that remember: "
+            f"{system.budgets['quick'].memory_steps:,} (quick)\n"
             + textwrap.indent(textwrap.fill(", ".join(system.agents), 72), "    ")
             for system in systems
         )
         self.epilog = (
             f"\b\nPresets:\n{presets}\n\n\b\nMethods:\n{methods}\n\n"
+            "The name of a method alone, such as acl, stands for its fuzzy and its crisp "
+            "partition; returning and q-replay for one that they choose and that grows. "
+            f"PPO and A2C get {ON_POLICY} times the steps of DQN, which take as long, or in "
+            "the quick preset twice its steps.\n\n"
             f"\b\nEnvironments, and the methods that they have:\n{environments}"
         )
         super().format_help(ctx, formatter)
@@ -142,7 +148,7 @@ def compare(
     debug: DebugOption = False,
 ) -> None:
     """Compare; see `HELP`."""
-    from acl_gym.experiments.names import PRESETS, agent_names
+    from acl_gym.experiments.names import METHODS, PRESETS, agent_names, agents_called
 
     # Names first: a wrong one is answered before anything slow is imported.
     check_name("--preset", preset, PRESETS)
@@ -153,7 +159,9 @@ def compare(
     if agents is not None:
         wanted = [name.strip() for name in agents.split(",") if name.strip()]
         for name in wanted or [""]:
-            check_name("--agents", name, agent_names(finite=False))
+            check_name(
+                "--agents", name, {**dict.fromkeys(agent_names(False)), **METHODS}
+            )
     if chosen is not None:
         chosen.import_module()
     from acl_gym.experiments.comparison.compare import compare as run_comparison
@@ -168,8 +176,10 @@ def compare(
     names = list(system.agents)
     if wanted is not None:
         for name in wanted:
-            check_name(f"--agents for {env}", name, names)
-        names = list(dict.fromkeys(wanted))
+            if not agents_called(name, names):
+                check_name(f"--agents for {env}", name, names)
+        called = [each for name in wanted for each in agents_called(name, names)]
+        names = list(dict.fromkeys(called))
     _check_packages(names)
     terminal = console(stderr=as_json)
     try:
@@ -195,14 +205,17 @@ def compare(
 
 
 def _check_packages(names: list[str]) -> None:
-    """Refuse DQN before any run where what it needs is not installed."""
-    if "dqn" not in names or all(map(find_spec, ("stable_baselines3", "torch"))):
+    """Refuse networks before any run where what they need is not installed."""
+    from acl_gym.experiments.names import NETWORKS
+
+    networks = [name for name in names if name in NETWORKS]
+    if not networks or all(map(find_spec, ("stable_baselines3", "torch"))):
         return
-    others = ",".join(name for name in names if name != "dqn")
-    without = f", or leave it out: --agents {others}" if others else ""
+    others = ",".join(name for name in names if name not in networks)
+    without = f", or leave them out: --agents {others}" if others else ""
     raise BadArgumentError(
-        "the agent dqn needs Stable-Baselines3 and torch, which are not installed; run "
-        f"`pip install stable-baselines3 torch`{without}."
+        f"the agents of Stable-Baselines3, here {', '.join(networks)}, need it and torch, "
+        f"which are not installed; run `pip install stable-baselines3 torch`{without}."
     )
 
 

@@ -27,7 +27,7 @@ Examples:
   acl-gym reproduce --list                 the figures, and what they need
   acl-gym reproduce fig5.4 --runs 3        one figure, in a minute
   acl-gym reproduce claims --out results   all that decides a claim
-  acl-gym reproduce versus --runs 3        against Q-learning and DQN
+  acl-gym reproduce comparison --runs 3    against Q-learning, DQN, PPO and A2C
   acl-gym reproduce all                    everything, about an hour
   acl-gym reproduce all --executor ray     needs pip install acl-gym[cluster]
 """
@@ -59,7 +59,7 @@ def reproduce(
         list[str] | None,
         typer.Argument(
             metavar="[NAME]...",
-            help="Figures, see below; `claims` or `all`.  [default: all]",
+            help="Figures, see below; `claims`, `comparison` or `all`.  [default: all]",
             show_default=False,
         ),
     ] = None,
@@ -100,14 +100,14 @@ def reproduce(
     debug: DebugOption = False,
 ) -> None:
     """Reproduce; see `HELP`."""
-    from acl_gym.experiments.names import EXECUTORS, EXPERIMENTS
+    from acl_gym.experiments.names import EXECUTORS, EXPERIMENTS, GROUPS
     from acl_gym.utils.validation import one_of
 
     # Names first: a wrong one is answered before anything slow is imported.
     wanted = names or ["all"]
     with bad_arguments():
         for name in wanted:
-            one_of("experiment", name, ("all", "claims", *EXPERIMENTS))
+            one_of("experiment", name, (*GROUPS, *EXPERIMENTS))
         one_of("--executor", executor, EXECUTORS)
     from acl_gym.experiments import reproduce as engine
 

@@ -15,13 +15,19 @@ from gymnasium.wrappers.vector import TransformReward
 from acl_gym.agents.acl import ACL, PheromoneBoundWarning
 from acl_gym.agents.base import TabularAgent
 from acl_gym.agents.q_learning import QLearning
+from acl_gym.agents.returning import ReturningACL
 from acl_gym.callbacks.base import Callback
 from acl_gym.colony.deposits import deposit_from_settings
 from acl_gym.envs.wrappers.perturbations import ReversedDraws, ReversedSlots
 from acl_gym.evaluation import Predictor, evaluate_policy_cost, policy_measures
 from acl_gym.experiments.episode_costs import EPISODE_COSTS
+from acl_gym.experiments.names import GROWING, NETWORKS
 from acl_gym.experiments.results import Run
 from acl_gym.experiments.study import Study
+from acl_gym.partitions.settings import (
+    partition_from_settings,
+    partition_to_settings,
+)
 from acl_gym.planning.q_iteration import fuzzy_q_iteration
 from acl_gym.planning.value_iteration import value_iteration
 from acl_gym.policies import TablePolicy
@@ -113,6 +119,13 @@ class Evaluation(Callback):
         return True
 
 
+_AGENTS: dict[str, type[ACL | ReturningACL | QLearning]] = {
+    "acl": ACL,
+    "returning": ReturningACL,
+    "q-learning": QLearning,
+}
+
+
 def make_agent(study: Study, seed: int) -> TabularAgent:
     """The agent of a method with a table, ready to learn."""
     task, settings = study.task, dict(study.settings)
@@ -125,11 +138,13 @@ def make_agent(study: Study, seed: int) -> TabularAgent:
         settings["cost"] = EPISODE_COSTS[task.cost].cost
     if isinstance(settings.get("deposit"), dict):
         settings["deposit"] = deposit_from_settings(settings["deposit"])
-    kind: type[ACL | QLearning] = ACL if study.method == "acl" else QLearning
+    partition = None if study.kind == GROWING else study.make_partition()
+    if study.kind == GROWING and study.method == "q-learning":
+        settings["grows"] = True
     with warnings.catch_warnings():
         # Table 4.1 has a tau_0 above 1 / J_max: the thesis wants it so.
         warnings.simplefilter("ignore", PheromoneBoundWarning)
-        agent = kind(env, study.make_partition(), seed=seed, **settings)
+        agent = _AGENTS[study.method](env, partition, seed=seed, **settings)
     if study.reversed_slots:
         agent.rng = ReversedDraws(agent.rng)  # type: ignore[assignment]
     return agent
@@ -141,7 +156,7 @@ def _learn_table(study: Study, seed: int) -> Run:
     try:
         agent.learn(study.steps, study.trials, callback=evaluation)
     except ValueError as error:
-        if study.method == "acl":
+        if study.method != "q-learning":
             raise
         failure = str(error)  # values that overflow: Q-learning may diverge
         evaluation.rows.append(
@@ -153,51 +168,60 @@ def _learn_table(study: Study, seed: int) -> Run:
             }
         )
     rows = pd.DataFrame(evaluation.rows, dtype=np.float64)
-    return Run(rows, np.array(agent.table).ravel(), agent.seconds, failure, seed)
+    grown = partition_to_settings(agent.partition) if study.kind == GROWING else None
+    table = np.array(agent.table).ravel()
+    return Run(rows, table, agent.seconds, failure, seed, partition=grown)
 
 
 def _restore_table(study: Study, run: Run) -> TablePolicy:
     partition = study.make_partition()
+    if run.partition is not None:
+        partition = partition_from_settings(run.partition)
     return TablePolicy(partition, run.table.reshape(partition.n_cells, -1).copy())
 
 
-def _learn_dqn(study: Study, seed: int) -> Run:
+def _learn_network(study: Study, seed: int) -> Run:
     # Only here: importing torch takes seconds that the other methods do not need.
     import torch
 
     from acl_gym.sb3.callback import PolicyCostCallback
 
     torch.set_num_threads(1)  # the fastest for such small networks
-    env, states, longest = study.task.dqn_evaluation()
+    env, states, longest = study.task.network_evaluation()
     evaluation = PolicyCostCallback(
         env, states, every=study.evaluate_every or 1_000, max_steps=longest
     )
-    model = _make_dqn(study, seed)
+    model = _make_network(study, seed)
     model.learn(study.steps, callback=evaluation)
     rows = pd.DataFrame(evaluation.history, dtype=np.float64)
-    weights = torch.nn.utils.parameters_to_vector(model.q_net.parameters())
+    weights = torch.nn.utils.parameters_to_vector(_network(model).parameters())
     table = weights.detach().numpy().astype(np.float64)
     return Run(rows, table, float(rows["seconds"].iloc[-1]), "", seed)
 
 
-def _make_dqn(study: Study, seed: int) -> Any:
+def _network(model: Any) -> Any:
+    """What of a model chooses actions."""
+    return getattr(model, "q_net", model.policy)
+
+
+def _make_network(study: Study, seed: int) -> Any:
     if study.task.perturbations or study.task.cost is not None:
         raise ValueError(
-            "DQN needs a task without perturbations and judged by its stage costs, got "
+            f"{study.method} needs a task without perturbations and judged by its stage costs, got "
             f"{study.task}."
         )
-    return study.task.make_dqn(study.settings, seed)
+    return study.task.make_network(study.method, study.settings, seed)
 
 
-def _restore_dqn(study: Study, run: Run) -> Predictor:
+def _restore_network(study: Study, run: Run) -> Predictor:
     import torch
 
     from acl_gym.partitions.discrete import FINITE_SPACES
     from acl_gym.sb3.dqn import ScaledPolicy
 
-    model = _make_dqn(study, run.seed)
+    model = _make_network(study, run.seed)
     weights = torch.from_numpy(run.table.astype(np.float32))  # a copy
-    torch.nn.utils.vector_to_parameters(weights, model.q_net.parameters())
+    torch.nn.utils.vector_to_parameters(weights, _network(model).parameters())
     env = study.task.make_system_env(1)
     if isinstance(env.single_observation_space, FINITE_SPACES):
         found: Predictor = model
@@ -238,8 +262,9 @@ def _plan(study: Study, seed: int) -> Run:
 
 METHODS = {
     "acl": Method(_learn_table, _restore_table),
+    "returning": Method(_learn_table, _restore_table),
     "q-learning": Method(_learn_table, _restore_table),
-    "dqn": Method(_learn_dqn, _restore_dqn),
+    **{name: Method(_learn_network, _restore_network) for name in NETWORKS},
     "planning": Method(_plan, _restore_table),
 }
 """The methods by name."""

@@ -5,6 +5,7 @@ To look up a name in the modules that use it takes seconds, for they import Numb
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import NamedTuple
 
 
@@ -17,14 +18,30 @@ class Method(NamedTuple):
 
 METHODS = {
     "acl": Method("ACL", "acl"),
+    "returning": Method("Returning ACL", "returning"),
     "q": Method("Q-learning", "q-learning"),
     "q-lambda": Method("Q(λ)", "q-learning"),
+    "q-replay": Method("Q-learning, replay", "q-learning"),
     "dqn": Method("DQN", "dqn"),
+    "ppo": Method("PPO", "ppo"),
+    "a2c": Method("A2C", "a2c"),
 }
 """The methods by the names that commands and files have for them."""
 
-TABLE_METHODS = tuple(name for name, each in METHODS.items() if each.key != "dqn")
+NETWORKS = ("dqn", "ppo", "a2c")
+"""Those of Stable-Baselines3; a method's key in `methods.METHODS` is the same."""
+
+TABLE_METHODS = tuple(name for name in METHODS if name not in NETWORKS)
 """Those that keep a table over a partition."""
+
+REMEMBERING = ("returning", "q-replay")
+"""Of these, those that remember what was done, and whose partition may grow."""
+
+FORGETTING = tuple(name for name in TABLE_METHODS if name not in REMEMBERING)
+"""Of these, the others."""
+
+GROWING = "growing"
+"""The kind of a partition that a method chooses for itself and that becomes finer."""
 
 PRESETS = {"smoke": 1, "quick": 3, "full": 10}
 """How many runs of each method `acl-gym compare` makes; a system has its budgets."""
@@ -33,11 +50,33 @@ PRESETS = {"smoke": 1, "quick": 3, "full": 10}
 def agent_names(finite: bool) -> list[str]:
     """What `acl-gym compare` runs, by name, in order.
 
+    An agent is called after its method and its kind of partition. One that has the name of
+    a method with a table has a partition that grows.
+
     Args:
         finite: whether a state is a cell, so that nothing is fuzzy.
     """
-    kinds = ("crisp",) if finite else ("fuzzy", "crisp")
-    return [*(f"{name}-{kind}" for name in TABLE_METHODS for kind in kinds), "dqn"]
+    if finite:
+        return [*(f"{name}-crisp" for name in TABLE_METHODS), *NETWORKS]
+    found = []
+    for name in TABLE_METHODS:
+        found += [name] * (name in REMEMBERING)
+        if name != "q-replay":  # a rival of the colony whose partition grows
+            found += [f"{name}-fuzzy", f"{name}-crisp"]
+    return [*found, *NETWORKS]
+
+
+def agents_called(name: str, names: Iterable[str]) -> list[str]:
+    """The agents for which a name stands.
+
+    Args:
+        name: of an agent, or of a method, which stands for all its kinds of partition.
+        names: of the agents that there are.
+    """
+    known = list(names)
+    if name in known:
+        return [name]
+    return [each for each in known if each in (f"{name}-fuzzy", f"{name}-crisp")]
 
 
 EXECUTORS = ("local", "ray")
@@ -101,3 +140,7 @@ EXPERIMENTS: tuple[str, ...] = (
     "versus-order",
 )
 """What `acl-gym reproduce` runs, in the order of the thesis."""
+
+GROUPS = ("all", "claims", "comparison")
+"""Names that stand for all of them, for those that decide a claim of the thesis, and for
+those that hold methods against each other."""

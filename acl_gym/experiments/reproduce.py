@@ -11,7 +11,7 @@ from pathlib import Path
 from rich.console import Console
 
 from acl_gym.experiments import comparison, outcome, plots, thesis
-from acl_gym.experiments.names import EXECUTORS
+from acl_gym.experiments.names import EXECUTORS, GROUPS
 from acl_gym.experiments.outcome import Outcome, without_curves
 from acl_gym.experiments.provenance import ROOT, circumstances
 from acl_gym.experiments.report import write_claims, write_report
@@ -52,20 +52,22 @@ def chosen(names: Sequence[str]) -> list[Experiment]:
 
     Args:
         names: of experiments; "all" are all of them, "claims" those that decide a
-            claim or were tried to understand one.
+            claim or were tried to understand one, "comparison" those that hold methods
+            against each other.
 
     Raises:
         ValueError: there is no experiment of a name.
     """
     known = [experiment.name for experiment in EXPERIMENTS]
     for name in names:
-        one_of("experiment", name, ("all", "claims", *known))
+        one_of("experiment", name, (*GROUPS, *known))
     return [
         each
         for each in EXPERIMENTS
         if "all" in names
         or each.name in names
         or ("claims" in names and (each.claims or each.explains))
+        or ("comparison" in names and each in comparison.EXPERIMENTS)
     ]
 
 

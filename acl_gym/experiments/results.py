@@ -29,6 +29,8 @@ class Run:
         failure: why the run broke down; "" if it did not.
         seed: its seed.
         made: where, when and with which versions it was made.
+        partition: what `partition_from_settings` makes the partition of; None where the
+            study says it.
     """
 
     rows: pd.DataFrame
@@ -37,6 +39,7 @@ class Run:
     failure: str = ""
     seed: int = 0
     made: dict[str, Any] = field(default_factory=dict)
+    partition: dict[str, Any] | None = None
 
 
 class MissingRunsError(LookupError):

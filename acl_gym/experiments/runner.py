@@ -24,6 +24,7 @@ from rich.progress import (
 from acl_gym.experiments.cluster import in_ray
 from acl_gym.experiments.executors import Executor, RunFailedError, in_processes
 from acl_gym.experiments.methods import warm_up
+from acl_gym.experiments.names import NETWORKS
 from acl_gym.experiments.results import Results, Run
 from acl_gym.experiments.store import Job, Store
 from acl_gym.experiments.study import Study
@@ -93,8 +94,8 @@ def run_studies(
 def list_jobs(studies: Iterable[Study], seeds: Sequence[int]) -> list[Job]:
     """The runs to be made, seed by seed, so that early ones are of all studies.
 
-    Of equal studies the most demanding says how many runs are made. Those of DQN come
-    first: they take longest, and no core is to wait for them at the end.
+    Of equal studies the most demanding says how many runs are made. Those of networks
+    come first: they take longest, and no core is to wait for them at the end.
     """
     distinct: dict[str, Study] = {}
     for study in studies:
@@ -109,7 +110,7 @@ def list_jobs(studies: Iterable[Study], seeds: Sequence[int]) -> list[Job]:
         for study in distinct.values()
         if study.most_runs is None or place < study.most_runs
     ]
-    return sorted(jobs, key=lambda job: job.study.method != "dqn")
+    return sorted(jobs, key=lambda job: job.study.method not in NETWORKS)
 
 
 def exclusive_lock(directory: Path) -> AbstractContextManager[Any]:
@@ -136,7 +137,7 @@ def exclusive_lock(directory: Path) -> AbstractContextManager[Any]:
 
 def _compile_kernels(jobs: list[Job], console: Console) -> None:
     """Compile here once, not in every process, to avoid races on Numba's cache."""
-    kinds = {job.study.kernels: job for job in jobs if job.study.method != "dqn"}
+    kinds = {job.study.kernels: job for job in jobs if job.study.method not in NETWORKS}
     with console.status("Compiling the kernels (half a minute, the first time)"):
         for job in kinds.values():
             try:

@@ -104,7 +104,13 @@ class Store:
             if known.pop("checksum") != _checksum(known, rows, table):
                 return None
             return Run(
-                rows, table, known["seconds"], known["failure"], job.seed, known["made"]
+                rows,
+                table,
+                known["seconds"],
+                known["failure"],
+                job.seed,
+                known["made"],
+                known["partition"],
             )
         except _UNREADABLE:
             return None
@@ -118,6 +124,7 @@ class Store:
             "seed": job.seed,
             "seconds": run.seconds,
             "failure": run.failure,
+            "partition": run.partition,
             "made": made,
         }
         metadata["checksum"] = _checksum(metadata, run.rows, table)

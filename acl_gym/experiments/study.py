@@ -19,8 +19,10 @@ from acl_gym.envs.control.environments import ControlVectorEnv
 from acl_gym.envs.wrappers.perturbations import perturbed
 from acl_gym.evaluation import control_env
 from acl_gym.experiments.episode_costs import EPISODE_COSTS
+from acl_gym.experiments.names import GROWING, NETWORKS
 from acl_gym.partitions import KINDS, Partition
 from acl_gym.partitions.automatic import thesis_partition
+from acl_gym.partitions.growing import initial_partition
 from acl_gym.utils.hashing import hashed
 from acl_gym.utils.typing import FloatArray
 
@@ -91,19 +93,20 @@ class Task:
         states = self.evaluation_states()
         return self.make_env(len(states)), states
 
-    def dqn_evaluation(
+    def network_evaluation(
         self,
     ) -> tuple[VectorEnv[Any, Any, Any], FloatArray | None, int | None]:
-        """As `evaluation_env` for DQN, whose observations are scaled; and T."""
+        """As `evaluation_env` for networks, whose observations are scaled; and T."""
         from acl_gym.sb3.dqn import scaled_env  # which imports torch
 
         return scaled_env(self.env_id, **self.env), None, None
 
-    def make_dqn(self, settings: dict[str, Any], seed: int) -> Any:
-        """The DQN that learns here."""
-        from acl_gym.sb3.dqn import DQNSettings, make_dqn
+    def make_network(self, method: str, settings: dict[str, Any], seed: int) -> Any:
+        """The model of Stable-Baselines3 that learns here; see `names.NETWORKS`."""
+        from acl_gym.sb3.models import MODELS
 
-        return make_dqn(self.env_id, DQNSettings(**settings), seed, **self.env)
+        kind = MODELS[method]
+        return kind.make(self.env_id, kind.settings(**settings), seed, **self.env)
 
     @cached_property
     def longest_evaluation(self) -> int:
@@ -128,15 +131,17 @@ class Study:
     Attributes:
         task: what is learned.
         method: a key of `methods.METHODS`.
-        settings: keyword arguments of the agent; for DQN, of `DQNSettings`; for
-            planning, of `fuzzy_q_iteration`. Of Q-learning, "reward" is "stage", the
-            stage costs, or "steps", 1 a step.
+        settings: keyword arguments of the agent; for networks, of their class of settings
+            in `acl_gym.sb3.models`; for planning, of `fuzzy_q_iteration`. Of methods that
+            learn from rewards, "reward" is "stage", the stage costs, or "steps", 1 a
+            step.
         slots: slots of the environment; of a colony M, the number of ants.
-        kind: "crisp" or "fuzzy"; not used where a state is a cell.
+        kind: "crisp" or "fuzzy", where a state is no cell; or "growing": the agent
+            chooses a partition, which becomes finer.
         cells: see `Task.make_partition`.
         trials: K, how many trials are made; None: `steps` decides.
         steps: how many interactions of all slots together; None: `trials` decides.
-        evaluate_every: interactions between two evaluations of DQN.
+        evaluate_every: interactions between two evaluations of a network.
         spacing: the factor by which interactions grow from one evaluation to the next;
             1 evaluates the policy after each trial.
         watched: names of columns, and the (cell, action) whose level they hold after
@@ -180,6 +185,7 @@ class Study:
             *(task.env_id, len(task.env), bool(task.perturbations), task.cost),
             *(self.method, self.kind, str(settings.get("update"))),
             *(settings.get("trace_decay", 0) > 0, settings.get("tabu")),
+            settings.get("replay", 0) > 0,
             *(settings.get("selection"), self.reversed_slots),
         )
 
@@ -187,8 +193,9 @@ class Study:
         """The same for a few steps: to compile its kernels, or to try it out."""
         if self.method == "planning":
             return replace(self, settings={**self.settings, "max_iterations": 1})
-        if self.method == "dqn":
-            settings = {**self.settings, "learning_starts": 16}
+        if self.method in NETWORKS:
+            few = {"learning_starts": 16} if self.method == "dqn" else {"n_steps": 8}
+            settings = {**self.settings, **few}
             return replace(self, settings=settings, steps=64, evaluate_every=32)
         # Episodes of full length: some kernels are needed only where ants have arrived.
         task = replace(self.task, evaluation_steps=2)
@@ -199,7 +206,9 @@ class Study:
         return replace(self, settings={**self.settings, **settings})
 
     def make_partition(self) -> Partition:
-        """The partition of a method that keeps a table."""
+        """The partition of a method that keeps a table; that it begins with."""
+        if self.kind == GROWING:
+            return initial_partition(self.task.make_env(1))
         return self.task.make_partition(self.kind, self.cells)
 
     def curve_points(self) -> list[int] | None:

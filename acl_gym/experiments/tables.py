@@ -1,8 +1,8 @@
-"""The tables beside the figures, and how ACL is compared with another method.
+"""The tables beside the figures, and how a colony is compared with another method.
 
-ACL is compared with each rival by the ratio of interquartile means with its bootstrap
+A colony is compared with each rival by the ratio of interquartile means with its bootstrap
 interval. It wins or loses where the whole interval lies on one side of 1; otherwise these
-runs show no difference.
+runs show no difference. ACL is a rival of the returning colony.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ class Table:
     Attributes:
         headings: of the columns.
         rows: a text for each column; after a line break, what belongs to it in small.
-        comparisons: ACL against its rivals, see `Comparison.as_json`.
+        comparisons: the colonies against their rivals, see `Comparison.as_json`.
         best: row and column of each cell to be emphasised.
     """
 
@@ -156,12 +156,13 @@ def _compared(
     where: str, measure: str, values: Mapping[str, FloatArray]
 ) -> list[Comparison]:
     """Each colony against each rival by the values under their labels."""
-    colonies = [name for name in values if name in (LABELS["acl"], LABELS[LONG])]
+    thesis, returning = LABELS["acl"], LABELS["returning"]
+    colonies = [name for name in values if name in (thesis, LABELS[LONG], returning)]
     return [
         compare(where, measure, (colony, name), (values[colony], values[name]))
         for colony in colonies
         for name in values
-        if name not in colonies
+        if name not in colonies or (colony, name) == (returning, thesis)
     ]
 
 
@@ -241,15 +242,17 @@ def _time(at: FloatArray, key: str) -> str:
 
 
 def harder(experiment: Experiment, results: Results) -> Table:
-    """Several tasks: the cost of the last policy, ACL against each rival."""
+    """Several tasks: the cost of the last policy, and each colony against it in small."""
     rows, comparisons, headings = [], [], [experiment.options["of"]]
     for where, row in experiment.options["rows"].items():
         last = {LABELS[name]: results.last(study) for name, study in row.items()}
         own = _compared(where, _COSTS["final_policy_cost"], last)
-        verdicts = [f"{each.verdict}, {each.ratio} times" for each in own]
-        rows.append([where, *(str(estimate(x)) for x in last.values()), *verdicts])
+        cells = {name: str(estimate(values)) for name, values in last.items()}
+        for each in own:
+            cells[each.rival] += f"\n{each.method} {each.verdict}, {each.ratio} times"
+        rows.append([where, *cells.values()])
         comparisons += [each.as_json() for each in own]
-    headings += [*last, *(f"{each.method} against {each.rival}" for each in own)]
+    headings += last
     return Table(headings, rows, comparisons)
 
 

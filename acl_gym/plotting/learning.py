@@ -59,7 +59,9 @@ def draw_learning_curves(
             Line2D([], [], **line, label=label)
             for label, line in zip(logs, lines, strict=True)
         ]
-        columns = len(handles) if len(handles) <= 5 else math.ceil(len(handles) / 2)
+        columns = len(handles)
+        if columns > 5:  # no wider than the figure
+            columns = min(4, math.ceil(columns / 2))
         style.legend(figure, handles, ncols=columns)
 
 

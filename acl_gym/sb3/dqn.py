@@ -229,6 +229,31 @@ def scaled_env(
     return ScaledVectorObservation(env, circular)
 
 
+def learning_env(
+    env_id: str,
+    num_envs: int,
+    *,
+    reward_scale: float,
+    circular: Iterable[int] | None = None,
+    **env_kwargs: Any,
+) -> VecEnv:
+    """Make what a model of Stable-Baselines3 learns in.
+
+    From the inside out: the native vector environment with autoreset disabled,
+    `ScaledVectorObservation` (except for a finite observation space),
+    `VectorEnvAdapter`, `VecMonitor` (unscaled returns), `ScaledReward`.
+
+    Args:
+        env_id: see `scaled_env`.
+        num_envs: slots, >= 1.
+        reward_scale: factor on the rewards that the model learns from, > 0.
+        circular: the circular variables, see `scaled_env`.
+        env_kwargs: keyword arguments of the environment.
+    """
+    env = scaled_env(env_id, num_envs, circular=circular, **env_kwargs)
+    return ScaledReward(VecMonitor(VectorEnvAdapter(env)), reward_scale)
+
+
 def make_dqn(
     env_id: str,
     settings: DQNSettings | None = None,
@@ -238,11 +263,7 @@ def make_dqn(
     device: str = "cpu",
     **env_kwargs: Any,
 ) -> DQN:
-    """Make a DQN agent that is ready to `learn`.
-
-    Its environment is, from the inside out: the native vector environment with
-    autoreset disabled, `ScaledVectorObservation` (except for a finite observation
-    space), `VectorEnvAdapter`, `VecMonitor` (unscaled returns), `ScaledReward`.
+    """Make a DQN agent that is ready to `learn`, in a `learning_env`.
 
     Args:
         env_id: a registered id with discrete actions, see `scaled_env`.
@@ -269,16 +290,17 @@ def make_dqn(
     """
     settings = DQNSettings() if settings is None else settings
     seed = validation.seed(seed)
-    env = scaled_env(
+    env = learning_env(
         env_id,
         settings.num_envs,
+        reward_scale=settings.reward_scale,
         circular=circular,
         max_episode_steps=settings.max_episode_steps,
         **env_kwargs,
     )
     return DQN(
         "MlpPolicy",
-        ScaledReward(VecMonitor(VectorEnvAdapter(env)), settings.reward_scale),
+        env,
         learning_rate=LinearSchedule(
             settings.learning_rate, settings.final_learning_rate, 1.0
         ),

@@ -53,7 +53,7 @@ def finished(folder: Path) -> subprocess.CompletedProcess[str]:
 def test_results_and_table_hold_every_run(finished, folder: Path) -> None:
     assert finished.returncode == 0, finished.stderr
     results = json.loads((folder / "results.json").read_text())
-    methods = ("acl", "q-learning", "dqn")
+    methods = ("acl", "returning", "q-learning", "q-replay", "dqn", "ppo", "a2c")
     wanted = {(env, method) for env in ENVIRONMENTS for method in methods}
     assert {(run["env"], run["method"]) for run in results["runs"]} == wanted
     assert {(row["env"], row["method"]) for row in results["table"]} == wanted
@@ -61,6 +61,7 @@ def test_results_and_table_hold_every_run(finished, folder: Path) -> None:
         assert one["steps"] > 0
         assert one["seconds"] > 0
         assert one["best_steps"] <= one["steps"]
+        assert (one["target_steps"] is None) == (one["target_seconds"] is None)
         low, high = (0, 1) if one["env"] == "FrozenLake-v1" else (-20_000, -13)
         for which in ("final", "best"):
             assert low <= one[which]["return"] <= high
@@ -82,6 +83,28 @@ def test_an_unknown_name_is_refused_with_those_that_are_known(tmp_path: Path) ->
     refused = run(tmp_path, "--env", "Pong-v0")
     assert refused.returncode == 2
     assert "'Pong-v0' is not one of CartPole-v1" in refused.stderr
+
+
+def test_the_colony_reaches_the_target_and_seeds_are_a_number(tmp_path: Path) -> None:
+    arguments = ("--env", "FrozenLake-v1", "--agents", "returning")
+    done = run(tmp_path, *arguments, "--seeds", "2", "--seed", "3")
+    assert done.returncode == 0, done.stderr
+    results = json.loads((tmp_path / "results.json").read_text())
+    assert [one["seed"] for one in results["runs"]] == [3, 4]
+    (row,) = results["table"]
+    assert row["final"]["reached"] == 2
+    assert 0 < row["target_steps"] < row["steps"] < 11_000
+
+
+def test_scaled_observations_and_rewards_are_for_those_that_ask(tmp_path: Path) -> None:
+    smoke = ("--preset", "smoke", "--env", "MountainCar-v0", "--agents", "ppo,a2c")
+    done = run(tmp_path, *smoke)
+    assert done.returncode == 0, done.stderr
+    results = json.loads((tmp_path / "results.json").read_text())
+    # The returns are those of the environment, not what the network has learned from.
+    for one in results["runs"]:
+        assert -200.0 <= one["final"]["return"] <= -80.0
+        assert 2 * one["final"]["return"] % 1 == 0  # a mean of two whole numbers
 
 
 def test_without_kept_runs_there_is_no_table(tmp_path: Path) -> None:

@@ -40,6 +40,16 @@ _SETTINGS: dict[str, dict[str, Any]] = {
         "epsilon": 0.05,
         "trace_decay": 0.9,
     },
+    "q-replay": {
+        "learning_rate": 0.3,
+        "discount": 0.99,
+        "epsilon": 0.1,
+        "trace_decay": 0.6,
+        "replay": 10,
+        "optimism": 1.0,
+    },
+    "ppo": {"n_steps": 128, "learning_rate": 1e-3, "batch_size": 64},
+    "a2c": {"n_steps": 8},
     "dqn": {
         "learning_rate": 1e-3,
         "buffer_size": 50_000,
@@ -54,12 +64,14 @@ _SETTINGS: dict[str, dict[str, Any]] = {
 }
 
 _BUDGETS = {
-    "smoke": Budget(trials=2, dqn_steps=1_200, evaluate_every=600),
-    "quick": Budget(trials=60, dqn_steps=30_000, evaluate_every=1_500),
-    "full": Budget(trials=100, dqn_steps=100_000, evaluate_every=2_500),
+    "smoke": Budget(2, dqn_steps=1_200, evaluate_every=600, memory_steps=1_200),
+    "quick": Budget(
+        60, dqn_steps=30_000, evaluate_every=1_500, memory_steps=60_000, on_policy=2
+    ),
+    "full": Budget(100, dqn_steps=100_000, evaluate_every=2_500, memory_steps=200_000),
 }
 _SLOTS = 200
-DQN_SLOTS = 4
+NETWORK_SLOTS = {"dqn": 4, "ppo": 8, "a2c": 8}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -91,22 +103,22 @@ class ForeignTask(Task):
         """An environment with a slot for each episode; states are random."""
         return self.make_env(EPISODES), None
 
-    def dqn_evaluation(
+    def network_evaluation(
         self,
     ) -> tuple[VectorEnv[Any, Any, Any], FloatArray | None, int | None]:
-        """As the other methods: DQN sees the observations as they are."""
+        """As the other methods: networks see the observations as they are."""
         return *self.evaluation_env(), self.longest_evaluation
 
-    def make_dqn(self, settings: dict[str, Any], seed: int) -> Any:
-        """A DQN of Stable-Baselines3 with general settings."""
-        from stable_baselines3 import DQN
+    def make_network(self, method: str, settings: dict[str, Any], seed: int) -> Any:
+        """A model of Stable-Baselines3 with general settings."""
+        from stable_baselines3 import A2C, DQN, PPO
         from stable_baselines3.common.vec_env import VecMonitor
 
         from acl_gym.sb3.adapter import VectorEnvAdapter
 
         name = self.env_id.rpartition(":")[2]
-        env = WaitingVectorEnv.make(name, DQN_SLOTS, **self.env)
-        return DQN(
+        env = WaitingVectorEnv.make(name, NETWORK_SLOTS[method], **self.env)
+        return {"dqn": DQN, "ppo": PPO, "a2c": A2C}[method](
             "MlpPolicy",
             VecMonitor(VectorEnvAdapter(env)),
             seed=seed,

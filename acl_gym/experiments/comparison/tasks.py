@@ -19,7 +19,14 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from acl_gym.experiments import systems
-from acl_gym.experiments.names import METHODS, TABLE_METHODS, agent_names
+from acl_gym.experiments.names import (
+    GROWING,
+    METHODS,
+    NETWORKS,
+    REMEMBERING,
+    TABLE_METHODS,
+    agent_names,
+)
 from acl_gym.experiments.study import Study, Task
 from acl_gym.utils.validation import one_of
 
@@ -29,6 +36,20 @@ _FOLDER = files("acl_gym.experiments.comparison")  # also where that is in a zip
 
 SETTINGS_FILE = Path(__file__).with_name("settings.json")
 """The tuned settings: task -> method -> what its search has found."""
+
+
+FEW_SLOTS = 5
+"""Of methods that remember, which learn from few interactions."""
+
+MOST_REMEMBERED = 500_000
+"""Interactions of such a method on a tuned task, where the others have no fewer."""
+
+ON_POLICY = 5
+"""How many times the interactions of DQN PPO and A2C get, which are as much faster: all
+take about as many seconds."""
+
+MEMORY_SPACING = 1.04
+"""`Study.spacing` of methods that remember: few interactions count here."""
 
 
 class Agent(NamedTuple):
@@ -46,15 +67,19 @@ class Budget(NamedTuple):
         trials: K of the methods with a table.
         dqn_steps: interactions of DQN.
         evaluate_every: interactions between two evaluations of DQN.
+        memory_steps: interactions of methods with a table that remember.
         cells: on which the reference is found, see `Task.make_partition`; None where a
             state is a cell.
+        on_policy: how many times the interactions of DQN PPO and A2C get.
         length: of the runs of DQN; where it is "long" DQN has its settings for that.
     """
 
     trials: int
     dqn_steps: int
     evaluate_every: int
+    memory_steps: int
     cells: Any = None
+    on_policy: int = ON_POLICY
     length: str = "short"
 
 
@@ -65,8 +90,8 @@ class System:
     Attributes:
         label: what it is called.
         colony: the thesis's colony on it, whose settings, slots, cells and T hold here.
-        settings: what a method runs with, by its name; of DQN, what differs from the
-            defaults of `DQNSettings`. Under a name with a suffix, "q-crisp" or
+        settings: what a method runs with, by its name; of networks and of the returning
+            colony, what differs from the defaults. Under a name with a suffix, "q-crisp" or
             "dqn-long", is what differs there.
         budgets: one for each preset.
         finite: whether a state is a cell, so that nothing is fuzzy.
@@ -112,6 +137,8 @@ class System:
             words = METHODS[name].label
             if kind and not self.finite:
                 words += f", {kind}"
+            if not kind and name in REMEMBERING:
+                kind = GROWING
             found[each] = Agent(words, name, kind)
         return found
 
@@ -129,16 +156,28 @@ class System:
         """
         _, method, kind = self.agents[one_of("agent", name, tuple(self.agents))]
         budget, task = self.budgets[preset], self.task
-        if method == "dqn":
-            settings = self.settings_of("dqn", budget.length)
-            return _dqn(task, settings, budget.dqn_steps, budget.evaluate_every)
-        return replace(
+        if method in NETWORKS:
+            settings = self.settings_of(method, budget.length)
+            more = 1 if method == "dqn" else budget.on_policy
+            return _network(
+                task, method, settings, budget.dqn_steps, budget.evaluate_every, more
+            )
+        study = replace(
             self.colony,
             task=task,
             method=METHODS[method].key,
             settings={"max_steps": self.max_steps, **self.settings_of(method, kind)},
             kind=kind,
             trials=budget.trials,
+        )
+        if method not in REMEMBERING:
+            return study
+        return replace(
+            study,
+            slots=FEW_SLOTS,
+            trials=None,
+            steps=budget.memory_steps,
+            spacing=MEMORY_SPACING,
         )
 
     def reference(self, preset: str = "quick") -> Study:
@@ -150,9 +189,20 @@ class System:
         return Study(task=self.task, method="planning", cells=cells, most_runs=1)
 
 
-def _dqn(task: Task, settings: dict[str, Any], steps: int, every: int) -> Study:
+def _network(
+    task: Task,
+    method: str,
+    settings: dict[str, Any],
+    dqn_steps: int,
+    every: int,
+    more: int,
+) -> Study:
     return Study(
-        task=task, method="dqn", settings=settings, steps=steps, evaluate_every=every
+        task=task,
+        method=method,
+        settings=settings,
+        steps=more * dqn_steps,
+        evaluate_every=more * every,
     )
 
 
@@ -188,12 +238,14 @@ class TunedTask:
     Attributes:
         label: what it is called in tables and figures.
         system: which one.
-        steps: interactions of a method with a table, all slots together.
+        steps: interactions of a method with a table, all slots together; one that
+            remembers has `MOST_REMEMBERED` at most.
         spacing: the factor by which interactions grow from one evaluation to the next.
         changes: of the task, keywords of `Task`: what makes it harder.
         cells: see `Task.make_partition`; None takes those of the system.
         max_steps: T, the longest episode; None takes that of the system.
-        dqn_steps: interactions of DQN; 0: it does not take part.
+        dqn_steps: interactions of DQN; PPO and A2C get `ON_POLICY` times as many. 0: no
+            network takes part.
         evaluate_every: interactions between two evaluations of DQN.
     """
 
@@ -222,10 +274,14 @@ class TunedTask:
 
         `slots` and `kind` are among those of the methods with a table.
         """
-        if method == "dqn":
-            return self.system.settings_of("dqn", "short")
+        if method in NETWORKS:
+            return self.system.settings_of(method, "short")
         finite, judged = self.system.finite, self.task.cost is not None
-        kind = "crisp" if finite else "fuzzy"
+        kind, slots = "crisp" if finite else "fuzzy", self.system.colony.slots
+        if method in REMEMBERING:
+            slots = FEW_SLOTS
+            if not finite and self.cells is None:
+                kind = GROWING
         settings = self.system.settings_of(method, kind)
         if method == "acl":
             # Boltzmann's rule is Max-Boltzmann's with epsilon = 0, which can be searched.
@@ -238,7 +294,7 @@ class TunedTask:
         elif judged:
             settings["reward"] = "stage"
         settings["max_steps"] = self.max_steps or self.system.max_steps
-        return {"slots": self.system.colony.slots, "kind": kind, **settings}
+        return {"slots": slots, "kind": kind, **settings}
 
     def study(self, method: str, found: Settings) -> Study:
         """A method with the settings that a search has found.
@@ -248,10 +304,16 @@ class TunedTask:
             found: what differs from `defaults`.
         """
         settings = {**self.defaults(method), **found}
-        if method == "dqn":
+        if method in NETWORKS:
             if "learning_rate" in settings:
                 settings["final_learning_rate"] = settings["learning_rate"]
-            return _dqn(self.task, settings, self.dqn_steps, self.evaluate_every)
+            more = 1 if method == "dqn" else ON_POLICY
+            return _network(
+                self.task, method, settings, self.dqn_steps, self.evaluate_every, more
+            )
+        steps, spacing = self.steps, self.spacing
+        if method in REMEMBERING:
+            steps, spacing = min(steps, MOST_REMEMBERED), min(spacing, MEMORY_SPACING)
         return Study(
             task=self.task,
             method=METHODS[method].key,
@@ -259,8 +321,8 @@ class TunedTask:
             kind=settings.pop("kind"),
             settings=settings,
             cells=self.cells or self.system.colony.cells,
-            steps=self.steps,
-            spacing=self.spacing,
+            steps=steps,
+            spacing=spacing,
         )
 
 
@@ -283,13 +345,24 @@ def tuned_settings() -> dict[str, dict[str, dict[str, Any]]]:
     return json.loads(_FOLDER.joinpath(SETTINGS_FILE.name).read_text(encoding="utf-8"))  # type: ignore[no-any-return]
 
 
+def is_tuned(name: str, method: str) -> bool:
+    """Whether there was a search for the settings of a method on a task.
+
+    There is none for the returning colony, which has its defaults everywhere.
+    """
+    return method in tuned_settings().get(name, {})
+
+
 def tuned(name: str, method: str, most_runs: int | None = None) -> Study:
     """A method on a task with the settings that its search has found.
+
+    A method of which there was no search has its defaults, see `is_tuned`.
 
     Args:
         name: a key of `TASKS`.
         method: one of the methods of the task.
         most_runs: see `Study`.
     """
-    study = TASKS[name].study(method, tuned_settings()[name][method])
+    found = tuned_settings()[name][method] if is_tuned(name, method) else {}
+    study = TASKS[name].study(method, found)
     return replace(study, most_runs=most_runs)

@@ -56,7 +56,8 @@ def draw_strips(
     if high < _NARROW * low:
         ax.set_ylim(low / _NARROW, high * _NARROW)
     ax.set_xlim(-0.6, len(studies) - 0.4)
-    ax.set_xticks(range(len(studies)), labels=[look.short for look, _ in studies])
+    names = [look.short for look, _ in studies]
+    ax.set_xticks(range(len(studies)), labels=names, rotation=90 * (len(names) > 5))
 
 
 def sweep(experiment: Experiment, results: Results) -> Figure:
@@ -110,7 +111,7 @@ def _legend(figure: Figure, experiment: Experiment) -> None:
         Line2D([], [], marker=LOOKS[key].marker, **LOOKS[key].line, label=LABELS[key])
         for key in next(iter(experiment.options["rows"].values()))
     ]
-    style.legend(figure, handles, ncols=len(handles))
+    style.legend(figure, handles, ncols=min(4, len(handles)))
 
 
 def summary(experiment: Experiment, results: Results) -> Figure:

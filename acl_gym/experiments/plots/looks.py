@@ -1,7 +1,7 @@
 """The line styles of methods, shared by all figures; references and symbols.
 
-A warm hue is a colony, a blue one Q-learning, a purple one Q(lambda). A crisp partition
-has a dashed line in the lighter shade.
+A red or orange hue is a colony, a blue one Q-learning, a purple one Q(lambda), a green one a
+network. A crisp partition has a dashed line in the lighter shade.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from acl_gym.plotting.style import BLUE, BOUND, GREEN, ORANGE
 from acl_gym.utils.text import digits
 
 _DASHES = (0, (4, 1.2))
+_DOTS = (0, (1, 1))
 
 
 class Look(NamedTuple):
@@ -37,11 +38,17 @@ LOOKS = {
     "acl": Look(ORANGE, "-", "o", "ACL"),
     "acl-crisp": Look("#E69F00", _DASHES, "o", "ACL"),
     "acl-long": Look("#E69F00", _DASHES, "P", "4 ACL"),
+    "returning": Look("#AA0A0A", "-", "*", "R-ACL"),
+    "returning-fuzzy": Look("#D8433B", _DOTS, "*", "R-ACL"),
+    "returning-crisp": Look("#F0908A", _DASHES, "*", "R-ACL"),
     "q": Look(BLUE, "-", "s", "Q"),
     "q-crisp": Look("#56B4E9", _DASHES, "s", "Q"),
     "q-lambda": Look("#882255", "-", "^", "Q(λ)"),
     "q-lambda-crisp": Look("#CC79A7", _DASHES, "^", "Q(λ)"),
+    "q-replay": Look("#1B2A6B", _DOTS, "v", "Q rep."),
     "dqn": Look(GREEN, (0, (6, 1, 1, 1)), "D", "DQN"),
+    "ppo": Look("#7A9A01", (0, (6, 1, 1, 1)), "X", "PPO"),
+    "a2c": Look("#35C9A5", (0, (6, 1, 1, 1)), "p", "A2C"),
     "planning": Look("0.55"),
 }
 """By the name that an experiment gives to a method, or as `look_of` composes it."""
@@ -50,7 +57,9 @@ LOOKS = {
 def look_of(study: Study) -> Look:
     """How a study is drawn beside others."""
     name = "q" if study.method == "q-learning" else study.method
-    if study.settings.get("trace_decay", 0) > 0:
+    if study.settings.get("replay", 0) > 0:
+        name = "q-replay"
+    elif study.settings.get("trace_decay", 0) > 0:
         name = "q-lambda"
     return LOOKS.get(f"{name}-{study.kind}", LOOKS[name])
 

@@ -129,7 +129,7 @@ def test_a_fresh_call_makes_every_run_anew(tmp_path: Path) -> None:
         (["--env", "Nope-v0"], "there is no environment 'Nope-v0'"),
         (
             ["--env", "acl_gym/GridSearch1D-v0", "--agents", "acl-fuzzy"],
-            "must be one of 'acl-crisp', 'q-crisp', 'q-lambda-crisp', 'dqn', got",
+            "must be one of 'acl-crisp', 'returning-crisp', 'q-crisp', 'q-lambda-crisp',",
         ),
     ],
 )
@@ -138,6 +138,27 @@ def test_bad_arguments_exit_with_2(arguments: list[str], message: str) -> None:
     assert failed.exit_code == 2
     assert message in failed.stderr
     assert len(failed.stderr.strip().splitlines()) == 1
+
+
+@pytest.mark.usefixtures("short_runs")
+def test_a_method_stands_for_its_agents(tmp_path: Path) -> None:
+    """And all of those that remember are drawn, with partitions that have grown."""
+    agents = ("--agents", "returning,returning-fuzzy,q-replay,acl")
+    in_this_process(tmp_path, *agents)
+    results = json.loads((tmp_path / "results.json").read_text())
+    assert {row["agent"] for row in results["rows"]} == {
+        *("returning", "returning-fuzzy", "q-replay", "acl-fuzzy", "acl-crisp"),
+    }
+    assert (tmp_path / "policy_maps.png").is_file()
+
+
+@pytest.mark.usefixtures("short_runs")
+def test_an_environment_of_another_package(tmp_path: Path) -> None:
+    agents = "returning,q-replay,ppo,a2c"
+    in_this_process(tmp_path, "--env", "CartPole-v1", "--agents", agents)
+    results = json.loads((tmp_path / "results.json").read_text())
+    assert {row["agent"] for row in results["rows"]} == set(agents.split(","))
+    assert all(-500 <= row["policy_cost"] < 0 for row in results["rows"])
 
 
 @pytest.mark.usefixtures("short_runs")

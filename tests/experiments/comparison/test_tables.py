@@ -14,6 +14,7 @@ import pytest
 from acl_gym.experiments.comparison import EXPERIMENTS
 from acl_gym.experiments.comparison.compare import experiment_of
 from acl_gym.experiments.comparison.tasks import SYSTEMS
+from acl_gym.experiments.names import METHODS
 from acl_gym.experiments.results import Results, Run
 from acl_gym.experiments.study import Experiment, Study
 from acl_gym.experiments.tables import (
@@ -62,11 +63,18 @@ def table(name: str, cost: Callable[[Study, int], float], runs: int = 10) -> Tab
 
 
 def cost_of(study: Study, n: int) -> float:
-    """ACL wins against Q(lambda), loses to Q-learning, and is as good as DQN."""
-    if study.method == "planning":
-        return 10.0
+    """ACL wins against Q(lambda), loses to Q-learning, and is as good as DQN.
+
+    With replay Q-learning is as good as Q(lambda); the returning colony loses to none.
+    """
+    if study.method in ("planning", "returning"):
+        return 10.0 + 0.01 * n * (study.method == "returning")
     q = 13.0 if study.settings.get("trace_decay", 0) else 11.0
     return (q if study.method == "q-learning" else 12.0) + 0.01 * n
+
+
+VERDICTS = {"Q-learning": "loses", "Q(λ)": "wins", "Q-learning, replay": "wins"}
+"""Of ACL against the methods with a table."""
 
 
 def verdict(own: Any, others: Any) -> str:
@@ -99,13 +107,21 @@ def test_what_is_never_reached_is_lost_to_what_is() -> None:
 
 def test_a_system() -> None:
     found = table("versus-pendulum", cost_of)
-    assert [row[0] for row in found.rows] == ["ACL", "Q-learning", "Q(λ)", "DQN"]
+    assert [row[0] for row in found.rows] == [each.label for each in METHODS.values()]
     last = {
-        each["rival"]: each["verdict"]
+        (each["method"], each["rival"]): each["verdict"]
         for each in found.comparisons
         if each["measure"] == "cost of the last policy"
     }
-    assert last == {"Q-learning": "loses", "Q(λ)": "wins", "DQN": "no difference"}
+    assert last == {
+        **{("ACL", rival): said for rival, said in VERDICTS.items()},
+        **{("ACL", name): "no difference" for name in ("DQN", "PPO", "A2C")},
+        **{
+            ("Returning ACL", each.label): "wins"
+            for each in METHODS.values()
+            if each.label != "Returning ACL"
+        },
+    }
     row = dict(zip(found.headings, found.rows[0], strict=True))
     assert row["Interactions to 25%"] == "2,000"
     assert row["Interactions to 10%"] == "never (0 of 10)"
@@ -117,18 +133,18 @@ def test_a_system() -> None:
 def test_the_overview() -> None:
     found = table("versus", cost_of)
     assert [row[0] for row in found.rows] == list(BY_NAME["versus"].options["rows"])
-    assert len(found.comparisons) == 4 * 3 * 5
+    # ACL has six rivals, the returning colony ACL as well; a cost and four times.
+    assert len(found.comparisons) == 4 * (6 + 7) * 5
     times = [e for e in found.comparisons if e["measure"].endswith("the reference")]
     assert len({each["measure"] for each in times}) == 4
     at_25 = [e for e in times if e["measure"].startswith("interactions to within 25%")]
-    assert [e["verdict"] for e in at_25] == [
-        "no difference",
-        "wins",
-        "no difference",
-    ] * 4
-    # Q-learning alone comes within 10%, in some of its runs.
+    verdicts = [e["verdict"] for e in at_25 if e["method"] == "ACL"]
+    assert verdicts == ["no difference", "wins", "wins", *["no difference"] * 3] * 4
+    # Of ACL's rivals Q-learning alone comes within 10%, in some of its runs.
     at_10 = [e for e in times if e["measure"].startswith("interactions to within 10%")]
-    assert {e["rival"]: e["verdict"] for e in at_10}["DQN"] == "neither"
+    assert {
+        e["verdict"] for e in at_10 if (e["method"], e["rival"]) == ("ACL", "DQN")
+    } == {"neither"}
 
 
 @pytest.mark.parametrize(
@@ -139,16 +155,20 @@ def test_several_tasks(name: str) -> None:
     rows = BY_NAME[f"versus-{name}"].options["rows"]
     assert [row[0] for row in found.rows[: len(rows)]] == list(rows)
     assert {len(row) for row in found.rows} == {len(found.headings)}
-    names = {"ACL", *(["ACL with 4 times the interactions"] if name != "slots" else [])}
+    wanted = {("ACL", rival): said for rival, said in VERDICTS.items()}
+    if name == "slots":  # where the methods that remember do not take part
+        del wanted["ACL", "Q-learning, replay"]
+    else:
+        longer = "ACL with 4 times the interactions"
+        wanted |= {(longer, rival): said for (_, rival), said in wanted.items()}
+        names = ("ACL", *VERDICTS)
+        wanted |= {("Returning ACL", name): "wins" for name in names}
+        heading = found.headings.index("Q(λ)")
+        assert "\nACL wins, 0.9" in found.rows[0][heading]
     assert {
         (each["where"], each["method"], each["rival"]): each["verdict"]
         for each in found.comparisons
-    } == {
-        (where, method, rival): said
-        for where in rows
-        for method in names
-        for rival, said in (("Q-learning", "loses"), ("Q(λ)", "wins"))
-    }
+    } == {(where, *pair): said for where in rows for pair, said in wanted.items()}
 
 
 def test_what_the_most_slots_cost() -> None:
@@ -247,7 +267,8 @@ def test_marks_never_reached_are_none_and_counted() -> None:
 
 
 def test_the_best_of_a_column_is_emphasised() -> None:
-    experiment = experiment_of(SYSTEMS["row"], "quick")
+    agents = ["acl-crisp", "q-crisp", "q-lambda-crisp", "dqn"]
+    experiment = experiment_of(SYSTEMS["row"], "quick", agents)
     costs = {"ACL": 6.0, "Q-learning": 5.0, "Q(λ)": 5.0, "DQN": 7.0}
     of_study = {study.key: costs[label] for label, study in experiment.studies.items()}
     results = made_up(experiment, lambda study, n: of_study.get(study.key, 5.0), 2)

@@ -21,7 +21,14 @@ tuning = SimpleNamespace(**runpy.run_path(str(SCRIPT)))
 FOLDER = tuning.FOLDER
 
 
-@pytest.mark.parametrize(("name", "method"), tuning.PAIRS)
+SEARCHED = [
+    (name, method)
+    for name, method in tuning.PAIRS
+    if tuning.path_of(name, method, FOLDER).is_file()
+]
+
+
+@pytest.mark.parametrize(("name", "method"), SEARCHED)
 def test_the_search_that_is_kept(name: str, method: str) -> None:
     """16 evaluations, the first of them the defaults, all of them in the space."""
     task = TASKS[name]
@@ -36,6 +43,20 @@ def test_the_search_that_is_kept(name: str, method: str) -> None:
             assert space[key]._contains(space[key].to_internal_repr(value)), key
         assert each["value"] == pytest.approx(sum(each["costs"]) / len(each["costs"]))
         assert 0 < each["value"] <= task.task.highest_cost * (1 + 1e-12)
+
+
+def test_every_method_can_be_searched() -> None:
+    """The defaults, which are tried first, lie in the space; as many for each network."""
+    sizes = {}
+    for name, method in tuning.PAIRS:
+        space = tuning.space_of(TASKS[name], method)
+        for first in tuning.starts(TASKS[name], method):
+            assert set(first) == set(space)
+            for key, value in first.items():
+                assert space[key]._contains(space[key].to_internal_repr(value)), key
+        sizes[method] = len(space)
+    assert sizes["dqn"] == sizes["ppo"] == sizes["a2c"]
+    assert "returning" not in sizes
 
 
 def test_settings_of_the_package_are_those_of_the_logs() -> None:
@@ -135,7 +156,7 @@ def test_the_command(tmp_path: Path) -> None:
     assert [path.name for path in tmp_path.iterdir()] == ["row-q.json"]
     wrong = tune("--only", "moon")
     assert wrong.returncode == 2
-    assert "--only must be tasks or task-method, got 'moon'" in wrong.stderr
+    assert "--only must be tasks, methods or task-method, got 'moon'" in wrong.stderr
     partly = tune("--write", "--out", str(tmp_path))
     assert partly.returncode == 1
     assert "search of row-acl must have an evaluation, got none" in partly.stderr

@@ -465,7 +465,7 @@ def _parser() -> argparse.ArgumentParser:
         choices=("smoke", "search", "full"),
         default="full",
         help="smoke: seconds, figures without meaning. full: the chosen settings with "
-        "seeds 0, 1 and 2; HOURS of one core. search: every candidate of "
+        "seeds 0, 1 and 2; about 25 minutes of one core for each. search: all candidates of "
         "gymnasium_settings.py with seed 100 (default: %(default)s)",
     )
     parser.add_argument(

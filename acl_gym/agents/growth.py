@@ -75,8 +75,8 @@ class Growth:
             partition: the present one.
             evidence: how often each pair was tried: sums of degrees, in units of
                 1 / `UNITS`, `(n_pairs,)`.
-            visits_to_grow: how many tries there must be for each pair and state variable:
-                the more variables, the more cells share a try.
+            visits_to_grow: how many tries there must be for each pair and each variable
+                that varies: the more variables, the more cells share a try.
             max_cells: the partition does not become finer than this.
 
         Returns:
@@ -93,7 +93,7 @@ class Growth:
         if partition.n_cells // size * (size + halved) > max_cells:
             return None  # first, since a look at the evidence takes longer
         tries = float(evidence.mean()) / UNITS
-        if tries <= visits_to_grow * len(partition.centres):
+        if tries <= visits_to_grow * len(several):
             return None
         self.splits += 1
         return partition.refined(axis)

@@ -23,32 +23,31 @@ def evidence(*tries: float, pairs: int = 12) -> Any:
 
 def test_axes_take_turns_and_lone_centres_are_left_out() -> None:
     growth = Growth(True)
-    enough = evidence(3.0, 3.0)
-    first = growth.finer(GRID, enough, 2.0, 1_000)
+    enough = evidence(3.0, 3.0)  # 0.5 tries of each of 12 pairs, 0.25 for each variable
+    first = growth.finer(GRID, enough, 0.2, 1_000)
     assert first is not None
     assert [line.size for line in first.centres] == [3, 1, 3]
-    second = growth.finer(first, enough, 2.0, 1_000)
+    second = growth.finer(first, enough, 0.2, 1_000)
     assert second is not None
     assert [line.size for line in second.centres] == [3, 1, 5]
     assert growth.splits == 2
-    third = growth.finer(second, enough, 2.0, 1_000)
+    third = growth.finer(second, enough, 0.2, 1_000)
     assert third is not None
     assert [line.size for line in third.centres] == [5, 1, 5]
 
 
-def test_the_median_of_what_was_tried_decides() -> None:
-    """Pairs that were never tried do not count; 3 is the median of 1, 3, 9."""
-    tries = evidence(1.0, 3.0, 9.0)
-    assert Growth(True).finer(GRID, tries, 3.0, 1_000) is None
-    assert Growth(True).finer(GRID, tries, 2.9, 1_000) is not None
-    # A state of a fuzzy grid of two variables is shared by four cells.
-    fuzzy = Fuzzy([[0.0, 1.0], [0.0, 1.0, 2.0]])
-    assert Growth(True).finer(fuzzy, tries, 11.9, 1_000) is not None
-    assert Growth(True).finer(fuzzy, tries, 12.0, 1_000) is None
+def test_the_tries_of_an_average_pair_decide() -> None:
+    """24 tries of 12 pairs are 2 for each, and 1 for each of two variables."""
+    tries = evidence(6.0, 9.0, 9.0)
+    assert Growth(True).finer(GRID, tries, 1.0, 1_000) is None
+    assert Growth(True).finer(GRID, tries, 0.99, 1_000) is not None
+    line = Fuzzy([[0.0, 1.0, 2.0], [0.5]])  # one variable: the other does not vary
+    assert Growth(True).finer(line, tries, 1.99, 1_000) is not None
+    assert Growth(True).finer(line, tries, 2.0, 1_000) is None
 
 
 def test_it_stops_at_the_limit_and_where_nothing_can_grow() -> None:
-    growth, enough = Growth(True), evidence(9.0)
+    growth, enough = Growth(True), evidence(99.0)
     assert growth.finer(GRID, enough, 1.0, 8) is None  # there would be 9
     assert growth.splits == 0
     assert growth.finer(Fuzzy([[0.5]]), enough, 1.0, 100) is None

@@ -40,7 +40,7 @@ negative costs. Policies are then judged by their return in 100 random episodes.
 \b
 Examples:
   acl-gym compare
-  acl-gym compare --agents returning,acl,q-fuzzy --seeds 5 --out results/tables
+  acl-gym compare --agents returning,acl --seeds 5 --out results/tables
   acl-gym compare --env acl_gym/GridSearch2D-v0 --out results/grid
   acl-gym compare --env CartPole-v1 --seeds 3
   acl-gym compare --preset full --out results/full

@@ -28,6 +28,8 @@ from tqdm.auto import tqdm
 from acl_gym import ReturningACL, WaitingVectorEnv, evaluate_policy_cost
 from acl_gym.utils.text import replace_unprintable_letters
 
+from ablation import at_least_one  # isort: skip  # the script beside this one
+
 ANTS = 5
 Row = dict[str, Any]
 
@@ -178,12 +180,6 @@ def _names(text: str) -> list[str]:
     return given
 
 
-def _at_least_one(text: str) -> int:
-    if not (text.isdecimal() and int(text) >= 1):
-        raise argparse.ArgumentTypeError(f"must be an integer >= 1, got {text!r}")
-    return int(text)
-
-
 def _parameter(text: str) -> tuple[str, Any]:
     name, equals, value = text.partition("=")
     if not equals:
@@ -208,7 +204,7 @@ def main(arguments: list[str] | None = None) -> int:
     )
     parser.add_argument(
         "--seeds",
-        type=_at_least_one,
+        type=at_least_one,
         default=10,
         help="runs of each, with successive seeds (default: %(default)s)",
     )

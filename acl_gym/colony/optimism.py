@@ -34,7 +34,7 @@ def promised_level(
     sizes = memory.last - memory.first
     longest = int(sizes.max())
     steps = longest if discount == 1.0 else 1 / (1 - discount)
-    going, ending = _best_rewards(
+    going, ending, _ = _extreme_rewards(
         memory.first, memory.last, memory.terminated, memory.reward
     )
     most = max(0.0, going * steps, ending)
@@ -59,21 +59,11 @@ def possible_levels(memory: Memory, discount: float) -> tuple[float, float]:
             the signs of the rewards rule out.
     """
     for_ever = np.inf if discount == 1.0 else 1.0 / (1.0 - discount)
-    going, ending = _best_rewards(
+    going, ending, worst = _extreme_rewards(
         memory.first, memory.last, memory.terminated, memory.reward
     )
-    worst = _worst_reward(memory.first, memory.last, memory.reward)
     most = (going * for_ever if going > 0.0 else 0.0) + max(0.0, ending)
     return (worst * for_ever if worst < 0.0 else 0.0), most
-
-
-@njit
-def _worst_reward(first: IntArray, last: IntArray, reward: FloatArray) -> float:
-    worst = np.inf
-    for path in range(first.size):
-        for row in range(first[path], last[path]):
-            worst = min(worst, reward[row])
-    return worst
 
 
 @njit
@@ -95,17 +85,20 @@ def _values(
 
 
 @njit
-def _best_rewards(
+def _extreme_rewards(
     first: IntArray, last: IntArray, terminated: BoolArray, reward: FloatArray
-) -> tuple[float, float]:
-    """The best reward of a step after which an ant went on, and of one that ended."""
+) -> tuple[float, float, float]:
+    """The best reward before an ant went on, the best at an end, and the worst of all."""
     going = ending = -np.inf
+    worst = np.inf
     for path in range(first.size):
         final = last[path] - 1
         for row in range(first[path], final):
             going = max(going, reward[row])
+            worst = min(worst, reward[row])
+        worst = min(worst, reward[final])
         if terminated[path]:
             ending = max(ending, reward[final])
         else:
             going = max(going, reward[final])
-    return going, ending
+    return going, ending, worst

@@ -14,6 +14,12 @@ from acl_gym.partitions.growing import carried_over, widened
 from acl_gym.utils import validation
 from acl_gym.utils.typing import BoolArray, FloatArray, IntArray
 
+WHERE = ("tried", "varied", "everywhere")
+"""Where cells may be halved before those of the whole grid are, see `Growth`."""
+
+TWICE = 2.0
+"""How much oftener than the average the pairs between two centres must be tried."""
+
 
 class Growth:
     """Says when a partition becomes wider or finer, and into what.
@@ -23,17 +29,34 @@ class Growth:
 
     Args:
         on: whether it grows at all.
+        where: where cells are halved before pairs have been tried often enough on the
+            average. `"tried"`: where pairs have been tried twice as often. `"varied"`:
+            where they have been tried often enough and the policy varies most (§7.3),
+            weighted with how often they were tried. `"everywhere"`: nowhere sooner than
+            elsewhere.
 
     Attributes:
-        splits: how often cells were halved along one variable, >= 0.
+        turn: whose turn it is, the number of a variable that varies, if the numbers go
+            round; >= 0.
 
     Raises:
         TypeError: `on` is neither True nor False.
+        ValueError: `where` is none of these words.
     """
 
-    def __init__(self, on: bool) -> None:
+    def __init__(self, on: bool, where: str = "tried") -> None:
         self.on = on
-        self.splits = 0
+        self.where = where
+        self.turn = 0
+
+    @property
+    def where(self) -> str:
+        """Where cells are halved first."""
+        return self._where
+
+    @where.setter
+    def where(self, value: str) -> None:
+        self._where = validation.one_of("grows_where", value, WHERE)
 
     @property
     def on(self) -> bool:
@@ -66,15 +89,21 @@ class Growth:
         self,
         partition: Partition,
         evidence: IntArray,
+        levels: FloatArray,
         visits_to_grow: float,
         max_cells: int,
     ) -> Grid | None:
-        """Halve the cells along the next variable if there is evidence for finer ones.
+        """Halve cells along the next variable for which there is evidence for finer ones.
+
+        All cells, once the pairs have been tried often enough on the average. Before
+        that, those between two neighbouring centres of the variable, if the pairs there
+        have been tried so often: what of them is halved, `where` says.
 
         Args:
             partition: the present one.
             evidence: how often each pair was tried: sums of degrees, in units of
                 1 / `UNITS`, `(n_pairs,)`.
+            levels: what each pair promises, `(n_cells, n_actions)`.
             visits_to_grow: how many tries there must be for each pair and each variable
                 that varies: the more variables, the more cells share a try.
             max_cells: the partition does not become finer than this.
@@ -85,28 +114,75 @@ class Growth:
         if not (self.on and isinstance(partition, Grid)):
             return None
         several = [i for i, line in enumerate(partition.centres) if line.size > 1]
-        if not several:
+        enough = visits_to_grow * len(several) * UNITS
+        everywhere = bool(evidence.mean() > enough)
+        if self.where == "everywhere" and not everywhere:
             return None
-        axis = several[self.splits % len(several)]
-        size = partition.centres[axis].size
-        halved = size - 1 if partition.periods[axis] is None else size
-        if partition.n_cells // size * (size + halved) > max_cells:
-            return None  # first, since a look at the evidence takes longer
-        tries = float(evidence.mean()) / UNITS
-        if tries <= visits_to_grow * len(several):
-            return None
-        self.splits += 1
-        return partition.refined(axis)
+        for turn in range(self.turn, self.turn + len(several)):
+            axis = several[turn % len(several)]
+            size = partition.centres[axis].size
+            if everywhere:
+                n_intervals = size - (partition.periods[axis] is None)
+                chosen = np.ones(n_intervals, np.bool_)
+            else:
+                chosen = self._chosen(partition, axis, evidence, levels, enough)
+            halved = np.count_nonzero(chosen)
+            if halved and partition.n_cells // size * (size + halved) <= max_cells:
+                self.turn = turn + 1
+                return partition.refined(axis, chosen)
+        return None
 
-    def restore(self, splits: NDArray[Any]) -> None:
-        """Take over the number of splits, perhaps from a stranger's file.
+    def _chosen(
+        self,
+        partition: Grid,
+        axis: int,
+        evidence: IntArray,
+        levels: FloatArray,
+        enough: float,
+    ) -> BoolArray:
+        """Which intervals of an axis are to be halved, `(n,)`."""
+        shape = tuple(line.size for line in partition.centres)
+        circular = partition.periods[axis] is not None
+        tries = _sides(evidence.reshape(*shape, -1), axis, circular)
+        others = tuple(range(1, tries[0].ndim))
+        mean = np.mean([side.mean(axis=others) for side in tries], axis=0)
+        if self.where == "tried":
+            return np.asarray(mean > TWICE * enough)
+        best = _sides(levels.argmax(axis=1).reshape(shape), axis, circular)
+        both = np.minimum(*(side.sum(axis=-1, dtype=np.float64) for side in tries))
+        varied = np.where(best[0] != best[1], both, 0.0).sum(axis=others[:-1])
+        varied[mean <= enough] = 0.0
+        # The fewest that have half of the variation among them.
+        order = np.argsort(-varied, kind="stable")
+        until = np.searchsorted(np.cumsum(varied[order]), varied.sum() / 2)
+        chosen = np.zeros(varied.size, np.bool_)
+        chosen[order[: until + 1]] = True
+        return np.asarray(chosen & (varied > 0.0))
+
+    def restore(self, turn: NDArray[Any]) -> None:
+        """Take over whose turn it is, perhaps from a stranger's file.
 
         Raises:
-            ValueError: it is not one.
+            ValueError: it is not such a number.
         """
-        if splits.shape != () or splits.dtype.kind not in "iu" or splits < 0:
-            raise ValueError("splits must be a number >= 0")
-        self.splits = int(splits)
+        if turn.shape != () or turn.dtype.kind not in "iu" or turn < 0:
+            raise ValueError("growth_turn must be a number >= 0")
+        self.turn = int(turn)
+
+
+def _sides(
+    of_cells: NDArray[Any], axis: int, circular: bool
+) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Split what belongs to cells into both sides of each interval of an axis.
+
+    Returns:
+        What belongs to the lower and to the upper centre of each interval, which are
+        the first axis of both.
+    """
+    lines = np.moveaxis(of_cells, axis, 0)
+    if circular:
+        lines = np.concatenate([lines, lines[:1]])
+    return lines[:-1], lines[1:]
 
 
 def carried_with_known(

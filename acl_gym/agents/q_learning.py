@@ -60,8 +60,9 @@ class QLearning(RememberingAgent):
         discount: gamma_rl, in [0, 1].
         epsilon: probability of a random action, in [0, 1].
         trace_decay: lambda, in [0, 1]; 0 is plain Q-learning.
-        traces: what a visit with degree beta makes of a trace e, after its fading. `"replacing"` makes it max(e, beta): at most 1, so that no
-            error is corrected by more than the learning rate. `"accumulating"` makes
+        traces: what a visit with degree beta makes of a trace e, after its fading.
+            `"replacing"` makes it max(e, beta): at most 1, so that no error is
+            corrected by more than the learning rate. `"accumulating"` makes
             it e + beta: a slot that stands still against a wall comes to
             1 / (1 - gamma_rl lambda), which times the learning rate can exceed 1, and
             then the value moves further than the error.
@@ -76,8 +77,9 @@ class QLearning(RememberingAgent):
         optimism: in [0, 1], what pairs promise that were never tried: with 0 the value
             of a good state, with 1 the most that could be had. None: they stay at 0.
         grows: whether the partition becomes wider and finer.
+        grows_where: where cells are halved first, see `ReturningACL`.
         visits_to_grow: how many steps must be remembered for each pair and state variable
-            before the partition becomes finer along one variable, > 0.
+            on the average before all cells are halved along one variable, > 0.
         max_cells: the partition does not become finer than this, in [1, 2e9].
         max_steps: the longest an episode may last, >= 1. None takes the time limit of
             the environment, or 300 if it has none.
@@ -151,6 +153,7 @@ class QLearning(RememberingAgent):
         memory_size: int = 100_000,
         optimism: float | None = None,
         grows: bool = False,
+        grows_where: str = "tried",
         visits_to_grow: float = 5.0,
         max_cells: int = 20_000,
         max_steps: int | None = None,
@@ -171,6 +174,7 @@ class QLearning(RememberingAgent):
             env,
             partition,
             grows=grows,
+            grows_where=grows_where,
             memory_size=memory_size,
             max_steps=max_steps,
             seed=seed,
@@ -370,6 +374,7 @@ class QLearning(RememberingAgent):
             "memory_size": self.memory_size,
             "optimism": self.optimism,
             "grows": self.grows,
+            "grows_where": self.grows_where,
             "visits_to_grow": self.visits_to_grow,
             "max_cells": self.max_cells,
             "max_steps": self.max_steps,

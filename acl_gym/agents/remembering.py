@@ -33,6 +33,7 @@ class RememberingAgent(TabularAgent):
         partition: turns observations into cells and degrees. None: it is chosen; one
             that grows begins coarse.
         grows: whether the partition becomes wider and finer.
+        grows_where: where it becomes finer first, see `Growth`.
         memory_size: how many states are remembered, >= 1.
         max_steps: see `TabularAgent`.
         seed: see `TabularAgent`.
@@ -58,13 +59,14 @@ class RememberingAgent(TabularAgent):
         partition: Partition | None,
         *,
         grows: bool,
+        grows_where: str,
         memory_size: int,
         max_steps: int | None,
         seed: int | None,
         n_actions: int | None,
         **of_other_bases: Any,
     ) -> None:
-        self._growth = Growth(grows)
+        self._growth = Growth(grows, grows_where)
         self._kept_memory: Memory | None = None
         self.memory_size = memory_size
         if partition is None and self.grows and env is not None:
@@ -124,6 +126,15 @@ class RememberingAgent(TabularAgent):
         self._growth.on = value
 
     @property
+    def grows_where(self) -> str:
+        """Where the partition becomes finer first: "tried", "varied" or "everywhere"."""
+        return self._growth.where
+
+    @grows_where.setter
+    def grows_where(self, value: str) -> None:
+        self._growth.where = value
+
+    @property
     def remembered_steps(self) -> int:
         """How many steps are remembered."""
         return 0 if self._kept_memory is None else self._kept_memory.n_steps
@@ -141,9 +152,13 @@ class RememberingAgent(TabularAgent):
         self._table[~self._known] = level
 
     def _split(self) -> None:
-        """Halve the cells along the next variable if there is evidence for finer ones."""
+        """Halve cells along the next variable if there is evidence for finer ones."""
         finer = self._growth.finer(
-            self.partition, self._memory.evidence, self.visits_to_grow, self.max_cells
+            self.partition,
+            self._memory.evidence,
+            self._table,
+            self.visits_to_grow,
+            self.max_cells,
         )
         self._grow_to(finer)
 
@@ -168,8 +183,8 @@ class RememberingAgent(TabularAgent):
         if not self._remembers:
             return {}
         remembered = {f"memory_{n}": a for n, a in self._memory.arrays().items()}
-        splits = np.array(self._growth.splits)
-        return {"known": self._known, "splits": splits, **remembered}
+        turn = np.array(self._growth.turn)
+        return {"known": self._known, "growth_turn": turn, **remembered}
 
     def _restore(
         self, header: dict[str, Any], arrays: Mapping[str, NDArray[Any]]
@@ -181,7 +196,7 @@ class RememberingAgent(TabularAgent):
         if known.shape != self._table.shape or known.dtype.kind != "b":
             raise ValueError("the array known does not fit the table")
         self._known[:] = known
-        self._growth.restore(arrays["splits"])
+        self._growth.restore(arrays["growth_turn"])
         self._memory.restore(with_prefix("memory_", arrays))
 
     def _state(self) -> Any:
@@ -191,12 +206,12 @@ class RememberingAgent(TabularAgent):
             self.partition,
             self._ranks,
             self._known.copy(),
-            self._growth.splits,
+            self._growth.turn,
             None if kept is None else kept.copy(),
         )
 
     def _take_over(self, table: FloatArray, state: Any) -> None:
-        partition, ranks, known, self._growth.splits, memory = state
+        partition, ranks, known, self._growth.turn, memory = state
         if partition is not self.partition:
             self._set_partition(partition, table.copy(), known.copy())
         self._table[:], self._known[:] = table, known

@@ -70,10 +70,16 @@ class ReturningACL(RememberingAgent, ColonyAgent):
             Ants that have not finished go on from where they are.
         memory_size: how many states are remembered, >= 1.
         visits_to_grow: how many steps must be remembered for each pair and state variable
-            before the partition becomes finer along one variable, > 0.
+            on the average before all cells are halved along one variable, > 0.
         max_cells: the partition does not become finer than this, >= 1.
         grows: whether the partition becomes wider and finer. None: if it was chosen for
             you.
+        grows_where: where cells are halved first, along one variable, each in turn.
+            `"tried"`: between centres where pairs have been tried twice as often as
+            `visits_to_grow` asks for. `"varied"`: of those that have been tried often
+            enough, where the policy varies most (§7.3). `"everywhere"`: not before the
+            pairs have been tried often enough on the average; then all cells are halved,
+            whatever this says.
         restart_after: after how many steps all ants set out anew, though they have not
             finished, >= 1. None takes 60 where they start anywhere, and never does so
             where all start in the same place, see `acl_gym.colony.starts`.
@@ -170,6 +176,7 @@ class ReturningACL(RememberingAgent, ColonyAgent):
         visits_to_grow: float = 5.0,
         max_cells: int = 20_000,
         grows: bool | None = None,
+        grows_where: str = "tried",
         restart_after: int | None = None,
         schedule: str = "synchronous",
         max_steps: int | None = None,
@@ -194,6 +201,7 @@ class ReturningACL(RememberingAgent, ColonyAgent):
             env,
             partition,
             grows=partition is None if grows is None else grows,
+            grows_where=grows_where,
             memory_size=memory_size,
             schedule=schedule,
             max_steps=max_steps,
@@ -361,6 +369,7 @@ class ReturningACL(RememberingAgent, ColonyAgent):
             "visits_to_grow": self.visits_to_grow,
             "max_cells": self.max_cells,
             "grows": self.grows,
+            "grows_where": self.grows_where,
             "restart_after": self.restart_after,
             "schedule": self.schedule,
             "max_steps": self.max_steps,

@@ -337,7 +337,7 @@ def test_values_that_overflow_in_memory_are_refused() -> None:
     ("name", "change"),
     [
         ("known", lambda a: a[1:]),
-        ("splits", lambda a: a - 10),
+        ("growth_turn", lambda a: a - 10),
         ("memory_last", lambda a: -a),
     ],
 )

@@ -258,7 +258,7 @@ def test_bad_parameters_are_refused(keywords: dict[str, Any], words: str) -> Non
         ("memory_seen", lambda a: a * np.inf),
         ("memory_terminated", lambda a: a[1:]),
         ("known", lambda a: a[1:]),
-        ("splits", lambda a: a - 10),
+        ("growth_turn", lambda a: a - 10),
     ],
 )
 def test_memories_from_strangers_are_checked(

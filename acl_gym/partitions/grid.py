@@ -11,6 +11,13 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import ArrayLike, NDArray
 
+from acl_gym.partitions.angles import Angles, periods_with_angles
+from acl_gym.partitions.axes import (
+    check_spans,
+    checked_centres,
+    checked_periods,
+    regular_rate,
+)
 from acl_gym.partitions.base import (
     MOST_CELLS,
     FixedPartition,
@@ -36,16 +43,22 @@ class Grid(FixedPartition):
             more variables, one or more centres each.
         periods: for each variable its period if it is circular (2 pi for an angle),
             else None. None for all: no variable is circular.
+        angles: for each variable that is observed as a cosine and a sine the numbers of
+            these two in an observation, see `Angles`; its period is 2 pi. With
+            `angles=[(0, 1)]` an observation (cos, sin, velocity) is in the cells of two
+            variables, angle and velocity.
 
     Raises:
         ValueError: centres that do not increase strictly or are not finite, or that
-            span a full period; a period that is not positive.
+            span a full period; a period that is not positive; angles that are no pairs
+            of numbers of an observation.
     """
 
     fuzzy: ClassVar[bool]
     _fixed = (
         "centres",
         "periods",
+        "angles",
         "n_cells",
         "cells_per_state",
         "state_ndim",
@@ -60,6 +73,7 @@ class Grid(FixedPartition):
         self,
         centres: Sequence[ArrayLike],
         periods: Sequence[float | None] | None = None,
+        angles: Sequence[tuple[int, int]] = (),
     ) -> None:
         given = validation.elements(centres)
         if given is None or (isinstance(centres, np.ndarray) and centres.ndim == 1):
@@ -67,10 +81,13 @@ class Grid(FixedPartition):
                 "centres must be one sequence for each state variable, got "
                 f"{validation.shown(centres)}; pass [sequence] for a single variable."
             )
-        axes = [_checked_centres(axis, values) for axis, values in enumerate(given)]
+        axes = [checked_centres(axis, values) for axis, values in enumerate(given)]
         if not axes:
             raise ValueError("centres must hold one or more state variables, got none.")
-        lengths = _checked_periods(periods, axes)
+        self._angles = Angles(angles, len(axes))
+        self.angles = self._angles.pairs
+        lengths = periods_with_angles(checked_periods(periods, axes), self._angles)
+        check_spans(axes, lengths)
         self.centres = tuple(map(validation.read_only, axes))
         self.periods = tuple(lengths)
         self._cells = tuple(axis.size for axis in axes)
@@ -103,7 +120,7 @@ class Grid(FixedPartition):
             tuple(counts),
             tuple(self._cells[i] for i in self._varied),
             tuple(lengths[i] or 0.0 for i in self._varied),
-            tuple(_regular_rate(axis) for axis in edges),
+            tuple(regular_rate(axis) for axis in edges),
         )
 
     @classmethod
@@ -173,7 +190,7 @@ class Grid(FixedPartition):
         Raises:
             ValueError: the observations of `space` are not states of the partition.
         """
-        dimensions = len(self.centres)
+        dimensions = self._angles.n_observed
         if not isinstance(space, spaces.Box) or space.shape != (dimensions,):
             raise ValueError(
                 f"{self!r} takes observations from a Box of shape ({dimensions},), "
@@ -181,6 +198,19 @@ class Grid(FixedPartition):
                 "env.single_observation_space, "
                 "or let automatic_partition(env) do it."
             )
+
+    @property
+    def columns(self) -> tuple[int, ...]:
+        """Of each variable its number in an observation; of an angle its cosine's."""
+        return self._angles.columns
+
+    def variables(self, observations: NDArray[Any]) -> NDArray[Any]:
+        """The variables that observations show, `(n, d)`: angles for their cosines."""
+        return self._angles.variables(observations)
+
+    def observations(self, variables: FloatArray) -> FloatArray:
+        """What shows these variables, `(n, d)`: cosines and sines for angles."""
+        return self._angles.observations(variables)
 
     def refine(self, axis: int, centres: ArrayLike) -> Self:
         """Return the partition with centres of your choice added along one axis.
@@ -203,7 +233,18 @@ class Grid(FixedPartition):
         distance = np.abs(added[:, None] - there).min(axis=1)
         new = added[distance > 1e-9 * max(np.ptp(there), np.ptp(added))]
         axes[axis] = np.union1d(there, new)
-        return type(self)(axes, self.periods)
+        return self.with_centres(axes)
+
+    def with_centres(self, centres: Sequence[ArrayLike]) -> Self:
+        """Return a partition of the same variables with other centres.
+
+        Args:
+            centres: as in the constructor.
+
+        Raises:
+            ValueError: see the constructor.
+        """
+        return type(self)(centres, self.periods, self.angles)
 
     def refined(
         self, axis: int, intervals: Sequence[bool] | BoolArray | None = None
@@ -243,7 +284,7 @@ class Grid(FixedPartition):
                 )
             middles = middles[chosen]
         axes[axis] = np.sort(np.concatenate([axes[axis], middles]))
-        return type(self)(axes, self.periods)
+        return self.with_centres(axes)
 
     def _checked_axis(self, axis: int) -> int:
         most = len(self.centres) - 1
@@ -256,7 +297,7 @@ class Grid(FixedPartition):
         index: CellArray,
         degree: FloatArray,
     ) -> None:
-        dimensions = len(self.centres)
+        dimensions = self._angles.n_observed
         if type(states) is not np.ndarray:
             check_states(states)
         if states.ndim != 2 or states.shape[1] != dimensions:
@@ -266,9 +307,11 @@ class Grid(FixedPartition):
         if states.dtype is not _FLOAT:
             states = _as_float64(states)
         seen, bad = states, -1
-        if len(self._varied) < dimensions:
-            bad = _first_not_finite(states, slots)
-            seen = np.take(states, self._varied, axis=1)
+        if self.angles:
+            seen = self.variables(states)
+        if len(self._varied) < len(self.centres):
+            bad = _first_not_finite(seen, slots)
+            seen = np.take(seen, self._varied, axis=1)
         if bad == -1:
             find = locate
             if threads.worth_it(slots.size):
@@ -291,23 +334,27 @@ class Grid(FixedPartition):
             )
 
     def cell_states(self) -> FloatArray:
-        """The centres of all cells, `(n_cells, d)`, in the order of (4.8).
+        """The centres of all cells as observations, in the order of (4.8).
+
+        They are `(n_cells, d)`, with d numbers in an observation.
 
         Raises:
             ValueError: they do not fit into memory.
         """
-        dimensions = len(self.centres)
-        check_memory_of_states(self.n_cells, dimensions)
+        check_memory_of_states(self.n_cells, self._angles.n_observed)
         mesh = np.meshgrid(*self.centres, indexing="ij")
-        return np.stack(mesh, axis=-1).reshape(-1, dimensions)
+        return self.observations(np.stack(mesh, axis=-1).reshape(self.n_cells, -1))
 
     def settings(self) -> dict[str, Any]:
         """See `Partition.settings`."""
-        return {
+        settings: dict[str, Any] = {
             "type": type(self).__name__,
             "centres": [axis.tolist() for axis in self.centres],
             "periods": list(self.periods),
         }
+        if self.angles:
+            settings["angles"] = [list(pair) for pair in self.angles]
+        return settings
 
     def _variables(self) -> list[tuple[Any, ...]]:
         return [
@@ -322,7 +369,8 @@ class Grid(FixedPartition):
         """Name, cells along each axis, and which axes are circular."""
         shape = " x ".join(str(n) for n in self._cells)
         rounds = [axis for axis, p in enumerate(self.periods) if p is not None]
-        return f"{type(self).__name__}({shape} cells, circular={rounds})"
+        seen = f", angles={list(self.angles)}" if self.angles else ""
+        return f"{type(self).__name__}({shape} cells, circular={rounds}{seen})"
 
 
 @trusted
@@ -335,6 +383,7 @@ class Crisp(Grid):
     Args:
         centres: for each state variable its centres, strictly increasing.
         periods: for each variable its period if circular, else None.
+        angles: which variables are observed as cosine and sine, see `Grid`.
     """
 
     fuzzy = False
@@ -351,6 +400,7 @@ class Fuzzy(Grid):
     Args:
         centres: for each state variable its centres, strictly increasing.
         periods: for each variable its period if circular, else None.
+        angles: which variables are observed as cosine and sine, see `Grid`.
     """
 
     fuzzy = True
@@ -383,58 +433,6 @@ def _first_not_finite(states: FloatArray, slots: IntArray) -> int:
         return OUTSIDE
     finite = np.isfinite(states[slots]).all(axis=1)
     return -1 if finite.all() else int(slots[np.argmin(finite)])
-
-
-def _checked_centres(axis: int, values: ArrayLike) -> FloatArray:
-    centres = validation.real_array(f"centres[{axis}]", values, ndim=1)
-    with np.errstate(over="ignore", divide="ignore"):
-        gaps = np.diff(centres)
-        usable = np.isfinite(gaps) & np.isfinite(1.0 / gaps)
-    if (falls := np.flatnonzero(gaps <= 0)).size:
-        i = int(falls[0])
-        raise ValueError(
-            f"centres[{axis}] must increase strictly, got {centres[i]:g} followed by "
-            f"{centres[i + 1]:g} at position {i}; sort them and drop duplicates."
-        )
-    if not usable.all():
-        raise ValueError(
-            f"centres[{axis}] must be further apart than 1e-307 and closer than "
-            f"1e307, got {validation.shown(values)}."
-        )
-    return centres
-
-
-def _checked_periods(
-    periods: Sequence[float | None] | None, axes: list[FloatArray]
-) -> list[float | None]:
-    if periods is None:
-        return [None] * len(axes)
-    if not isinstance(periods, Sequence) or len(periods) != len(axes):
-        raise ValueError(
-            f"periods must hold one entry for each of the {len(axes)} variables, "
-            f"got {validation.shown(periods)}."
-        )
-    lengths: list[float | None] = []
-    for axis, period in enumerate(periods):
-        if period is not None:
-            period = validation.number(f"periods[{axis}]", period, above=0)
-            span = float(axes[axis][-1] - axes[axis][0])
-            if span >= period:
-                raise ValueError(
-                    f"centres[{axis}] must span less than their period {period:g}, "
-                    f"got {span:g}; leave out the centre that repeats the first."
-                )
-        lengths.append(period)
-    return lengths
-
-
-def _regular_rate(edges: FloatArray) -> float:
-    """1 / spacing where the spacing is constant to rounding, else 0."""
-    if edges.size < 2:
-        return 0.0
-    gaps = np.diff(edges)
-    regular = np.allclose(gaps, gaps.mean(), rtol=1e-9, atol=0.0)
-    return float(1.0 / gaps.mean()) if regular else 0.0
 
 
 KINDS: dict[str, type[Crisp | Fuzzy]] = {"crisp": Crisp, "fuzzy": Fuzzy}

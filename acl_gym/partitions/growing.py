@@ -12,6 +12,7 @@ from gymnasium import spaces
 from numpy.typing import ArrayLike
 
 from acl_gym.envs.control.lookup import system_of
+from acl_gym.partitions.angles import find_angles
 from acl_gym.partitions.automatic import centres_for
 from acl_gym.partitions.base import Partition, locate_all
 from acl_gym.partitions.bounds import Env, observation_space, real_box
@@ -72,6 +73,9 @@ def initial_partition(env: Env) -> Partition:
 def widened(grid: AnyGrid, states: FloatArray, space: spaces.Box) -> AnyGrid | None:
     """Return the grid over the range that is seen, where that is wider than its own.
 
+    While nothing is known of the range of variables, those that turn out to be cosine and
+    sine of an angle become one circular variable (`acl_gym.partitions.angles`).
+
     The centres of a variable whose range changes are spread evenly over the new range,
     as many as before; a variable with one centre that is seen to vary gets as many as
     `COARSE` says.
@@ -84,11 +88,15 @@ def widened(grid: AnyGrid, states: FloatArray, space: spaces.Box) -> AnyGrid | N
     Returns:
         The wider grid, or None if nothing was seen beyond the outermost centres.
     """
-    least, most = declared_bounds(space)
-    low, high = states.min(axis=0), states.max(axis=0)
-    if not np.isfinite([low, high]).all():
+    if not np.isfinite([states.min(axis=0), states.max(axis=0)]).all():
         return None  # whoever locates these states refuses them
-    axes, wider = list(grid.centres), False
+    angled = _with_angles(grid, states)
+    wider, grid = angled is not None, angled or grid
+    columns = list(grid.columns)
+    least, most = (bounds[columns] for bounds in declared_bounds(space))
+    variables = grid.variables(states)
+    low, high = variables.min(axis=0), variables.max(axis=0)
+    axes = list(grid.centres)
     for axis, line in enumerate(axes):
         beyond = low[axis] < line[0] or high[axis] > line[-1]
         if grid.periods[axis] is not None or not beyond:
@@ -107,7 +115,29 @@ def widened(grid: AnyGrid, states: FloatArray, space: spaces.Box) -> AnyGrid | N
         if last > first and (first < line[0] or last > line[-1]):
             axes[axis] = np.linspace(first, last, count)
             wider = True
-    return type(grid)(axes, grid.periods) if wider else None
+    return grid.with_centres(axes) if wider else None
+
+
+def _with_angles(grid: AnyGrid, states: FloatArray) -> AnyGrid | None:
+    """Make one circular variable of each two that are seen to be cosine and sine.
+
+    Only of those that have one centre each: nothing was learned of them yet.
+    """
+    if grid.angles:
+        return None
+    lone = [axis for axis, line in enumerate(grid.centres) if line.size == 1]
+    pairs = [(lone[i], lone[j]) for i, j in find_angles(states[:, lone])]
+    if not pairs:
+        return None
+    sine_of = dict(pairs)
+    kept = [a for a in range(len(grid.centres)) if a not in sine_of.values()]
+    number = centres_for(COARSE, len(kept))
+    circle = np.linspace(-np.pi, np.pi, number + 1, endpoint=False)
+    return type(grid)(
+        [circle if axis in sine_of else grid.centres[axis] for axis in kept],
+        [grid.periods[axis] for axis in kept],
+        pairs,
+    )
 
 
 def carried_over(table: ArrayLike, old: Partition, new: Partition) -> FloatArray:

@@ -151,7 +151,8 @@ def partition_from_settings(settings: dict[str, Any]) -> Partition:
                 f"a fuzzy partition must have at most {_MOST_VARIABLES} variables, got "
                 f"{len(settings['centres'])}."
             )
-        return grids[kind](settings["centres"], settings["periods"])
+        angles = settings.get("angles", ())
+        return grids[kind](settings["centres"], settings["periods"], angles)
     except (KeyError, TypeError) as error:
         raise ValueError(
             "settings must describe one of ['Crisp', 'Discrete', 'Fuzzy'], got "

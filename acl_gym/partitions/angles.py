@@ -98,7 +98,8 @@ class Angles:
         for axis in self.circular:
             cosine, sine = variables[:, axis], given[:, self._sines[axis]]
             angle = np.arctan2(sine, cosine)
-            variables[:, axis] = np.where(np.isfinite(cosine + sine), angle, np.nan)
+            good = np.isfinite(cosine) & np.isfinite(sine)
+            variables[:, axis] = np.where(good, angle, np.nan)
         return variables
 
     def observations(self, variables: FloatArray) -> FloatArray:

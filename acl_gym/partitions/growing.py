@@ -22,8 +22,9 @@ from acl_gym.utils import validation
 from acl_gym.utils.boxes import declared_bounds
 from acl_gym.utils.typing import FloatArray
 
-COARSE = {1: 21, 2: 9, 3: 6, 4: 5, 5: 4, 6: 3}
-"""Number of variables -> centres of each to begin with: at most about a thousand cells."""
+COARSE = {1: 21, 2: 9, 3: 7, 4: 7, 5: 5, 6: 3}
+"""Number of variables -> centres of each to begin with: a few thousand cells at most. They
+are odd, so that the middle of a range that is symmetric is a centre."""
 
 MARGIN = 0.1
 """A range that has become too narrow is widened by this share of it beyond what was seen,

@@ -200,7 +200,9 @@ def main(arguments: list[str] | None = None) -> int:
         "--tasks",
         type=_names,
         default=list(TASKS),
-        help=f"some of {'; '.join(TASKS)}, with semicolons (default: all)",
+        help=f"some of {'; '.join(TASKS)}, with semicolons (default: all)".replace(
+            "%", "%%"
+        ),
     )
     parser.add_argument(
         "--seeds",

@@ -150,7 +150,7 @@ class QLearning(RememberingAgent):
         replay: int = 0,
         older_steps: int = 10_000,
         steps_per_replay: int = 300,
-        memory_size: int = 100_000,
+        memory_size: int = 300_000,
         optimism: float | None = None,
         grows: bool = False,
         grows_where: str = "tried",

@@ -172,7 +172,7 @@ class ReturningACL(RememberingAgent, ColonyAgent):
         walks_back: int = 10,
         older_steps: int = 10_000,
         steps_per_walk: int = 300,
-        memory_size: int = 100_000,
+        memory_size: int = 300_000,
         visits_to_grow: float = 5.0,
         max_cells: int = 20_000,
         grows: bool | None = None,

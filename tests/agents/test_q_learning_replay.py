@@ -216,7 +216,7 @@ def test_untried_pairs_promise_what_could_be_had() -> None:
 
 def test_the_partition_grows_with_what_is_seen() -> None:
     env = gymnasium_env("CartPole-v1")
-    agent = QLearning(env, grows=True, visits_to_grow=1.0, trace_decay=0.5, seed=3)
+    agent = QLearning(env, grows=True, visits_to_grow=0.1, trace_decay=0.5, seed=3)
     assert agent.partition.n_cells == 1
     agent.learn(trials=1)
     seen = agent._memory._rows["seen"][: int(agent._memory.last[-1]) + 1]

@@ -191,7 +191,7 @@ def test_a_time_out_promises_what_the_last_state_promises() -> None:
 
 
 def test_the_partition_grows_with_what_is_seen() -> None:
-    colony = make("cart-pole", visits_to_grow=1.0)
+    colony = make("cart-pole", visits_to_grow=0.1)
     begun = colony.partition
     assert begun.n_cells == 1
     colony.learn(trials=1)

@@ -6,6 +6,8 @@ Each is taken away from `ReturningACL` with its defaults, and nothing else is ch
 - the latest: likewise, and levels follow what was laid last, not the mean over all that
   was tried, which the newest paths alone change little (trust = 0);
 - no growth: cells of a fixed grid that is about as fine as the grown one becomes;
+- doubling: all cells are halved at a time, and none sooner where much was tried;
+- varied: cells are halved sooner where the policy varies (§7.3), not where much was tried;
 - no ants: Q-learning with the same memory, as many replays, the same growth and the
   same optimism. It learns from one remembered step after the other, each on the values
   as they then are, where ants all lay on the same levels and are merged;
@@ -128,6 +130,11 @@ def on_fixed_cells(task: Task, seed: int) -> ReturningACL | None:
     return ReturningACL(env, grid, grows=False, seed=seed)
 
 
+def growing(task: Task, seed: int, where: str) -> ReturningACL | None:
+    """With growth in other places first; None where there is none."""
+    return None if task.fixed is None else colony(task, seed, grows_where=where)
+
+
 SEQUENTIAL = {
     "discount": 0.99,
     "epsilon": 0.1,
@@ -165,6 +172,8 @@ VARIANTS: dict[str, Callable[[Task, int], TabularAgent | None]] = {
         task, seed, older_steps=0, walks_back=1, trust=0.0
     ),
     "no growth": on_fixed_cells,
+    "doubling": lambda task, seed: growing(task, seed, "everywhere"),
+    "varied": lambda task, seed: growing(task, seed, "varied"),
     "no ants": without_ants,
     "none": alone,
 }

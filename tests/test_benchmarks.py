@@ -75,13 +75,13 @@ def test_policy_export() -> None:
 
 
 def test_ablation() -> None:
-    """Where a state is a cell nothing grows, so that one variant is left out."""
+    """Where a state is a cell nothing grows, so that three variants are left out."""
     arguments = ["--tasks", "grid,pendulum", "--steps", "1500"]
     rows = output_of("ablation.py", *arguments, "--seeds", "1")["rows"]
     assert [row["variant"] for row in rows if row["task"] == "grid"] == [
         *("returning", "no memory", "the latest", "no ants", "none"),
     ]
-    assert len(rows) == 5 + 6
+    assert len(rows) == 5 + 8
     for row in rows:
         assert row["best"] >= row["last"]
         assert row["runs"][0]["steps"] >= 1500

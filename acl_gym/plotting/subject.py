@@ -190,7 +190,7 @@ def subject_of(
             that of the agent, if it has one.
         labels: names of the state variables, with their units in brackets at the end;
             None takes those of a system of this package, or "state 1", "state 2", ...,
-            and "angle of states 1 and 2 (rad)" where these are its cosine and sine.
+            and "angle 1 (rad)" where state 1 is its cosine.
         actions: names of all actions; None takes those of the system, or
             "action 0", "action 1", ...
 
@@ -357,16 +357,15 @@ def _own_names(
     known = () if signals is None else signals.observations
     if len(known) != count + len(angles):
         known = ()
-    sine_of = dict(angles)
+    cosines, sines = zip(*angles, strict=True) if angles else ((), ())
     names = []
     for column in range(count + len(angles)):
-        if column in sine_of.values():
+        if column in sines:
             continue
         name = _with_unit(known[column]) if known else f"state {column + 1}"
-        if column in sine_of:
-            both = f"states {column + 1} and {sine_of[column] + 1}"
-            shown = known[column].split(", ")[0] if known else both
-            name = f"angle of {shown} (rad)"
+        if column in cosines:
+            whose = f"of {known[column].split(', ')[0]}" if known else f"{column + 1}"
+            name = f"angle {whose} (rad)"
         names.append(name)
     return names
 

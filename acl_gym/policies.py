@@ -169,11 +169,14 @@ class PartitionPolicy(Fixed, ABC):
 
         p = dict(np.load("policy.npz"))
         lines = [p[f"centres_{axis}"] for axis in range(p["periods"].size)]
+        axes = list(zip(p["columns"], p["sines"], lines, p["periods"]))
 
 
         def act(observation):
+            seen = np.ravel(observation).astype(float)
             corners = [((), 1.0)]  # the cells around the observation, and their degrees
-            for x, line, period in zip(np.ravel(observation), lines, p["periods"]):
+            for column, sine, line, period in axes:
+                x = np.arctan2(seen[sine], seen[column]) if sine >= 0 else seen[column]
                 x = x - period * np.floor((x - line[0]) / period) if period else x
                 low = np.searchsorted(line[1:-1], x, "right")
                 up = np.clip((x - line[low]) / (line[low + 1] - line[low]), 0, 1)
@@ -214,7 +217,8 @@ class PartitionPolicy(Fixed, ABC):
         """Write the greedy policy as one C99 header, also for C++.
 
         `name_action(x)` returns the action for the observation `x`. It allocates
-        nothing, needs no library (`cc -std=c99 -O2 main.c -o main`, without `-lm`), and
+        nothing, needs no library (`cc -std=c99 -O2 main.c -o main`, without `-lm`, which
+        only atan2 needs, for observations that show an angle as cosine and sine), and
         keeps its tables in read-only memory: a byte for each cell of a crisp or discrete
         policy, n_actions numbers and a byte or two for each cell of a fuzzy one. The
         comment at the head of the file states the units, the memory, the work of a call
@@ -223,9 +227,10 @@ class PartitionPolicy(Fixed, ABC):
         Where it is known, the table `name_inputs` holds the input values that each
         action stands for.
 
-        With "double" the actions are those of `predict` to the bit. With "float", half
-        the memory, they differ only where rounding to a float, one part in 10^7, moves
-        an observation across a border between two actions. An observation that
+        With "double" the actions are those of `predict` to the bit, unless atan2 of the C
+        library differs from NumPy's in the last place, at a border between two actions.
+        With "float", half the memory, they differ only where rounding to a float, one
+        part in 10^7, moves an observation across such a border. An observation that
         `predict` refuses (NaN, infinite, out of the range of a discrete variable) gives
         `name_INVALID`.
 

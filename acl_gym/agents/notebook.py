@@ -93,7 +93,8 @@ def _picture(agent: Any, policy: IntArray) -> str:
     where = ""
     if len(sizes) > 2:
         across, up = sorted(wide)
-        where = f", variables {across + 1} and {up + 1}, others in the middle"
+        both = f"{_number(agent.partition, across)} and {_number(agent.partition, up)}"
+        where = f", variables {both}, others in the middle"
     names, values = _actions(agent)
     colours = pictures.action_colours(agent.n_actions, values)
     pixels = np.array([pictures.rgb(colour) for colour in colours], dtype=np.uint8)
@@ -125,6 +126,15 @@ def _actions(agent: Any) -> tuple[list[str], list[float] | None]:
     values = [row[0] for row in signals.values]
     unit = signals.inputs[0].split(", ")[1:2]
     return [" ".join([signed(value), *unit]) for value in values], values
+
+
+def _number(partition: Partition, axis: int) -> str:
+    """Which variable it is, from 1, and whether it is an angle."""
+    if isinstance(partition, Grid):
+        cosines = [cosine for cosine, _ in partition.angles]
+        if partition.columns[axis] in cosines:
+            return f"{axis + 1} (angle)"
+    return f"{axis + 1}"
 
 
 def _sizes(partition: Partition) -> list[int]:

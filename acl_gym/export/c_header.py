@@ -98,7 +98,12 @@ def c_header(source: Source, name: str, precision: str, file_name: str) -> str:
         kind=source.kind,
         state_type=state_type,
         order_type=order_type,
+        observed=source.angles.n_observed,
         dimensions=dimensions,
+        columns=source.angles.columns,
+        angles=dict(source.angles.pairs),
+        variables="v" if source.angles.pairs else "x",
+        atan2=number.atan2,
         corners=2**dimensions,
         n_actions=source.n_actions,
         first_action=source.first_action,
@@ -107,7 +112,7 @@ def c_header(source: Source, name: str, precision: str, file_name: str) -> str:
         tables=tables.texts,
         bytes=f"{tables.bytes:,}",
         stack=_stack(source, number),
-        work=_work(source),
+        work=_work(source, number),
         file_name=sanitised(file_name),
         version=version("acl-gym"),
         **_words(source, number),
@@ -255,6 +260,8 @@ def _stack(source: Source, number: Number) -> int:
     """Bytes of the arrays and numbers that the functions declare."""
     d, n_actions = len(source.cells), source.n_actions
     locate = 2 * number.bytes + 20
+    if source.angles.pairs:
+        locate += d * number.bytes + 4  # the variables, and the number of one
     if source.kind == "discrete":
         return 8
     if source.kind == "crisp":
@@ -262,35 +269,53 @@ def _stack(source: Source, number: Number) -> int:
     return locate + d * (8 + number.bytes) + (n_actions + 2) * number.bytes + 32
 
 
-def _work(source: Source) -> str:
+def _work(source: Source, number: Number) -> str:
     """How many operations of real numbers a call takes at most."""
     d = len(source.cells)
     if source.kind == "discrete":
         return f"{2 * d} comparisons of integers"
+    angles = source.angles.pairs
     searches = sum((line.size - 1).bit_length() + 4 for line in source.lines)
+    searches += 2 * source.angles.n_observed if angles else 0
     divisions = d + sum(period > 0 for period in source.periods)
     multiplications = sum(period > 0 for period in source.periods)
     if source.kind == "fuzzy":
         multiplications += 2**d * (d + source.n_actions)
+    calls = ""
+    if angles:
+        plural = "s" if len(angles) > 1 else ""
+        calls = f", {len(angles)} call{plural} of {number.atan2}"
     return (
         f"at most {searches} comparisons of real numbers to locate x, {divisions} "
-        f"divisions,\n * {multiplications:,} multiplications"
+        f"divisions,\n * {multiplications:,} multiplications{calls}"
     )
+
+
+def _meanings(source: Source) -> list[str]:
+    """What each number of an observation is, and which values it takes."""
+    meanings = [""] * source.angles.n_observed
+    for axis, column in enumerate(source.angles.columns):
+        line, period = source.lines[axis], source.periods[axis]
+        ends = f"{line[0]:.10g} to {line[-1]:.10g}"
+        meanings[column] = f"centres {ends}"
+        if source.kind == "discrete":
+            meanings[column] = f"whole numbers {ends}"
+        elif period:
+            meanings[column] = f"circular, period {period!r}, any value"
+    for cosine, sine in source.angles.pairs:
+        meanings[cosine] = f"cosine of an angle, its sine is x[{sine}]"
+        meanings[sine] = f"sine of the angle with cosine x[{cosine}]"
+    return meanings
 
 
 def _words(source: Source, number: Number) -> dict[str, Any]:
     """What the comment at the head says in words."""
     discrete = source.kind == "discrete"
     names = source.signals.observations if source.signals else ()
-    observations = []
-    for axis, line in enumerate(source.lines):
-        period = source.periods[axis]
-        ends = f"{line[0]:.10g} to {line[-1]:.10g}"
-        what = f"whole numbers {ends}" if discrete else f"centres {ends}"
-        if period:
-            what = f"circular, period {period!r}, any value"
-        about = f": {names[axis]}" if names else ""
-        observations.append(sanitised(f"x[{axis}]{about}; {what}"))
+    observations = [
+        sanitised(f"x[{i}]{f': {names[i]}' if names else ''}; {what}")
+        for i, what in enumerate(_meanings(source))
+    ]
     actions = []
     for column in range(source.n_actions):
         meaning = ""
@@ -304,9 +329,12 @@ def _words(source: Source, number: Number) -> dict[str, Any]:
     beyond = "Values beyond the centres belong to the outermost cells."
     if discrete:
         beyond = "Other values have no action."
+    rounding = "rounding to float"
+    if source.angles.pairs:
+        rounding += ", or that of atan2f,"
     exactness = (
-        "The actions are those of the Python policy, except where rounding to float "
-        "moves an observation across a border between actions."
+        f"The actions are those of the Python policy, except where {rounding} moves an "
+        "observation across a border between actions."
     )
     if discrete:
         exactness = "The actions are those of the Python policy."
@@ -316,6 +344,14 @@ def _words(source: Source, number: Number) -> dict[str, Any]:
             "keeps to IEEE 754: -std=c99, or -ffp-contract=off where it fuses "
             "multiplication and addition."
         )
+        if source.angles.pairs:
+            exactness = (
+                "The actions are those of the Python policy, except where atan2 of the "
+                "C library and that of NumPy, which may differ in the last place, put an "
+                "observation on different sides of a border between actions; all else is "
+                "the same to the bit, if the compiler keeps to IEEE 754: -std=c99, or "
+                "-ffp-contract=off where it fuses multiplication and addition."
+            )
     cells = " x ".join(map(str, source.cells))
     return {
         "observations": observations,

@@ -23,6 +23,7 @@ class Number:
         bytes: of one number.
         largest: the macro of the largest finite number.
         whole_from: the literal from which on there are no fractions.
+        atan2: the function of <math.h>.
         integer: a type that holds all whole numbers below `whole_from`.
 
     Raises:
@@ -37,6 +38,7 @@ class Number:
         self.bytes = 4 if single else 8
         self.largest = "FLT_MAX" if single else "DBL_MAX"
         self.whole_from = self.literal(2.0**23 if single else 2.0**52)
+        self.atan2 = "atan2f" if single else "atan2"
         self.integer = "int32_t" if single else "int64_t"
 
     def rounded(self, values: FloatArray) -> NDArray[Any]:

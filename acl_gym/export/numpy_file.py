@@ -17,11 +17,14 @@ import numpy as np
 
 p = dict(np.load("policy.npz"))
 lines = [p[f"centres_{axis}"] for axis in range(p["periods"].size)]
+axes = list(zip(p["columns"], p["sines"], lines, p["periods"]))
 
 
 def act(observation):
+    seen = np.ravel(observation).astype(float)
     corners = [((), 1.0)]  # the cells around the observation, and their degrees
-    for x, line, period in zip(np.ravel(observation), lines, p["periods"]):
+    for column, sine, line, period in axes:
+        x = np.arctan2(seen[sine], seen[column]) if sine >= 0 else seen[column]
         x = x - period * np.floor((x - line[0]) / period) if period else x
         low = np.searchsorted(line[1:-1], x, "right")
         up = np.clip((x - line[low]) / (line[low + 1] - line[low]), 0, 1)
@@ -46,6 +49,8 @@ def numpy_arrays(source: Source) -> dict[str, NDArray[Any]]:
           repeats its first centre one period on, and a lone centre is followed by
           infinity, so that each has an interval;
         - `periods`: of each variable, 0 where it is not circular;
+        - `columns`: of each variable its number in an observation; `sines`: that of
+          its sine where it is an angle, whose cosine is in `columns`, else -1;
         - `fuzzy`: whether an observation belongs to all cells around it, or to the
           nearest;
         - `table`, `ranks`: values and preferences, an axis for each variable as long
@@ -57,6 +62,7 @@ def numpy_arrays(source: Source) -> dict[str, NDArray[Any]]:
     table = source.table.reshape(*source.cells, -1)
     ranks = source.ranks.reshape(table.shape)
     lines, periods = source.lines, np.array(source.periods)
+    columns, sine_of = source.angles.columns, dict(source.angles.pairs)
     for axis in np.flatnonzero(periods):
         table = np.concatenate([table, table.take([0], axis)], axis)
         ranks = np.concatenate([ranks, ranks.take([0], axis)], axis)
@@ -66,6 +72,8 @@ def numpy_arrays(source: Source) -> dict[str, NDArray[Any]]:
     }
     arrays |= {
         "periods": periods,
+        "columns": np.array(columns),
+        "sines": np.array([sine_of.get(column, -1) for column in columns]),
         "fuzzy": np.array(source.kind == "fuzzy"),
         "table": table,
         "ranks": ranks,

@@ -11,6 +11,7 @@ import numpy as np
 from acl_gym.colony.greedy import greedy_actions
 from acl_gym.envs.control.signals import Signals
 from acl_gym.partitions import Discrete, Grid, Partition
+from acl_gym.partitions.angles import Angles
 from acl_gym.utils.typing import FloatArray, IntArray, RankArray
 
 
@@ -24,6 +25,7 @@ class Source:
             period on. The possible values, where the kind is discrete.
         periods: of each variable, 0 where it is not circular.
         cells: the number of cells along each variable; the last one varies fastest.
+        angles: which numbers of an observation the variables are.
         table: `(n_cells, n_actions)`, values or levels.
         ranks: `(n_cells, n_actions)`, the order in which tied actions are preferred.
         first_action: the action that column 0 stands for.
@@ -34,6 +36,7 @@ class Source:
     lines: tuple[FloatArray, ...]
     periods: tuple[float, ...]
     cells: tuple[int, ...]
+    angles: Angles
     table: FloatArray
     ranks: RankArray
     first_action: int
@@ -55,15 +58,15 @@ class Source:
             table: `(n_cells, n_actions)`.
             ranks: `(n_cells, n_actions)`.
             first_action: the action that column 0 stands for.
-            signals: what observations and actions mean; names that fit another number
-                of variables are left out.
+            signals: what observations and actions mean; names of observations of
+                another size are left out.
 
         Raises:
             TypeError: the partition locates states by a method of its own.
             ValueError: the table holds NaN, or infinity in a fuzzy policy, or
                 `signals` fit another number of actions.
         """
-        kind, centres, given = _axes(partition)
+        kind, centres, given, angles = _axes(partition)
         # A lone centre takes every value, so it needs no period.
         periods = [
             0.0 if period is None or line.size == 1 else float(period)
@@ -85,7 +88,7 @@ class Source:
                 "inputs must hold a number or a row of numbers for each of the "
                 f"{table.shape[1]} actions, got {len(signals.values)}."
             )
-        if signals is not None and len(signals.observations) != len(lines):
+        if signals is not None and len(signals.observations) != angles.n_observed:
             signals = replace(signals, observations=())
         cells = tuple(line.size for line in centres)
         return cls(
@@ -93,6 +96,7 @@ class Source:
             tuple(lines),
             tuple(periods),
             cells,
+            angles,
             table,
             ranks,
             first_action,
@@ -125,19 +129,20 @@ class Source:
 
 def _axes(
     partition: Partition,
-) -> tuple[str, tuple[FloatArray, ...], tuple[float | None, ...]]:
-    """The kind of a partition; centres and period of each variable."""
+) -> tuple[str, tuple[FloatArray, ...], tuple[float | None, ...], Angles]:
+    """The kind of a partition; centres and period of each variable; its angles."""
     locate = type(partition).locate
     if isinstance(partition, Grid) and locate is Grid.locate:
         kind = "fuzzy" if partition.fuzzy else "crisp"
-        return kind, partition.centres, partition.periods
+        angles = Angles(partition.angles, len(partition.centres))
+        return kind, partition.centres, partition.periods, angles
     if isinstance(partition, Discrete) and locate is Discrete.locate:
         sizes, starts = partition.sizes.ravel(), partition.starts.ravel()
         lines = tuple(
             np.arange(start, start + size, dtype=np.float64)
             for start, size in zip(starts, sizes, strict=True)
         )
-        return "discrete", lines, (None,) * len(lines)
+        return "discrete", lines, (None,) * len(lines), Angles((), len(lines))
     raise TypeError(
         "only policies over Crisp, Fuzzy and Discrete partitions can be exported, got "
         f"{type(partition).__name__}, which locates states by a method of its own; "

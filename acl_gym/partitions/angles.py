@@ -97,9 +97,8 @@ class Angles:
         variables = given[:, self.columns]
         for axis in self.circular:
             cosine, sine = variables[:, axis], given[:, self._sines[axis]]
-            angle = np.arctan2(sine, cosine)
-            good = np.isfinite(cosine) & np.isfinite(sine)
-            variables[:, axis] = np.where(good, angle, np.nan)
+            finite = np.isfinite(cosine) & np.isfinite(sine)
+            variables[:, axis] = np.where(finite, np.arctan2(sine, cosine), np.nan)
         return variables
 
     def observations(self, variables: FloatArray) -> FloatArray:
@@ -126,17 +125,17 @@ def find_angles(observations: NDArray[Any]) -> list[tuple[int, int]]:
         Pairs of their numbers; none has a number twice.
     """
     given = np.asarray(observations, dtype=np.float64)
-    squares = given**2
     free = [
         column
         for column in range(given.shape[1])
-        if squares[:, column].max() <= 1.0 + ROUNDING and np.ptp(given[:, column]) > 0.0
+        if np.abs(given[:, column]).max() <= 1.0 + ROUNDING
+        and np.ptp(given[:, column]) > 0.0
     ]
     pairs = []
     while free:
         cosine = free.pop(0)
         for sine in free:
-            miss = squares[:, cosine] + squares[:, sine] - 1.0
+            miss = given[:, cosine] ** 2 + given[:, sine] ** 2 - 1.0
             if np.abs(miss).max() <= ROUNDING:
                 pairs.append((cosine, sine))
                 free.remove(sine)

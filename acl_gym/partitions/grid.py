@@ -357,13 +357,19 @@ class Grid(FixedPartition):
         return settings
 
     def _variables(self) -> list[tuple[Any, ...]]:
-        return [
-            (i + 1, axis.size, f"{axis[0]:.4g}", f"{axis[-1]:.4g}", note)
-            for i, (axis, period) in enumerate(
-                zip(self.centres, self.periods, strict=True)
-            )
-            for note in ["" if period is None else f"circular, period {period:.4g}"]
-        ]
+        sine_of = dict(self.angles)
+        rows: list[tuple[Any, ...]] = []
+        for i, (column, axis, period) in enumerate(
+            zip(self.columns, self.centres, self.periods, strict=True)
+        ):
+            note = "" if period is None else f"circular, period {period:.4g}"
+            if column in sine_of:
+                both = f"{column + 1} and {sine_of[column] + 1}"
+                note = f"angle, from observations {both}"
+            elif self.angles and column != i:
+                note = ", ".join(filter(None, [f"observation {column + 1}", note]))
+            rows.append((i + 1, axis.size, f"{axis[0]:.4g}", f"{axis[-1]:.4g}", note))
+        return rows
 
     def __repr__(self) -> str:
         """Name, cells along each axis, and which axes are circular."""

@@ -57,7 +57,8 @@ def plot_policy(
             metres, or the first two variables that are not in `slice`.
         slice: values of other variables: `{"omega": 0.0, 2: 1.5}`.
         labels: names of all state variables, or a dict from numbers to names, with
-            units in brackets at the end: "speed (m/s)".
+            units in brackets at the end: "speed (m/s)". An angle that the agent takes
+            from its cosine and sine is one variable, in the place of the cosine.
         actions: names of all actions.
         shape: rows and columns in which numbered states lie, row by row.
         colorbar: whether a bar, or a legend, explains the colours.

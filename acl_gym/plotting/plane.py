@@ -12,7 +12,6 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
-from acl_gym.partitions import Discrete
 from acl_gym.plotting import style
 from acl_gym.plotting.subject import Subject, Variable
 from acl_gym.utils import validation
@@ -51,16 +50,12 @@ class Plane:
     def states(self, subject: Subject) -> NDArray[Any]:
         """A state for each piece, as observed; the second axis varies slowest."""
         mesh = [grid.ravel() for grid in np.meshgrid(*self.points())]
-        states = np.empty((mesh[0].size, len(self.variables)))
+        values = np.empty((mesh[0].size, len(self.variables)))
         for i, value in self.fixed.items():
-            states[:, i] = value
-        for i, values in zip(self.shown, mesh, strict=True):
-            states[:, i] = values
-        partition = subject.partition
-        if isinstance(partition, Discrete):
-            whole = np.rint(states).astype(np.int64)
-            return whole.reshape(-1, *partition.sizes.shape)
-        return states
+            values[:, i] = value
+        for i, points in zip(self.shown, mesh, strict=True):
+            values[:, i] = points
+        return subject.observations(values)
 
     def shape(self) -> tuple[int, ...]:
         """Of values in `states`: rows and columns of an image, or one row."""

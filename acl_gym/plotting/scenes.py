@@ -52,7 +52,8 @@ class Stage:
         looks: keyword arguments of `plot_policy` and `plot_pheromone`.
         limits: of the scale of levels, the same in all stages.
         title: in two lines.
-        states: where the policy went, for each frame, `(frames, state_size)`.
+        states: where the policy went, for each frame, `(frames, variables)`; of
+            numbered states `(frames, 1)`.
         frame_time: seconds of a frame.
         frames: how many there are.
         rows: the history until all stages are over.
@@ -98,7 +99,7 @@ def stages_of(
         step = getattr(known.system, "sampling_time", None)
         most = max(1, round(seconds / (_STEP if step is None else step)))
         path = run(known, start, most, seed=0)
-        states = path.states
+        states = known.values(path.states)
         if step is not None:
             states = _between(states, known)
         kept.append((trial, known, _title(agent.num_timesteps, known), states))

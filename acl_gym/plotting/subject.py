@@ -18,6 +18,7 @@ from acl_gym.envs.control.signals import Signals
 from acl_gym.envs.control.system import ControlSystem
 from acl_gym.envs.grid_search.system import GridSearch
 from acl_gym.partitions import Discrete, Grid, Partition
+from acl_gym.plotting import pieces
 from acl_gym.plotting.style import GREEK
 from acl_gym.policies import PartitionPolicy, SoftPolicy, TablePolicy
 from acl_gym.utils import validation
@@ -25,9 +26,6 @@ from acl_gym.utils.typing import FloatArray, IntArray
 
 _BATCH = 20_000
 """States that are looked up at once: a fuzzy one has 2^d degrees."""
-
-_LIMIT = 1e6
-"""Observations beyond it are not drawn: the bound stands for none."""
 
 _DIRECTIONS = {(-1, 0): "north", (1, 0): "south", (0, 1): "east", (0, -1): "west"}
 
@@ -96,7 +94,8 @@ class Subject:
         system: that of an environment of this package, or None.
         inputs: the physical input of each action, `(n_actions, m)`, or None.
         input_names: of the columns of `inputs`.
-        variables: the state variables; of numbered states none.
+        variables: the state variables; of numbered states none. An angle that is
+            observed as cosine and sine is one.
         n_states: how many numbered states there are, or 0.
         first_state: the number of the first of them.
         n_actions: how many actions there are.
@@ -124,8 +123,30 @@ class Subject:
         """The title of a picture of some kind."""
         return ", ".join(filter(None, [kind.capitalize(), self.title]))
 
+    def observations(self, values: FloatArray) -> NDArray[Any]:
+        """What is observed where the variables have these values, `(n, variables)`."""
+        if isinstance(self.partition, Grid):
+            return self.partition.observations(values)
+        if isinstance(self.partition, Discrete):
+            whole = np.rint(values).astype(np.int64)
+            return whole.reshape(-1, *self.partition.sizes.shape)
+        return values
+
+    def values(self, observations: FloatArray) -> FloatArray:
+        """The values of the variables in some observations, each `(n, d)`."""
+        if not isinstance(self.partition, Grid):
+            return observations
+        values: FloatArray = self.partition.variables(observations)
+        if self.partition.angles:
+            # From -pi to pi, while the axis of a picture may begin elsewhere.
+            for axis, variable in enumerate(self.variables):
+                if variable.period is not None:
+                    low = variable.low
+                    values[:, axis] = low + (values[:, axis] - low) % variable.period
+        return values
+
     def columns(self, states: NDArray[Any]) -> IntArray:
-        """The action of the policy in each of some states, counted from 0, `(n,)`."""
+        """The action of the policy for some observations, counted from 0, `(n,)`."""
         chosen = [
             np.asarray(self.policy.predict(part, deterministic=True)[0])
             for part in _batches(states)
@@ -168,7 +189,8 @@ def subject_of(
         env: an environment that gives names and bounds, single or vector; None takes
             that of the agent, if it has one.
         labels: names of the state variables, with their units in brackets at the end;
-            None takes those of a system of this package, or "state 1", "state 2", ...
+            None takes those of a system of this package, or "state 1", "state 2", ...,
+            and "angle 1 (rad)" where state 1 is its cosine.
         actions: names of all actions; None takes those of the system, or
             "action 0", "action 1", ...
 
@@ -301,10 +323,10 @@ def _variables(
     labels: Labels,
 ) -> tuple[Variable, ...]:
     if isinstance(partition, Grid):
-        made = _of_grid(partition, space)
+        made = pieces.of_grid(partition, space)
     elif isinstance(partition, Discrete):
         made = [
-            _of_integers(int(size), int(start))
+            pieces.of_integers(int(size), int(start))
             for size, start in zip(
                 partition.sizes.ravel(), partition.starts.ravel(), strict=True
             )
@@ -312,7 +334,7 @@ def _variables(
     elif isinstance(space, spaces.Box) and len(space.shape) == 1:
         circular = () if system is None else system.circular
         made = [
-            _of_bounds(low, high, axis in circular)
+            pieces.of_bounds(low, high, axis in circular)
             for axis, (low, high) in enumerate(zip(space.low, space.high, strict=True))
         ]
     else:
@@ -320,17 +342,41 @@ def _variables(
             "states must be a number or a row of numbers to be drawn, got "
             f"{space if partition is None else partition!r}."
         )
-    names = _labels(labels, signals, len(made))
+    angles = partition.angles if isinstance(partition, Grid) else ()
+    names = _labels(labels, signals, len(made), angles)
     return tuple(
         Variable(name, edges[0], edges[-1], edges, period)
         for name, (edges, period) in zip(names, made, strict=True)
     )
 
 
-def _labels(labels: Labels, signals: Signals | None, count: int) -> list[str]:
-    names = [f"state {i + 1}" for i in range(count)]
-    if signals is not None and len(signals.observations) == count:
-        names = list(map(_with_unit, signals.observations))
+def _own_names(
+    signals: Signals | None, count: int, angles: Sequence[tuple[int, int]]
+) -> list[str]:
+    """The names of variables that nobody has given: those of their observations."""
+    known = () if signals is None else signals.observations
+    if len(known) != count + len(angles):
+        known = ()
+    cosines, sines = zip(*angles, strict=True) if angles else ((), ())
+    names = []
+    for column in range(count + len(angles)):
+        if column in sines:
+            continue
+        name = _with_unit(known[column]) if known else f"state {column + 1}"
+        if column in cosines:
+            whose = f"of {known[column].split(', ')[0]}" if known else f"{column + 1}"
+            name = f"angle {whose} (rad)"
+        names.append(name)
+    return names
+
+
+def _labels(
+    labels: Labels,
+    signals: Signals | None,
+    count: int,
+    angles: Sequence[tuple[int, int]],
+) -> list[str]:
+    names = _own_names(signals, count, angles)
     if labels is None:
         return names
     given: dict[Any, Any] = {}
@@ -347,65 +393,6 @@ def _labels(labels: Labels, signals: Signals | None, count: int) -> list[str]:
             f"from numbers 0..{count - 1} to names, got {validation.shown(labels)}."
         )
     return [given.get(i, name) for i, name in enumerate(names)]
-
-
-Pieces = tuple[FloatArray, float | None]
-"""Edges of a variable, and its period or None."""
-
-_FINEST = 240
-"""Pieces of an axis at most, and where nothing tells how many."""
-
-
-def _of_grid(grid: Grid, space: Any) -> list[Pieces]:
-    """Crisp cells as they are, fuzzy ones finely divided."""
-    pieces: list[Pieces] = []
-    for axis, (centres, period) in enumerate(
-        zip(grid.centres, grid.periods, strict=True)
-    ):
-        low, high = _ends(centres, period, grid.fuzzy)
-        if period is None and isinstance(space, spaces.Box):
-            bounds = float(space.low[axis]), float(space.high[axis])
-            if np.abs(bounds).max() < _LIMIT and bounds[0] < bounds[1]:
-                low, high = bounds
-        if grid.fuzzy and centres.size > 1:
-            edges = np.linspace(low, high, min(4 * centres.size, _FINEST) + 1)
-        else:
-            last = [] if period is None else [centres[0] + period]
-            inner = np.append(centres, last)
-            borders = 0.5 * (inner[1:] + inner[:-1])
-            inside = borders[(borders > low) & (borders < high)]
-            edges = np.concatenate([[low], inside, [high]])
-        pieces.append((edges, period))
-    return pieces
-
-
-def _ends(
-    centres: FloatArray, period: float | None, fuzzy: bool
-) -> tuple[float, float]:
-    low, high = float(centres[0]), float(centres[-1])
-    if period is not None:
-        return low, low + period
-    if centres.size == 1:
-        return low - 0.5, high + 0.5
-    if fuzzy:
-        return low, high
-    # The outermost bins reach as far beyond their centres as within.
-    gaps = np.diff(centres)
-    return low - 0.5 * float(gaps[0]), high + 0.5 * float(gaps[-1])
-
-
-def _of_integers(size: int, start: int) -> Pieces:
-    return start - 0.5 + np.arange(size + 1.0), None
-
-
-def _of_bounds(low: Any, high: Any, circular: bool) -> Pieces:
-    if not (np.isfinite([low, high]).all() and max(abs(low), abs(high)) < _LIMIT):
-        raise ValueError(
-            f"observations must be bounded to be drawn, got bounds {low} and {high}; "
-            "draw an agent with a partition."
-        )
-    period = float(high) - float(low) if circular else None
-    return np.linspace(float(low), float(high), _FINEST + 1), period
 
 
 def _batches(states: NDArray[Any]) -> list[NDArray[Any]]:

@@ -240,7 +240,9 @@ def _signals(subject: Subject, path: Trajectory) -> list[Signal]:
         return [("state", path.states[:, 0], None)]
     return [
         (variable.name_in_short(), values, variable.period)
-        for variable, values in zip(subject.variables, path.states.T, strict=True)
+        for variable, values in zip(
+            subject.variables, subject.values(path.states).T, strict=True
+        )
     ]
 
 
@@ -307,7 +309,7 @@ def _plot_path(subject: Subject, path: Trajectory, ax: Axes | None, axes: Any) -
         if ground:
             system: Any = subject.system
             navigation.draw_ground(ax, system)
-        shown = path.states[:, plane.shown]
+        shown = subject.values(path.states)[:, plane.shown]
         (x, y), *_, last = shown
         ax.plot(*without_jumps(shown, plane).T, marker=".", markersize=3, **_LINE)
         ax.plot(x, y, **_START, label="start")

@@ -36,12 +36,15 @@ def compiled(
     number: str,
     name: str = "policy",
     compiler: tuple[str, ...] = ("gcc", "-std=c99", "-O2"),
+    libraries: tuple[str, ...] = (),
 ) -> Path:
-    """Compile a program around the header, every warning being an error."""
+    """Compile a program around the header, every warning being an error.
+
+    Without a library, unless there is an angle: that needs ("-lm",).
+    """
     source, program = header.with_suffix(".main.c"), header.with_suffix(".program")
     source.write_text(MAIN.format(header=header.name, type=number, name=name))
-    # Without -lm: a header needs no library.
-    command = [*compiler, *STRICT, str(source), "-o", str(program)]
+    command = [*compiler, *STRICT, str(source), "-o", str(program), *libraries]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     return program

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from acl_gym.partitions import Crisp, Fuzzy, Grid
+from acl_gym.partitions.angles import Angles
 from acl_gym.policies import TablePolicy
 
 
@@ -15,16 +18,24 @@ def random_policy(
     n_actions: int,
     seed: int,
     regular: bool = True,
+    angles: Sequence[tuple[int, int]] = (),
 ) -> TablePolicy:
-    """A policy over a grid of which a third of the levels are alike, as in unvisited cells."""
+    """A policy over a grid of which a third of the levels are alike, as in unvisited cells.
+
+    A variable that is one of `angles` is circular, its centres spread over the circle.
+    """
+    around = Angles(angles, len(sizes)).circular
     rng = np.random.default_rng(seed)
     centres, periods = [], []
-    for size, is_round in zip(sizes, circular, strict=True):
+    for axis, (size, is_round) in enumerate(zip(sizes, circular, strict=True)):
         gaps = np.full(size, 0.3) if regular else rng.uniform(0.1, 0.7, size)
         line = rng.normal() + np.cumsum(gaps)
+        period = float(np.ptp(line) + gaps[0]) if is_round else None
+        if axis in around:
+            line, period = line * (2 * np.pi / gaps.sum()), None
         centres.append(line)
-        periods.append(float(np.ptp(line) + gaps[0]) if is_round else None)
-    partition = kind(centres, periods)
+        periods.append(period)
+    partition = kind(centres, periods, angles)
     table = rng.exponential(1e-4, (partition.n_cells, n_actions))
     table[rng.random(len(table)) < 1 / 3] = 1e-4
     return TablePolicy(partition, table, first_action=int(rng.integers(-3, 4)))
@@ -33,7 +44,8 @@ def random_policy(
 def hard_observations(policy: TablePolicy, count: int, seed: int) -> np.ndarray:
     """Random states inside and outside, on centres, halfway between them, next to both.
 
-    A twelfth of them are multiples of a period away, a few are huge.
+    A twelfth of them are multiples of a period away, a few are huge. Half of what shows
+    an angle is on the circle, half not.
     """
     rng = np.random.default_rng(seed)
     grid = policy.partition
@@ -51,4 +63,8 @@ def hard_observations(policy: TablePolicy, count: int, seed: int) -> np.ndarray:
         x = np.where(kind == 4, x + (period or 1.0) * rng.integers(-50, 50, count), x)
         x[:3] = 1e300, -1e300, np.finfo(np.float64).max
         columns.append(x)
-    return np.stack(columns, axis=1)
+    states = grid.observations(np.stack(columns, axis=1))
+    for pair in grid.angles:
+        states[: count // 2, pair] *= rng.lognormal(0.0, 3.0, (count // 2, 1))
+        states[3:6, pair] = (0.0, 0.0), (1e308, 1.7e308), (-0.0, 0.0)
+    return states

@@ -7,6 +7,7 @@ import pytest
 from gymnasium import spaces
 
 from acl_gym.partitions import Crisp, Fuzzy, partition_from_settings
+from acl_gym.partitions.angles import find_angles
 
 NAN, INF = float("nan"), float("inf")
 REFUSED = (TypeError, ValueError)
@@ -205,3 +206,14 @@ def test_no_states_have_no_cells() -> None:
 def test_settings_of_something_else_are_refused(settings: Any) -> None:
     with pytest.raises(ValueError, match=r"^(settings|centres(\[0\])?|periods) must"):
         partition_from_settings(settings)
+
+
+def test_cosines_that_are_huge_are_taken_and_infinite_ones_refused() -> None:
+    """Their sum overflows, or is no number; neither is an angle's fault."""
+    grid = Fuzzy([[-2.0, 0.0, 2.0]], angles=[(0, 1)])
+    index, _ = grid([[1e308, 1.7e308]])
+    assert index.tolist() == grid([[1.0, 1.7]])[0].tolist()
+    with pytest.raises(ValueError, match=r"states must be finite, got \[inf, -inf\]"):
+        grid([[np.inf, -np.inf]])
+    seen = np.array([[0.6, 0.8, 1e300], [-0.8, 0.6, -1e300]])
+    assert find_angles(seen) == [(0, 1)]

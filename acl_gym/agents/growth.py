@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,8 @@ from acl_gym.partitions import Grid, Partition
 from acl_gym.partitions.growing import carried_over, widened
 from acl_gym.utils import validation
 from acl_gym.utils.typing import BoolArray, FloatArray, IntArray
+
+logger = logging.getLogger("acl_gym")
 
 WHERE = ("tried", "varied", "everywhere")
 """Where cells may be halved before those of the whole grid are, see `Growth`."""
@@ -48,6 +51,7 @@ class Growth:
         self.on = on
         self.where = where
         self.turn = 0
+        self._told = 0  # the limit of which the log has said that it is reached
 
     @property
     def where(self) -> str:
@@ -127,10 +131,24 @@ class Growth:
             else:
                 chosen = self._chosen(partition, axis, evidence, levels, enough)
             halved = np.count_nonzero(chosen)
-            if halved and partition.n_cells // size * (size + halved) <= max_cells:
+            if not halved:
+                continue
+            if partition.n_cells // size * (size + halved) <= max_cells:
                 self.turn = turn + 1
                 return partition.refined(axis, chosen)
+            self._tell(partition.n_cells, max_cells)
         return None
+
+    def _tell(self, n_cells: int, max_cells: int) -> None:
+        """Say once for each limit that it keeps cells from being halved."""
+        if self._told != max_cells:
+            self._told = max_cells
+            logger.info(
+                "The partition has %d cells and would be made finer, but max_cells is "
+                "%d; a higher limit allows finer cells.",
+                n_cells,
+                max_cells,
+            )
 
     def _chosen(
         self,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from abc import abstractmethod
 from collections.abc import Mapping
 from typing import Any, ClassVar
@@ -21,6 +22,8 @@ from acl_gym.partitions.growing import initial_partition
 from acl_gym.utils import validation
 from acl_gym.utils.parameters import Parameter
 from acl_gym.utils.typing import BoolArray, FloatArray, IntArray, Row
+
+logger = logging.getLogger("acl_gym")
 
 
 class RememberingAgent(TabularAgent):
@@ -143,7 +146,10 @@ class RememberingAgent(TabularAgent):
         """Remember what was done, in a partition wide enough; the numbers of its paths."""
         if self.grows and isinstance(self.partition, Grid):
             space: Any = self.rollout.env.single_observation_space
-            self._grow_to(self._growth.wider(self.partition, walk.states(), space))
+            wider = self._growth.wider(self.partition, walk.states(), space)
+            if wider is not None:
+                self._grow_to(wider)
+                logger.info("The range of what is seen has grown: %r.", wider)
         return self._memory.add(walk)
 
     def _promise(self, optimism: float) -> None:

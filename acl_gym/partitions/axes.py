@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from numbers import Integral
+from typing import Any
 
 import numpy as np
+from gymnasium import spaces
 from numpy.typing import ArrayLike
 
+from acl_gym.partitions.base import MOST_CELLS
 from acl_gym.utils import validation
+from acl_gym.utils.boxes import declared_bounds
 from acl_gym.utils.typing import FloatArray
 
 
@@ -81,3 +86,54 @@ def regular_rate(edges: FloatArray) -> float:
     gaps = np.diff(edges)
     regular = np.allclose(gaps, gaps.mean(), rtol=1e-9, atol=0.0)
     return float(1.0 / gaps.mean()) if regular else 0.0
+
+
+def spread_centres(
+    space: Any, cells: int | Sequence[int], circular: Iterable[int]
+) -> tuple[list[FloatArray], list[float | None]]:
+    """Spread centres evenly over a Box, see `Grid.from_box`.
+
+    Returns:
+        Of each variable the centres, and the period.
+
+    Raises:
+        ValueError: the Box is unbounded or not one-dimensional, or `cells` or
+            `circular` do not fit it.
+    """
+    if not isinstance(space, spaces.Box) or len(space.shape) != 1:
+        raise ValueError(
+            f"space must be a one-dimensional Box, got {validation.shown(space)}."
+        )
+    low, high = declared_bounds(space)
+    if not (np.isfinite(low) & np.isfinite(high)).all():
+        raise ValueError(
+            "space must be bounded in every variable, got "
+            f"{validation.shown(space)}; "
+            "give the centres of an unbounded variable yourself."
+        )
+    if isinstance(cells, Integral):
+        counts = [cells] * low.size
+    else:
+        counts = validation.elements(cells) or []
+    if len(counts) != low.size:
+        raise ValueError(
+            f"cells must be an int or {low.size} ints, one a variable, "
+            f"got {validation.shown(cells)}."
+        )
+    round_axes = validation.elements(circular)
+    if round_axes is None:
+        round_axes = [None]  # which is refused
+    for axis in round_axes:
+        whole = isinstance(axis, Integral) and not isinstance(axis, bool)
+        if not whole or not 0 <= axis < low.size:
+            raise ValueError(
+                f"circular must hold variables 0..{low.size - 1}, got "
+                f"{validation.shown(circular)}."
+            )
+    centres, periods = [], []
+    for axis, count in enumerate(counts):
+        validation.integer(f"cells[{axis}]", count, at_least=1, at_most=MOST_CELLS)
+        is_round = axis in round_axes
+        centres.append(np.linspace(low[axis], high[axis], count, endpoint=not is_round))
+        periods.append(float(high[axis] - low[axis]) if is_round else None)
+    return centres, periods

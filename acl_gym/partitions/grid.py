@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from numbers import Integral
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -17,6 +16,7 @@ from acl_gym.partitions.axes import (
     checked_centres,
     checked_periods,
     regular_rate,
+    spread_centres,
 )
 from acl_gym.partitions.base import (
     MOST_CELLS,
@@ -27,7 +27,6 @@ from acl_gym.partitions.base import (
 )
 from acl_gym.partitions.kernels import OUTSIDE, Axes, locate, locate_in_parallel
 from acl_gym.utils import threads, validation
-from acl_gym.utils.boxes import declared_bounds
 from acl_gym.utils.typing import BoolArray, CellArray, FloatArray, IntArray
 
 _FLOAT = np.dtype(np.float64)
@@ -144,45 +143,7 @@ class Grid(FixedPartition):
             ValueError: the Box is unbounded or not one-dimensional, or `cells` or
                 `circular` do not fit it.
         """
-        if not isinstance(space, spaces.Box) or len(space.shape) != 1:
-            raise ValueError(
-                f"space must be a one-dimensional Box, got {validation.shown(space)}."
-            )
-        low, high = declared_bounds(space)
-        if not (np.isfinite(low) & np.isfinite(high)).all():
-            raise ValueError(
-                "space must be bounded in every variable, got "
-                f"{validation.shown(space)}; "
-                "give the centres of an unbounded variable yourself."
-            )
-        if isinstance(cells, Integral):
-            counts = [cells] * low.size
-        else:
-            counts = validation.elements(cells) or []
-        if len(counts) != low.size:
-            raise ValueError(
-                f"cells must be an int or {low.size} ints, one a variable, "
-                f"got {validation.shown(cells)}."
-            )
-        round_axes = validation.elements(circular)
-        if round_axes is None:
-            round_axes = [None]  # which is refused
-        for axis in round_axes:
-            whole = isinstance(axis, Integral) and not isinstance(axis, bool)
-            if not whole or not 0 <= axis < low.size:
-                raise ValueError(
-                    f"circular must hold variables 0..{low.size - 1}, got "
-                    f"{validation.shown(circular)}."
-                )
-        centres, periods = [], []
-        for axis, count in enumerate(counts):
-            validation.integer(f"cells[{axis}]", count, at_least=1, at_most=MOST_CELLS)
-            is_round = axis in round_axes
-            centres.append(
-                np.linspace(low[axis], high[axis], count, endpoint=not is_round)
-            )
-            periods.append(float(high[axis] - low[axis]) if is_round else None)
-        return cls(centres, periods)
+        return cls(*spread_centres(space, cells, circular))
 
     def check_space(self, space: spaces.Space[Any]) -> None:
         """Refuse what is not a one-dimensional Box of as many variables.

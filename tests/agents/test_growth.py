@@ -149,6 +149,16 @@ def test_it_stops_at_the_limit_and_where_nothing_can_grow() -> None:
     assert Growth(False).finer(GRID, enough, LEVELS, 1.0, 100) is None
 
 
+def test_the_limit_is_told_once(caplog: Any) -> None:
+    growth, enough = Growth(True), evidence(99.0)
+    with caplog.at_level("INFO", "acl_gym"):
+        for limit in (7, 7, 8):
+            assert growth.finer(GRID, enough, LEVELS, 1.0, limit) is None
+    told = [record.getMessage() for record in caplog.records]
+    assert [message.split("max_cells is ")[1][0] for message in told] == ["7", "8"]
+    assert "has 6 cells" in told[0]
+
+
 def test_it_becomes_wider_only_where_it_grows() -> None:
     box = spaces.Box(-9.0, 9.0, (1,), np.float64)
     grid, seen = Fuzzy([[0.0, 1.0]]), np.array([[3.0]])

@@ -207,6 +207,16 @@ def test_the_partition_grows_with_what_is_seen() -> None:
     )
 
 
+def test_the_range_that_was_taken_is_told(caplog: Any) -> None:
+    with caplog.at_level("INFO", "acl_gym"):
+        colony = make("cart-pole").learn(trials=1)
+    told = [
+        each.getMessage() for each in caplog.records if "range" in each.getMessage()
+    ]
+    assert told
+    assert repr(colony.partition) in told[-1]
+
+
 def test_the_limit_on_cells_is_kept() -> None:
     colony = make("pendulum", max_cells=200, visits_to_grow=0.1)
     assert colony.learn(total_timesteps=3_000).partition.n_cells <= 200

@@ -141,9 +141,9 @@ SEQUENTIAL = {
     "learning_rate": 0.3,
     "trace_decay": 0.6,
 }
-"""Discount and epsilon are the colony's. Rate and lambda, of 0.05 to 0.9 and 0 to 0.9,
-are good on the pendulum and the grid alike: one setting for all tasks, as the colony has.
-On the pendulum alone a rate of 0.1 is better towards the end."""
+"""The discount is the colony's. Rate and lambda, of 0.05 to 0.9 and 0 to 0.9, are good on
+the pendulum and the grid alike: one setting for all tasks, as the colony has. On the
+pendulum alone a rate of 0.1 is better towards the end."""
 
 
 def without_ants(task: Task, seed: int) -> QLearning:

@@ -175,12 +175,12 @@ _ELITE: Candidate = {"deposit": Rank(20), "alpha": 1.5, "global_decay": 0.2}
 def _remembering(total: int, every: int = 1) -> dict[str, list[Candidate]]:
     """The methods that remember, everywhere alike but for the length of a run.
 
-    The returning colony has its defaults. Q-learning has the discount, epsilon, replays and
-    optimism of these, and the rate and lambda of ablation.py.
+    The returning colony has its defaults. Q-learning has the discount, replays and optimism
+    of these, and the epsilon, rate and lambda of ablation.py.
     """
     common = {"slots": 5, "total": total, "every": every, "kind": "growing"}
     q = {"learning_rate": 0.3, "discount": 0.99, "epsilon": 0.1, "trace_decay": 0.6}
-    replay = {"replay": 10, "optimism": 1.0, "grows": True}
+    replay = {"replay": 30, "optimism": 1.0, "grows": True}
     return {"returning": [common], "q-replay": [{**common, **q, **replay}]}
 
 

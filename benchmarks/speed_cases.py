@@ -126,7 +126,7 @@ def learn(system: str, kind: str, n_ants: int, trials: int) -> Work:
 
 
 def learn_returning(n_ants: int) -> Work:
-    """Let a new returning colony learn the pendulum: it walks back ten times as often."""
+    """Let a new returning colony learn the pendulum: it walks back 30 times as often."""
     env = make_env("pendulum", n_ants)
 
     def work() -> int:

@@ -45,7 +45,7 @@ _SETTINGS: dict[str, dict[str, Any]] = {
         "discount": 0.99,
         "epsilon": 0.1,
         "trace_decay": 0.6,
-        "replay": 10,
+        "replay": 30,
         "optimism": 1.0,
     },
     "ppo": {"n_steps": 128, "learning_rate": 1e-3, "batch_size": 64},

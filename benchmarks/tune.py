@@ -1,7 +1,7 @@
 """Search for the settings of every method, alike: what the comparison `versus` runs with.
 
 On each task (a system as it is, or made harder) each method but the returning colony,
-which has its defaults everywhere, gets the same number of evaluations by Optuna's TPE
+which has its defaults everywhere, and Q-learning with replay on the harder tasks, gets the same number of evaluations by Optuna's TPE
 sampler, the first of them its defaults. An evaluation is one run for each tuning seed; its
 value is the mean cost of the last policies, so that a policy that fails counts as what it
 costs. The search is logged after every evaluation, in one
@@ -44,6 +44,7 @@ from optuna.distributions import FloatDistribution as Real
 from optuna.distributions import IntDistribution as Whole
 
 from acl_gym.experiments.comparison.tasks import (
+    PLAIN,
     SETTINGS_FILE,
     TASKS,
     TunedTask,
@@ -69,9 +70,10 @@ PAIRS = [
     (name, method)
     for name, task in TASKS.items()
     for method in task.methods
-    if method != "returning"
+    if method != "returning" and (method not in REMEMBERING or name in PLAIN)
 ]
-"""Every search: the name of a task and of a method."""
+"""Every search: the name of a task and of a method. On the harder tasks Q-learning with
+replay has its defaults, as the colony has."""
 
 Log = dict[str, Any]
 """A search as its file holds it; `evaluations` are in the order in which they were made."""

@@ -14,9 +14,9 @@ from typing import Any
 
 from acl_gym.experiments.comparison.tasks import (
     HARDER,
-    MOST_REMEMBERED,
     ON_POLICY,
     PLAIN,
+    REMEMBERED_STEPS,
     TASKS,
     is_tuned,
     tuned,
@@ -42,8 +42,8 @@ FEWER_RUNS = 10
 SLOTS = (25, 100, 400, 1600)
 
 _LONG = (
-    f"The methods get the same number of interactions, those that remember at most "
-    f"{MOST_REMEMBERED:,}; ACL is run a second time with four times as many and the same "
+    f"The methods get the same number of interactions, those that remember "
+    f"{REMEMBERED_STEPS:,}; ACL is run a second time with four times as many and the same "
     "settings, to see whether it lacks no more than these."
 )
 _JUDGED = (
@@ -92,7 +92,7 @@ def _system(name: str) -> Experiment:
         table="system",
         text=(
             f"{_tuned_words([name])} {task.steps:,} interactions for the methods with a "
-            f"table, of those that remember at most {MOST_REMEMBERED:,}; "
+            f"table, {task.memory_steps:,} for those that remember; "
             f"{task.dqn_steps:,} for DQN and {ON_POLICY} times as many for PPO and A2C, "
             f"which take as many seconds or more: both are reported. {_JUDGED}"
         ),

@@ -41,8 +41,8 @@ SETTINGS_FILE = Path(__file__).with_name("settings.json")
 FEW_SLOTS = 5
 """Of methods that remember, which learn from few interactions."""
 
-MOST_REMEMBERED = 500_000
-"""Interactions of such a method on a tuned task, where the others have no fewer."""
+REMEMBERED_STEPS = 100_000
+"""Interactions of such a method on a tuned task that names no others."""
 
 ON_POLICY = 5
 """How many times the interactions of DQN PPO and A2C get, which are as much faster: all
@@ -238,8 +238,8 @@ class TunedTask:
     Attributes:
         label: what it is called in tables and figures.
         system: which one.
-        steps: interactions of a method with a table, all slots together; one that
-            remembers has `MOST_REMEMBERED` at most.
+        steps: interactions of a method with a table that forgets, all slots together.
+        memory_steps: interactions of a method that remembers; it computes longer for each.
         spacing: the factor by which interactions grow from one evaluation to the next.
         changes: of the task, keywords of `Task`: what makes it harder.
         cells: see `Task.make_partition`; None takes those of the system.
@@ -258,6 +258,7 @@ class TunedTask:
     max_steps: int | None = None
     dqn_steps: int = 0
     evaluate_every: int = 500
+    memory_steps: int = REMEMBERED_STEPS
 
     @property
     def methods(self) -> tuple[str, ...]:
@@ -313,7 +314,7 @@ class TunedTask:
             )
         steps, spacing = self.steps, self.spacing
         if method in REMEMBERING:
-            steps, spacing = min(steps, MOST_REMEMBERED), min(spacing, MEMORY_SPACING)
+            steps, spacing = self.memory_steps, min(spacing, MEMORY_SPACING)
         return Study(
             task=self.task,
             method=METHODS[method].key,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 from collections.abc import Iterator
 from dataclasses import replace
@@ -23,11 +24,26 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 # Figures and frames need no screen.
 os.environ.setdefault("MPLBACKEND", "Agg")
 os.environ.setdefault("SDL_VIDEODRIVER", "dummy")
+
+
+def _kernels() -> str:
+    """A name that changes with any file that holds kernels.
+
+    Numba looks at the file of the kernel that it loads, not at those of the kernels that
+    were compiled into it: after a change there it would run what stood there before.
+    """
+    digest = hashlib.sha256()
+    for path in sorted((ROOT / "acl_gym").rglob("*.py")):
+        if b"njit" in (text := path.read_bytes()):
+            digest.update(text)
+    return digest.hexdigest()[:16]
+
+
 # Numba's cache is not safe against two processes that compile one function for
 # different types at the same time, so each worker keeps a cache of its own.
 if worker := os.environ.get("PYTEST_XDIST_WORKER"):
     cache = Path(os.environ.get("NUMBA_CACHE_DIR", ROOT / ".numba_cache"))
-    os.environ["NUMBA_CACHE_DIR"] = str(cache / worker)
+    os.environ["NUMBA_CACHE_DIR"] = str(cache / _kernels() / worker)
 
 # The first example of a test may wait for a kernel to compile: no deadline.
 settings.register_profile("local", deadline=None)

@@ -23,6 +23,13 @@ WHERE = ("tried", "varied", "everywhere")
 TWICE = 2.0
 """How much oftener than the average the pairs between two centres must be tried."""
 
+NARROWEST = 2.0**-10
+"""The share of a variable's range below which single intervals are not halved.
+
+Where all episodes start in the same state, or a state is a number that is often repeated,
+the cells around it would otherwise be halved for ever, and nothing would be learned from it.
+"""
+
 
 class Growth:
     """Says when a partition becomes wider or finer, and into what.
@@ -124,12 +131,14 @@ class Growth:
             return None
         for turn in range(self.turn, self.turn + len(several)):
             axis = several[turn % len(several)]
-            size = partition.centres[axis].size
+            size, edges = partition.centres[axis].size, partition.edges(axis)
+            low, high = edges[:-1], edges[1:]
+            middle = low + (high - low) / 2
             if everywhere:
-                n_intervals = size - (partition.periods[axis] is None)
-                chosen = np.ones(n_intervals, np.bool_)
+                chosen = (low < middle) & (middle < high)  # but for rounding, always
             else:
                 chosen = self._chosen(partition, axis, evidence, levels, enough)
+                chosen &= high - low > NARROWEST * (edges[-1] - edges[0])
             halved = np.count_nonzero(chosen)
             if not halved:
                 continue

@@ -227,10 +227,7 @@ class Grid(FixedPartition):
                 be 2^31 cells or more.
         """
         axis = self._checked_axis(axis)
-        axes = list(self.centres)
-        edges, period = axes[axis], self.periods[axis]
-        if period is not None and edges.size > 1:
-            edges = np.append(edges, edges[0] + period)
+        axes, edges = list(self.centres), self.edges(axis)
         middles = edges[:-1] + np.diff(edges) / 2
         if intervals is not None:
             chosen = validation.as_array(intervals)
@@ -246,6 +243,16 @@ class Grid(FixedPartition):
             middles = middles[chosen]
         axes[axis] = np.sort(np.concatenate([axes[axis], middles]))
         return self.with_centres(axes)
+
+    def edges(self, axis: int) -> FloatArray:
+        """Where the intervals of an axis end that `refined` halves, `(n + 1,)`.
+
+        These are the centres, and on a circular axis the first one again, a period later.
+        """
+        centres, period = self.centres[axis], self.periods[axis]
+        if period is None or centres.size == 1:
+            return centres
+        return np.append(centres, centres[0] + period)
 
     def _checked_axis(self, axis: int) -> int:
         most = len(self.centres) - 1

@@ -95,6 +95,32 @@ def test_what_was_tried_twice_as_often_is_halved_sooner(
     assert Growth(True, where).finer(grid, *given, fits - 1) is None or halved > 1
 
 
+@pytest.mark.parametrize("where", ["tried", "varied"])
+def test_states_that_are_always_the_same_are_not_closed_in_for_ever(where: str) -> None:
+    """As of a start that all episodes share: 0.3, in a range of 1."""
+    state, growth = np.full((1_000, 1), 0.3), Growth(True, where)
+    grid = Fuzzy([np.linspace(0.0, 1.0, 9)])
+    for _ in range(100):
+        tries = np.zeros(grid.n_cells)
+        index, degree = grid(state)
+        np.add.at(tries, index, degree)
+        levels = np.eye(2)[np.arange(grid.n_cells) % 2]  # the policy varies everywhere
+        # 250 of each pair on both sides of the state's interval; 56 or fewer on average.
+        finer = growth.finer(grid, of_cells(tries), levels, 100.0, 10**6)
+        if finer is None:
+            break
+        grid = finer
+    assert finer is None
+    assert 1e-4 < np.diff(grid.centres[0]).min() <= 2.0**-10
+
+
+def test_cells_that_rounding_cannot_tell_apart_are_not_halved() -> None:
+    grid = Fuzzy([[1.0, np.nextafter(1.0, 2.0), 2.0]])
+    finer = Growth(True).finer(grid, of_cells(np.full(3, 50.0)), np.eye(3, 2), 1.0, 99)
+    assert finer is not None
+    assert finer.centres[0].size == 4  # between the last two only
+
+
 def test_a_circle_is_closed_by_an_interval() -> None:
     grid = Fuzzy([np.arange(6.0)], [6.0])
     tries = of_cells(np.array([50.0, 0.0, 0.0, 0.0, 0.0, 50.0]))

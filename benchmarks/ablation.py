@@ -2,14 +2,15 @@
 
 Each is taken away from `ReturningACL` with its defaults, and nothing else is changed:
 
-- no memory: the ants walk the newest paths back, once, and no older ones;
-- the latest: likewise, and levels follow what was laid last, not the mean over all that
-  was tried, which the newest paths alone change little (trust = 0);
+- no memory: the ants walk only the newest paths back, as often as before, and levels follow
+  these alone (trust = 0); older ones are kept only to say where cells are to be finer;
+- one walk back: they remember, but walk back once in place of thirty times;
+- neither: they walk the newest paths back, once;
 - no growth: cells of a fixed grid that is about as fine as the grown one becomes;
 - doubling: all cells are halved at a time, and none sooner where much was tried;
 - varied: cells are halved sooner where the policy varies (§7.3), not where much was tried;
-- no ants: Q-learning with the same memory, as many replays, the same growth and the
-  same optimism. It learns from one remembered step after the other, each on the values
+- no ants: Q-learning with the same memory, as many replays, the same growth, the same
+  optimism and as much exploration. It learns from one remembered step after the other, each on the values
   as they then are, where ants all lay on the same levels and are merged;
 - none: Q-learning alone, on the fixed grid.
 
@@ -137,11 +138,11 @@ def growing(task: Task, seed: int, where: str) -> ReturningACL | None:
 
 SEQUENTIAL = {
     "discount": 0.99,
-    "epsilon": 0.1,
+    "epsilon": 0.2,
     "learning_rate": 0.3,
     "trace_decay": 0.6,
 }
-"""The discount is the colony's. Rate and lambda, of 0.05 to 0.9 and 0 to 0.9, are good on
+"""Discount and exploration are the colony's. Rate and lambda, of 0.05 to 0.9 and 0 to 0.9, are good on
 the pendulum and the grid alike: one setting for all tasks, as the colony has. On the
 pendulum alone a rate of 0.1 is better towards the end."""
 
@@ -167,9 +168,10 @@ def alone(task: Task, seed: int) -> QLearning:
 
 VARIANTS: dict[str, Callable[[Task, int], TabularAgent | None]] = {
     "returning": colony,
-    "no memory": lambda task, seed: colony(task, seed, older_steps=0, walks_back=1),
-    "the latest": lambda task, seed: colony(
-        task, seed, older_steps=0, walks_back=1, trust=0.0
+    "no memory": lambda task, seed: colony(task, seed, older_steps=0, trust=0.0),
+    "one walk back": lambda task, seed: colony(task, seed, walks_back=1),
+    "neither": lambda task, seed: colony(
+        task, seed, older_steps=0, trust=0.0, walks_back=1
     ),
     "no growth": on_fixed_cells,
     "doubling": lambda task, seed: growing(task, seed, "everywhere"),

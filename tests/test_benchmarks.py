@@ -79,9 +79,9 @@ def test_ablation() -> None:
     arguments = ["--tasks", "grid,pendulum", "--steps", "1500"]
     rows = output_of("ablation.py", *arguments, "--seeds", "1")["rows"]
     assert [row["variant"] for row in rows if row["task"] == "grid"] == [
-        *("returning", "no memory", "the latest", "no ants", "none"),
+        *("returning", "no memory", "one walk back", "neither", "no ants", "none"),
     ]
-    assert len(rows) == 5 + 8
+    assert len(rows) == 6 + 9
     for row in rows:
         assert row["best"] >= row["last"]
         assert row["runs"][0]["steps"] >= 1500

@@ -73,7 +73,7 @@ class RememberingAgent(TabularAgent):
         self._kept_memory: Memory | None = None
         self.memory_size = memory_size
         if partition is None and self.grows and env is not None:
-            partition = initial_partition(env)
+            partition = initial_partition(env, self.max_cells)
         super().__init__(
             env,
             partition,
@@ -146,7 +146,9 @@ class RememberingAgent(TabularAgent):
         """Remember what was done, in a partition wide enough; the numbers of its paths."""
         if self.grows and isinstance(self.partition, Grid):
             space: Any = self.rollout.env.single_observation_space
-            wider = self._growth.wider(self.partition, walk.states(), space)
+            wider = self._growth.wider(
+                self.partition, walk.states(), space, self.max_cells
+            )
             if wider is not None:
                 self._grow_to(wider)
                 logger.info("The range of what is seen has grown: %r.", wider)
@@ -154,7 +156,9 @@ class RememberingAgent(TabularAgent):
 
     def _promise(self, optimism: float) -> None:
         """Set what pairs promise of which nothing is known yet."""
-        level = promised_level(self._memory, self._table, optimism, self.discount)
+        level = promised_level(
+            self._memory, self._table, optimism, self.discount, self.max_steps
+        )
         self._table[~self._known] = level
 
     def _split(self) -> None:

@@ -252,7 +252,9 @@ class ReturningACL(RememberingAgent, ColonyAgent):
                     walk, observation = self._walk(observation, limit)
                     newest = self._remember(walk)
                     self._promise(self.optimism)
-                    bounds = possible_levels(self._memory, self.discount)
+                    bounds = possible_levels(
+                        self._memory, self.discount, self.max_steps
+                    )
                     for _ in range(self.walks_back):
                         self._return(newest, bounds)
                     self._split()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -63,6 +62,7 @@ class Memory:
         self.largest_reward = 0.0
         self._used = 0  # rows, those of forgotten paths before them included
         self._shared = False  # whether a copy has the same rows
+        self._borrowed = False  # whether it is such a copy, and has none of its own
         self._rows: dict[str, NDArray[Any]] = {
             "action": np.empty(0, np.min_scalar_type(n_actions - 1)),
             "reward": np.empty(0),
@@ -153,20 +153,20 @@ class Memory:
 
         Args:
             newest: the numbers of the newest paths, as `add` gave them.
-            most: how many steps the older ones have together, at most, but for one of
-                them.
+            most: how many steps the older ones have together; the last that is drawn
+                may exceed it.
             rng: draws them.
 
         Returns:
             Their numbers, in the order of time.
         """
         older = self.n_paths - newest.size
-        steps = int(self.last[:older].sum() - self.first[:older].sum())
-        if steps > most:
-            share = math.ceil(older * most / steps)
-            drawn = np.sort(rng.choice(older, share, replace=False))
-        else:
-            drawn = np.arange(older)
+        drawn = np.arange(older)
+        sizes = self.last[:older] - self.first[:older]
+        if sizes.sum() > most:
+            order = rng.permutation(older)
+            enough = int(np.searchsorted(np.cumsum(sizes[order]), most)) + (most > 0)
+            drawn = np.sort(order[:enough])
         return np.concatenate([drawn, newest])
 
     def set_partition(self, partition: Partition) -> None:
@@ -188,9 +188,10 @@ class Memory:
     def copy(self) -> Memory:
         """What is remembered now, to come back to; what is added later is not in it."""
         copied = copy.copy(self)
-        # Rows are added behind those in use, and shared ones are not moved.
+        # This memory adds rows behind those in use and moves none of them; the copy adds
+        # to rows of its own, since others may have come behind by then.
         copied._rows = dict(self._rows)
-        copied._shared = self._shared = True
+        copied._shared = self._shared = copied._borrowed = True
         copied.evidence = self.evidence.copy()
         return copied
 
@@ -246,7 +247,8 @@ class Memory:
             rows[name] = np.ascontiguousarray(arrays[name])
         if not located:
             self._check_cells(rows["index"], rows["degree"])
-        self._rows, self._used, self._shared = rows, size, False
+        self._rows, self._used = rows, size
+        self._shared = self._borrowed = False
         self.first, self.last = first, last
         self.terminated = arrays["terminated"].copy()
         self._find_largest_reward()
@@ -322,7 +324,7 @@ class Memory:
             elif name == "seen" and kept.dtype != array.dtype:
                 kind = np.result_type(kept, array)
                 self._rows[name] = kept.astype(kind)
-        if self._used + size > len(self.action):
+        if self._borrowed or self._used + size > len(self.action):
             self._move_to_the_front(size)
         rows = slice(self._used, self._used + size)
         self._used += size
@@ -343,7 +345,7 @@ class Memory:
                 moved = np.zeros((length, *kept.shape[1:]), dtype=kept.dtype)
                 moved[:live] = kept[begin : self._used]
                 self._rows[name] = moved
-            self._shared = False
+            self._shared = self._borrowed = False
         else:
             for kept in self._rows.values():
                 # In parts that do not overlap, which NumPy moves without a copy.

@@ -17,23 +17,23 @@ NEWEST = 20_000
 
 
 def promised_level(
-    memory: Memory, levels: FloatArray, optimism: float, discount: float
+    memory: Memory, levels: FloatArray, optimism: float, discount: float, horizon: int
 ) -> float:
     """What pairs promise of which nothing is known, from what has been seen so far.
 
     It lies between the value of a good state, of which nine of ten are worse, and the
-    most that could be had: the best reward for ever, or the best reward at an end, or
-    an end that costs nothing.
+    most that could be had: the best reward for ever (without discounting: in each step of
+    an episode), or the best reward at an end, or an end that costs nothing.
 
     Args:
         memory: what the ants remember.
         levels: what pairs promise now, `(n_cells, n_actions)`.
         optimism: where between the two it lies, in [0, 1].
         discount: gamma_rl, in [0, 1].
+        horizon: the most steps of an episode, which count where discount is 1.
     """
     sizes = memory.last - memory.first
-    longest = int(sizes.max())
-    steps = longest if discount == 1.0 else 1 / (1 - discount)
+    steps = _steps_that_count(discount, horizon)
     going, ending, _ = _extreme_rewards(
         memory.first, memory.last, memory.terminated, memory.reward
     )
@@ -48,22 +48,30 @@ def promised_level(
     return good + optimism * (most - good)
 
 
-def possible_levels(memory: Memory, discount: float) -> tuple[float, float]:
+def possible_levels(
+    memory: Memory, discount: float, horizon: int
+) -> tuple[float, float]:
     """The least and the most that a pair can promise, from the rewards seen so far.
 
     The worst reward for ever; and the best one for ever, then the best end.
 
     Args:
         memory: what the ants remember.
-        discount: gamma_rl, in [0, 1]; without discounting nothing is ruled out but what
-            the signs of the rewards rule out.
+        discount: gamma_rl, in [0, 1].
+        horizon: the most steps of an episode. They bound what can be had where discount
+            is 1: what ends by then promises what comes after, for ever.
     """
-    for_ever = np.inf if discount == 1.0 else 1.0 / (1.0 - discount)
+    steps = _steps_that_count(discount, horizon)
     going, ending, worst = _extreme_rewards(
         memory.first, memory.last, memory.terminated, memory.reward
     )
-    most = (going * for_ever if going > 0.0 else 0.0) + max(0.0, ending)
-    return (worst * for_ever if worst < 0.0 else 0.0), most
+    most = max(0.0, going) * steps + max(0.0, ending)
+    return min(0.0, worst) * steps, most
+
+
+def _steps_that_count(discount: float, horizon: int) -> float:
+    """The sum of the weights of all steps that an episode may still have."""
+    return float(horizon) if discount == 1.0 else 1.0 / (1.0 - discount)
 
 
 @njit

@@ -135,7 +135,7 @@ class WalkBack:
         longest = int((last - first).max(initial=1))
         steps = longest if kept == 1.0 else min(longest, 1.0 / (1.0 - kept))
         reward = memory.largest_reward
-        level = max(abs(self.levels.min()), abs(self.levels.max()))
+        level = float(max(abs(self.levels.min()), abs(self.levels.max())))
         bound = (reward + 2.0 * level) * (steps + 1) * int((last - first).sum() + 1)
         if not bound < 2.0**1000:
             raise ValueError(

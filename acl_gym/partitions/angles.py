@@ -22,6 +22,9 @@ ROUNDING = 1e-4
 """By how much the squares of a cosine and a sine may miss 1; observations are often
 rounded to float32."""
 
+DIFFERENT = 10
+"""So many directions must have been seen before two numbers count as cosine and sine."""
+
 
 class Angles:
     """Which numbers of an observation are cosine and sine of one variable.
@@ -116,7 +119,8 @@ class Angles:
 def find_angles(observations: NDArray[Any]) -> list[tuple[int, int]]:
     """Find what could be cosine and sine of an angle, in observations of any kind.
 
-    Both vary, and their squares add up to 1 every time.
+    Their squares add up to 1 every time, and they take `DIFFERENT` pairs of values or
+    more: flags of which one is set do so too, but are no angle.
 
     Args:
         observations: finite, `(n, d)`.
@@ -136,7 +140,11 @@ def find_angles(observations: NDArray[Any]) -> list[tuple[int, int]]:
         cosine = free.pop(0)
         for sine in free:
             miss = given[:, cosine] ** 2 + given[:, sine] ** 2 - 1.0
-            if np.abs(miss).max() <= ROUNDING:
+            both = given[:, [cosine, sine]]
+            if (
+                np.abs(miss).max() <= ROUNDING
+                and len(np.unique(both, axis=0)) >= DIFFERENT
+            ):
                 pairs.append((cosine, sine))
                 free.remove(sine)
                 break

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TypeVar
 
 import numpy as np
@@ -35,7 +36,7 @@ _ROWS = 65_536  # cells that are carried over at a time
 AnyGrid = TypeVar("AnyGrid", bound=Grid)
 
 
-def initial_partition(env: Env) -> Partition:
+def initial_partition(env: Env, max_cells: int) -> Partition:
     """Choose the partition from which that of a colony grows.
 
     Observations that are cells already stay cells. Others get a fuzzy grid of few cells.
@@ -46,6 +47,7 @@ def initial_partition(env: Env) -> Partition:
 
     Args:
         env: a vector environment or a single one.
+        max_cells: a grid has no more cells than this, >= 1, nor when it becomes wider.
 
     Raises:
         TypeError: its observations have no cells, such as Dict, Tuple or Text.
@@ -55,23 +57,39 @@ def initial_partition(env: Env) -> Partition:
     if isinstance(space, FINITE_SPACES):
         return Discrete.from_space(space)
     box = real_box(space)
-    number = centres_for(COARSE, box.low.size)
     system = system_of(env)
     whole = system is not None and system.observation_space == space
     circular = system.circular if system is not None and whole else ()
+    on_circle = _coarse(box.low.size, len(circular), max_cells)[1]
     centres: list[FloatArray] = []
     periods: list[float | None] = []
     for axis, (low, high) in enumerate(zip(*declared_bounds(box), strict=True)):
         if axis in circular:
             periods.append(float(high - low))
-            centres.append(np.linspace(low, high, number + 1, endpoint=False))
+            centres.append(np.linspace(low, high, on_circle, endpoint=False))
         else:
             periods.append(None)
             centres.append(np.array([min(max(0.0, low), high)]))
     return Fuzzy(centres, periods)
 
 
-def widened(grid: AnyGrid, states: FloatArray, space: spaces.Box) -> AnyGrid | None:
+def _coarse(n_variables: int, n_circular: int, max_cells: int) -> tuple[int, int]:
+    """The centres of a variable to begin with, and those of one that is circular.
+
+    A circle has one more: its first centre is its last one as well.
+    """
+    for number in range(centres_for(COARSE, n_variables), 1, -1):
+        if (
+            number ** (n_variables - n_circular) * (number + 1) ** n_circular
+            <= max_cells
+        ):
+            return number, number + 1
+    return 1, 1
+
+
+def widened(
+    grid: AnyGrid, states: FloatArray, space: spaces.Box, max_cells: int
+) -> AnyGrid | None:
     """Return the grid over the range that is seen, where that is wider than its own.
 
     While nothing is known of the range of variables, those that turn out to be cosine and
@@ -85,13 +103,17 @@ def widened(grid: AnyGrid, states: FloatArray, space: spaces.Box) -> AnyGrid | N
         grid: a crisp or a fuzzy partition.
         states: what was seen, `(n, d)`.
         space: the observations; no range becomes wider than its bounds.
+        max_cells: variables that are seen to vary get no more centres than this allows.
 
     Returns:
         The wider grid, or None if nothing was seen beyond the outermost centres.
+
+    Raises:
+        ValueError: what was seen lies too far apart, or too close together, for cells.
     """
     if not np.isfinite([states.min(axis=0), states.max(axis=0)]).all():
         return None  # whoever locates these states refuses them
-    angled = _with_angles(grid, states)
+    angled = _with_angles(grid, states, max_cells)
     wider, grid = angled is not None, angled or grid
     columns = list(grid.columns)
     least, most = (bounds[columns] for bounds in declared_bounds(space))
@@ -104,22 +126,42 @@ def widened(grid: AnyGrid, states: FloatArray, space: spaces.Box) -> AnyGrid | N
             continue
         count = line.size
         if count == 1:
-            count = centres_for(COARSE, len(axes))
+            circles = sum(period is not None for period in grid.periods)
+            others = math.prod(each.size for each in axes)
+            count = _coarse(len(axes), circles, max_cells)[0]
+            count = max(1, min(count, max_cells // others))
             first, last = low[axis], high[axis]
         else:
             first, last = min(low[axis], line[0]), max(high[axis], line[-1])
+        _check_range(axis, float(first), float(last), count)
         margin = MARGIN * (last - first)
         if low[axis] < line[0] or line.size == 1:
             first = max(first - margin, least[axis])
         if high[axis] > line[-1] or line.size == 1:
             last = min(last + margin, most[axis])
+        if count == line.size == 1:
+            continue
         if last > first and (first < line[0] or last > line[-1]):
             axes[axis] = np.linspace(first, last, count)
             wider = True
     return grid.with_centres(axes) if wider else None
 
 
-def _with_angles(grid: AnyGrid, states: FloatArray) -> AnyGrid | None:
+def _check_range(axis: int, first: float, last: float, count: int) -> None:
+    """Check that a range can be divided, to rounding.
+
+    Raises:
+        ValueError: it is too wide or too narrow.
+    """
+    gap = last / count - first / count  # Python's numbers overflow without a warning
+    if gap != 0.0 and not 1e-300 < abs(gap) < 1e300:
+        raise ValueError(
+            "observations must have ranges that can be divided into cells, those of "
+            f"variable {axis} lie between {first:g} and {last:g}; scale them."
+        )
+
+
+def _with_angles(grid: AnyGrid, states: FloatArray, max_cells: int) -> AnyGrid | None:
     """Make one circular variable of each two that are seen to be cosine and sine.
 
     Only of those that have one centre each: nothing was learned of them yet.
@@ -132,8 +174,9 @@ def _with_angles(grid: AnyGrid, states: FloatArray) -> AnyGrid | None:
         return None
     sine_of = dict(pairs)
     kept = [a for a in range(len(grid.centres)) if a not in sine_of.values()]
-    number = centres_for(COARSE, len(kept))
-    circle = np.linspace(-np.pi, np.pi, number + 1, endpoint=False)
+    circles = len(pairs) + sum(grid.periods[axis] is not None for axis in kept)
+    number = _coarse(len(kept), circles, max_cells)[1]
+    circle = np.linspace(-np.pi, np.pi, number, endpoint=False)
     return type(grid)(
         [circle if axis in sine_of else grid.centres[axis] for axis in kept],
         [grid.periods[axis] for axis in kept],
@@ -162,7 +205,9 @@ def carried_over(table: ArrayLike, old: Partition, new: Partition) -> FloatArray
         `(new.n_cells, n_actions)`.
 
     Raises:
-        ValueError: the table is not one of `old`.
+        TypeError: `old` or `new` is no partition.
+        ValueError: the table is not one of `old`, or the partitions are not of the same
+            variables.
 
     Example:
         >>> from acl_gym import Fuzzy
@@ -170,6 +215,12 @@ def carried_over(table: ArrayLike, old: Partition, new: Partition) -> FloatArray
         >>> carried_over([[1.0], [3.0]], coarse, coarse.refined(0)).ravel().tolist()
         [1.0, 2.0, 3.0]
     """
+    for name, each in (("old", old), ("new", new)):
+        if not isinstance(each, Partition):
+            raise TypeError(
+                f"{name} must be a partition, got {validation.shown(each)}; take Fuzzy, "
+                "Crisp or Discrete."
+            )
     values = validation.real_array("table", table, ndim=2)
     if len(values) != old.n_cells:
         raise ValueError(

@@ -188,11 +188,11 @@ def test_the_limit_is_told_once(caplog: Any) -> None:
 def test_it_becomes_wider_only_where_it_grows() -> None:
     box = spaces.Box(-9.0, 9.0, (1,), np.float64)
     grid, seen = Fuzzy([[0.0, 1.0]]), np.array([[3.0]])
-    wide = Growth(True).wider(grid, seen, box)
+    wide = Growth(True).wider(grid, seen, box, 99)
     assert wide is not None
     assert wide.centres[0][-1] > 3.0
-    assert Growth(False).wider(grid, seen, box) is None
-    assert Growth(True).wider(Discrete(3), seen, box) is None
+    assert Growth(False).wider(grid, seen, box, 99) is None
+    assert Growth(True).wider(Discrete(3), seen, box, 99) is None
 
 
 @pytest.mark.parametrize("on", [None, 1, "yes", np.True_])

@@ -93,6 +93,22 @@ def test_a_trial_can_be_taken_back(name: str) -> None:
         assert_same(colony.learn(trials=3), make(name).learn(trials=5))
 
 
+@EACH
+def test_going_on_from_one_snapshot_leaves_others_alone(name: str) -> None:
+    """The later one holds rows that stand behind those of the earlier one."""
+    colony = make(name).learn(trials=2)
+    early = colony.snapshot()
+    late = colony.learn(trials=2).snapshot()
+    colony.take_back(early)
+    colony.epsilon = 1.0
+    colony.learn(trials=3)
+    colony.take_back(late)
+    colony.epsilon = make(name).epsilon
+    uninterrupted = make(name).learn(trials=5)
+    assert colony.learn(trials=1).table.tobytes() == uninterrupted.table.tobytes()
+    assert np.array_equal(colony._memory.evidence, uninterrupted._memory.evidence)
+
+
 def test_a_second_call_goes_on_for_as_many_steps() -> None:
     colony = make("pendulum").learn(total_timesteps=600)
     first = colony.num_timesteps
@@ -181,8 +197,48 @@ def test_what_is_masked_is_neither_done_nor_promised() -> None:
     assert np.allclose(way[:, 1], -np.arange(10.0, 0.0, -1.0), atol=0.5)
 
 
+class Treadmill(gym.Env):
+    """Each step gives 1, and episodes never end but by their limit."""
+
+    observation_space = spaces.Discrete(1)
+    action_space = spaces.Discrete(1)
+
+    def reset(self, **kwargs: Any) -> tuple[int, dict[str, Any]]:
+        super().reset(**kwargs)
+        return 0, {}
+
+    def step(self, action: int) -> tuple[int, float, bool, bool, dict[str, Any]]:
+        return 0, 1.0, False, False, {}
+
+
+@pytest.mark.parametrize("mode", list(AutoresetMode))
+@pytest.mark.parametrize("schedule", ["synchronous", "asynchronous"])
+def test_a_time_limit_is_no_terminal_state(mode: AutoresetMode, schedule: str) -> None:
+    """With a discount of a half all of it is worth 2; an end after 3 steps, 1.75."""
+
+    def limited() -> gym.Env[Any, Any]:
+        return gym.wrappers.TimeLimit(Treadmill(), 3)
+
+    env: Any = SyncVectorEnv([limited] * 2, autoreset_mode=mode)
+    if schedule == "asynchronous":
+        env = WaitingVectorEnv([limited] * 2)
+    keywords = {"discount": 0.5, "schedule": schedule, "optimism": 0.0, "max_steps": 3}
+    colony = ReturningACL(env, seed=0, **keywords).learn(trials=40)
+    assert not colony._memory.terminated.any()
+    assert colony.table.ravel() == pytest.approx([2.0], abs=0.01)
+
+
+@pytest.mark.parametrize("reward", [1.0, -1.0])
+def test_without_discounting_levels_are_bounded_by_an_episode(reward: float) -> None:
+    """What ends by a limit promises what comes after, which would add up for ever."""
+    paid = gym.wrappers.TransformReward(Treadmill(), lambda _: reward)
+    env = WaitingVectorEnv([lambda: gym.wrappers.TimeLimit(paid, 7)])
+    colony = ReturningACL(env, seed=0, discount=1.0, max_steps=7).learn(trials=200)
+    assert np.abs(colony.table).max() <= 7.0
+
+
 def test_a_time_out_promises_what_the_last_state_promises() -> None:
-    """Ants that are stopped after two steps know the way of ten."""
+    """Ants that are stopped after each step know the way of six."""
     env = WaitingVectorEnv([lambda: gym.make("FrozenLake-v1", is_slippery=False)] * 4)
     colony = ReturningACL(env, seed=0, steps_per_walk=4).learn(total_timesteps=4_000)
     one = WaitingVectorEnv([lambda: gym.make("FrozenLake-v1", is_slippery=False)])
@@ -220,6 +276,9 @@ def test_the_range_that_was_taken_is_told(caplog: Any) -> None:
 def test_the_limit_on_cells_is_kept() -> None:
     colony = make("pendulum", max_cells=200, visits_to_grow=0.1)
     assert colony.learn(total_timesteps=3_000).partition.n_cells <= 200
+    few = make("pendulum", max_cells=10).learn(total_timesteps=1_000)
+    assert few.partition.n_cells <= 10
+    assert make("cart-pole", max_cells=100).learn(trials=2).partition.n_cells == 3**4
 
 
 def test_a_partition_that_is_given_stays() -> None:
@@ -324,3 +383,43 @@ def test_observations_that_are_no_numbers_are_refused() -> None:
     colony = ReturningACL(WaitingVectorEnv([Broken] * 2), seed=0)
     with pytest.raises(ValueError, match="states must be finite, got"):
         colony.learn(trials=2)
+
+
+class Given(gym.Env):
+    """Six steps, of which the reward and what is seen are given."""
+
+    observation_space = spaces.Box(-np.inf, np.inf, (1,), np.float64)
+    action_space = spaces.Discrete(2)
+
+    def __init__(self, reward: Any = 1.0, scale: float = 1.0) -> None:
+        self.reward, self.scale, self.steps = reward, scale, 0
+
+    def reset(self, **kwargs: Any) -> tuple[Any, dict[str, Any]]:
+        super().reset(**kwargs)
+        self.steps = 0
+        return np.array([self.scale]), {}
+
+    def step(self, action: int) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
+        self.steps += 1
+        seen = np.array([self.scale * (-1) ** self.steps])
+        return seen, self.reward, self.steps == 6, False, {}
+
+
+@pytest.mark.parametrize(
+    ("keywords", "words"),
+    [
+        ({"reward": "a"}, r"step must return a number as reward, .*'a'.* in slot 0"),
+        ({"reward": np.ones(2)}, r"step must return a number as reward, .* in slot 0"),
+        ({"reward": 10**400}, r"step must return a number as reward, .* in slot 0"),
+        ({"reward": -1e306}, r"levels and rewards must be numbers that can be added"),
+        ({"scale": 1.7e308}, r"observations must have ranges that can be divided"),
+        ({"scale": 1e-310}, r"observations must have ranges that can be divided"),
+    ],
+)
+def test_what_cannot_be_reckoned_with_is_refused(
+    keywords: dict[str, Any], words: str
+) -> None:
+    env = WaitingVectorEnv([lambda: Given(**keywords)] * 2)
+    with pytest.raises(ValueError, match=words) as caught:
+        ReturningACL(env, seed=0).learn(trials=2)
+    assert caught.value.__cause__ is None

@@ -165,6 +165,8 @@ def test_older_paths_are_drawn_before_the_newest() -> None:
     assert some[-2:].tolist() == newest.tolist()
     assert some.size == 3
     assert memory.with_older(newest, 0, rng).tolist() == newest.tolist()
-    half = memory.with_older(newest, steps // 2, rng)
-    assert half.size == 2 + -(-older * (steps // 2) // steps)
-    assert (np.diff(half) > 0).all()
+    sizes = memory.last - memory.first
+    for most in range(1, steps):
+        drawn = memory.with_older(newest, most, rng)[:-2]
+        assert most <= sizes[drawn].sum() < most + sizes.max()
+        assert (np.diff(drawn) > 0).all()

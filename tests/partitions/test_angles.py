@@ -184,23 +184,32 @@ def test_what_is_constant_or_misses_once_is_no_angle() -> None:
     almost[7, 3] += 0.01
     assert find_angles(almost) == [(2, 4)]
     assert find_angles(np.zeros((3, 0))) == []
-    assert find_angles(np.array([[1.0, 0.0], [0.0, 1.0]])) == [(0, 1)]
+
+
+def test_a_few_flags_are_no_angle() -> None:
+    """Of which one is set every time: so do the squares of a cosine and a sine add up."""
+    flags = np.eye(2)[[0, 1, 1, 0, 1] * 60]
+    assert find_angles(flags) == []
+    nine = np.linspace(0.0, 1.0, 9)
+    directions = np.column_stack([np.cos(nine), np.sin(nine)])
+    assert find_angles(np.repeat(directions, 30, axis=0)) == []
+    assert find_angles(np.vstack([directions, [[0.0, 1.0]]])) == [(0, 1)]
 
 
 def test_a_partition_takes_angles_before_it_knows_ranges() -> None:
     space = spaces.Box(-np.inf, np.inf, (6,), np.float64)
-    begun = initial_partition(_spaced(space))
-    wide = widened(begun, seen(), space)
+    begun = initial_partition(_spaced(space), 20_000)
+    wide = widened(begun, seen(), space, 20_000)
     assert wide is not None
     assert wide.angles == ((0, 3), (2, 4))
     assert wide.columns == (0, 1, 2, 5)
     assert [line.size for line in wide.centres] == [8, 7, 8, 1]
     assert wide.centres[1][0] < -0.9
     assert wide.centres[1][-1] > 0.9
-    assert widened(wide, seen(), space) is None
+    assert widened(wide, seen(), space, 20_000) is None
     further = seen()
     further[0, 1] = 5.0
-    wider = widened(wide, further, space)
+    wider = widened(wide, further, space, 20_000)
     assert wider is not None
     assert wider.angles == wide.angles
     assert wider.centres[1][-1] > 5.0
@@ -210,7 +219,7 @@ def test_variables_that_have_a_range_stay_as_they_are() -> None:
     grid = Fuzzy([[-1.0, 0.0, 1.0], [-1.0, 0.0, 1.0]])
     a = np.linspace(-3.0, 3.0, 50)
     box = spaces.Box(-1.0, 1.0, (2,), np.float64)
-    assert widened(grid, np.column_stack([np.cos(a), np.sin(a)]), box) is None
+    assert widened(grid, np.column_stack([np.cos(a), np.sin(a)]), box, 20_000) is None
 
 
 def _spaced(space: spaces.Box) -> Any:

@@ -215,5 +215,6 @@ def test_cosines_that_are_huge_are_taken_and_infinite_ones_refused() -> None:
     assert index.tolist() == grid([[1.0, 1.7]])[0].tolist()
     with pytest.raises(ValueError, match=r"states must be finite, got \[inf, -inf\]"):
         grid([[np.inf, -np.inf]])
-    seen = np.array([[0.6, 0.8, 1e300], [-0.8, 0.6, -1e300]])
+    angle = np.arange(10.0)
+    seen = np.column_stack([np.cos(angle), np.sin(angle), np.tile([1e300, -1e300], 5)])
     assert find_angles(seen) == [(0, 1)]

@@ -86,6 +86,9 @@ def test_only_grids_can_be_refined_and_stay_of_their_kind() -> None:
     assert lone.refined(0).n_cells == lone.n_cells
 
 
+MOST = 20_000  # cells
+
+
 @pytest.mark.parametrize("axis", [2, -1, "0", 0.5, None, True])
 def test_an_axis_must_exist(axis: Any) -> None:
     with pytest.raises((TypeError, ValueError), match="axis must be"):
@@ -98,18 +101,25 @@ def test_a_table_of_another_partition_is_refused() -> None:
         carried_over(np.zeros((3, 1)), coarse, coarse.refined(0))
 
 
+@pytest.mark.parametrize("which", ["old", "new"])
+def test_tables_are_carried_between_partitions(which: str) -> None:
+    both: dict[str, Any] = {"old": Fuzzy([[0.0, 1.0]]), "new": Fuzzy([[0.0, 1.0]])}
+    with pytest.raises(TypeError, match=f"{which} must be a partition, got 3"):
+        carried_over(np.zeros((2, 1)), **{**both, which: 3})
+
+
 BOX = spaces.Box(np.array([-np.inf, 0.0]), np.array([np.inf, 1.0]), dtype=np.float64)
 
 
 def test_a_range_is_that_which_is_seen_with_a_margin_within_the_bounds() -> None:
     start = Fuzzy([[0.0], [0.5]])
-    wide = widened(start, np.array([[-2.0, 0.1], [8.0, 0.9]]), BOX)
+    wide = widened(start, np.array([[-2.0, 0.1], [8.0, 0.9]]), BOX, MOST)
     assert wide is not None
     # A tenth of the range is added on either side: 1.0, and 0.08.
     np.testing.assert_allclose(wide.centres[0], np.linspace(-3.0, 9.0, 9))
     np.testing.assert_allclose(wide.centres[1], np.linspace(0.02, 0.98, 9))
-    assert widened(wide, np.array([[9.0, 0.5]]), BOX) is None
-    wider = widened(wide, np.array([[10.0, 1.0]]), BOX)
+    assert widened(wide, np.array([[9.0, 0.5]]), BOX, MOST) is None
+    wider = widened(wide, np.array([[10.0, 1.0]]), BOX, MOST)
     assert wider is not None
     np.testing.assert_allclose(wider.centres[0], np.linspace(-3.0, 11.3, 9))
     np.testing.assert_allclose(wider.centres[1][[0, -1]], [0.02, 1.0])
@@ -117,22 +127,41 @@ def test_a_range_is_that_which_is_seen_with_a_margin_within_the_bounds() -> None
 
 def test_what_does_not_vary_or_is_circular_keeps_its_centres() -> None:
     grid = Fuzzy([[0.0, 1.0, 2.0], [0.5]], [3.0, None])
-    assert widened(grid, np.array([[50.0, 0.7], [-9.0, 0.7]]), BOX) is None
+    assert widened(grid, np.array([[50.0, 0.7], [-9.0, 0.7]]), BOX, MOST) is None
 
 
 def test_states_that_are_not_finite_widen_nothing() -> None:
-    assert widened(Fuzzy([[0.0], [0.5]]), np.array([[np.inf, 0.1]]), BOX) is None
-    assert widened(Fuzzy([[0.0], [0.5]]), np.array([[np.nan, 0.1]]), BOX) is None
+    start = Fuzzy([[0.0], [0.5]])
+    assert widened(start, np.array([[np.inf, 0.1]]), BOX, MOST) is None
+    assert widened(start, np.array([[np.nan, 0.1]]), BOX, MOST) is None
 
 
 def test_a_partition_to_begin_with() -> None:
-    pendulum = initial_partition(gym.make("acl_gym/Pendulum-v0"))
+    pendulum = initial_partition(gym.make("acl_gym/Pendulum-v0"), MOST)
     assert isinstance(pendulum, Fuzzy)
     assert pendulum.periods == (pytest.approx(2 * np.pi), None)
     assert [line.size for line in pendulum.centres] == [10, 1]
-    assert isinstance(initial_partition(gym.make("Taxi-v4")), Discrete)
+    assert isinstance(initial_partition(gym.make("Taxi-v4"), 1), Discrete)
     with pytest.raises(ValueError, match=r"must have 1 to 6 variables .*, got 7"):
-        initial_partition(Many())
+        initial_partition(Many(), MOST)
+
+
+@pytest.mark.parametrize(
+    ("most", "on_circle", "on_line"),
+    [(1, 1, 1), (5, 1, 1), (6, 3, 2), (19, 4, 3), (20, 5, 4), (89, 9, 8), (90, 10, 9)],
+)
+def test_there_are_never_more_cells_than_may_be(
+    most: int, on_circle: int, on_line: int
+) -> None:
+    """A circle and a line: 9 centres of the line and 10 of the circle where they fit."""
+    env = gym.make("acl_gym/Pendulum-v0")
+    grid = initial_partition(env, most)
+    assert isinstance(grid, Fuzzy)
+    box = env.observation_space
+    assert isinstance(box, spaces.Box)
+    wide = widened(grid, np.array([[0.0, -3.0], [1.0, 3.0]]), box, most) or grid
+    assert [line.size for line in wide.centres] == [on_circle, on_line]
+    assert wide.n_cells <= most
 
 
 class Many(gym.Env):

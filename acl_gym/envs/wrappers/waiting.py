@@ -139,7 +139,10 @@ class WaitingSlots(VectorEnv[Any, Any, NDArray[Any]]):
         for slot, given in self._advance(walking, actions):
             if type(given) is not tuple or len(given) != 5:
                 given = _parts("step", given, 5)
-            seen, rewards[slot], terminated[slot], truncated[slot], info = given
+            try:
+                seen, rewards[slot], terminated[slot], truncated[slot], info = given
+            except (TypeError, ValueError, OverflowError):
+                raise _no_numbers(slot, given) from None
             if plain and type(seen) is np.ndarray and seen.shape == shape:
                 shown[slot] = seen  # what is most frequent needs no more checks
             else:
@@ -148,6 +151,15 @@ class WaitingSlots(VectorEnv[Any, Any, NDArray[Any]]):
                 infos = self._add_info(infos, info, slot)
         self._finished |= terminated | truncated
         return copied(shown), rewards, terminated, truncated, infos
+
+
+def _no_numbers(slot: int, given: Any) -> ValueError:
+    """The error for a reward or flags that are none."""
+    return ValueError(
+        "step must return a number as reward, then True or False for terminated and "
+        f"truncated, got {', '.join(map(validation.shown, given[1:4]))} in slot {slot}; "
+        "check the environment."
+    )
 
 
 class WaitingVectorEnv(WaitingSlots, SyncVectorEnv[Any, Any]):

@@ -36,7 +36,7 @@ _ROWS = 65_536  # cells that are carried over at a time
 AnyGrid = TypeVar("AnyGrid", bound=Grid)
 
 
-def initial_partition(env: Env, max_cells: int) -> Partition:
+def initial_partition(env: Env, max_cells: float = math.inf) -> Partition:
     """Choose the partition from which that of a colony grows.
 
     Observations that are cells already stay cells. Others get a fuzzy grid of few cells.
@@ -73,7 +73,7 @@ def initial_partition(env: Env, max_cells: int) -> Partition:
     return Fuzzy(centres, periods)
 
 
-def _coarse(n_variables: int, n_circular: int, max_cells: int) -> tuple[int, int]:
+def _coarse(n_variables: int, n_circular: int, max_cells: float) -> tuple[int, int]:
     """The centres of a variable to begin with, and those of one that is circular.
 
     A circle has one more: its first centre is its last one as well.

@@ -46,7 +46,6 @@ class Task:
         starts: how many episodes an evaluation has; a control system of this package has
             its own.
         limit: another time limit than the registered one.
-        native: whether it is one of this package's vector environments.
     """
 
     env_id: str

@@ -53,13 +53,13 @@ def test_ten_lines_learn_the_pendulum_and_go_home(
 ) -> None:
     run(*BLOCKS[:2])
     cost = float(capsys.readouterr().out.split()[0])
-    assert cost < 1.2 * 38.4, "three seeds: 41.9 to 42.3"
+    assert cost < 1.2 * 38.4, "five seeds: 41.1 to 44.0"
     written = {"swing_up.npz", "policy.png", "swing_up.h", "swing_up_policy.npz"}
     assert set(os.listdir()) == written
 
 
 def test_a_plant_of_ones_own_is_controlled(capsys: pytest.CaptureFixture[str]) -> None:
-    """Five seeds have cost 53.4 to 53.8, and all starts succeed; 52 is about the best."""
+    """Seed 0 has 53.8, and all starts succeed; 52 is about the best."""
     names = run(BLOCKS[2])
     assert 50.0 < float(capsys.readouterr().out) < 55.0
     result = acl_gym.evaluate_policy_cost(names["colony"], names["env"])
@@ -68,10 +68,10 @@ def test_a_plant_of_ones_own_is_controlled(capsys: pytest.CaptureFixture[str]) -
 
 
 def test_a_newcomers_environment_is_learned() -> None:
-    """Five seeds take 15.5 to 15.7 steps, and all arrive."""
+    """Five seeds take 15.2 to 15.3 steps, and all arrive."""
     result = run(BLOCKS[3])["result"]
     assert result.success_rate >= 0.95
-    assert result.cost < 17.0
+    assert result.cost < 16.0
 
 
 @pytest.mark.slow
@@ -83,10 +83,10 @@ def test_commands_of_the_shell_do_what_they_say() -> None:
     assert "acl_gym/Pendulum-v0" in shell(listed)
     said = [json.loads(shell(f"{command} --json")) for command in rest]
     trained, evaluated, resumed, filmed, continuous, thesis, balanced = said
-    # Five seeds: 41.2 to 43.0 after 6,800 to 7,400 interactions.
+    # Seed 0: 42.8 after 8,991 interactions.
     assert trained["agent"] == "returning"
     assert trained["policy_cost"] < 46.0
-    assert trained["env_steps"] < 9_000
+    assert trained["env_steps"] < 9_500
     assert evaluated["policy_cost"] == trained["policy_cost"]
     assert resumed["trials"] == 60
     assert resumed["best"]["policy_cost"] == filmed["policy_cost"] < 46.0

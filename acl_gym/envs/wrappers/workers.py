@@ -42,8 +42,8 @@ class WorkersVectorEnv(WaitingSlots):
     Like a `WaitingVectorEnv` it steps only the slots that have not finished. What an
     agent learns is the same, to the bit, for any number of workers and every executor:
     each episode of a slot starts from a seed that is drawn here, see `reset`. Where each
-    trial is seeded, as by the agents of this package, it is also the same as with a
-    `WaitingVectorEnv`. It pays where the slots of a worker take longer for a step
+    trial is seeded and each slot makes one episode in it, as in the synchronous trials of
+    this package's agents, it is also the same as with a `WaitingVectorEnv`. It pays where the slots of a worker take longer for a step
     together than a message to it, a few tenths of a millisecond for a process and a few
     milliseconds for a cluster.
 

@@ -157,10 +157,7 @@ def plot_branch_choice(
             places = np.arange(5) + (i - (len(shares) - 1) / 2) * width
             colour = _COLOURS[i % len(_COLOURS)]
             ax.bar(places, counts / found.size, 0.9 * width, color=colour, label=name)
-        names = [
-            f"{low:.0%}\N{EN DASH}{high:.0%}".replace("%\N{EN DASH}", "\N{EN DASH}")
-            for low, high in zip(_FIFTHS[:-1], _FIFTHS[1:], strict=True)
-        ]
+        names = [f"{low}\N{EN DASH}{low + 20}%" for low in range(0, 100, 20)]
         ax.set_xticks(np.arange(5), names)
         ax.grid(visible=False, axis="x")
         _share_axis(ax.yaxis)

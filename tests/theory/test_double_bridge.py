@@ -73,7 +73,10 @@ def test_without_an_exponent_the_law_is_beta_binomial(
 ) -> None:
     expected = stats.betabinom(n_ants, offset, offset).pmf(np.arange(n_ants + 1))
     # SciPy's own is a difference of large logarithms.
-    for found in (crossing_law(n_ants, 1.0, offset), linear_crossing_law(n_ants, offset)):
+    for found in (
+        crossing_law(n_ants, 1.0, offset),
+        linear_crossing_law(n_ants, offset),
+    ):
         assert np.allclose(found, expected, rtol=1e-9, atol=1e-300)
 
 

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from acl_gym import ACL, evaluate_policy_cost
-from acl_gym.envs.graph import double_bridge
 from acl_gym.envs.graph.double_bridge import (
     DoubleBridge,
     DoubleBridgeEnv,
     DoubleBridgeVectorEnv,
     Place,
+    kernels,
 )
 from acl_gym.theory import choice_probability, crossing_law, majority_probability
 
@@ -125,7 +125,7 @@ def test_the_kernel_runs_the_same_without_the_compiler() -> None:
     starts = np.repeat(np.arange(float(system.n_states)), 2)
     actions = np.tile([0, 1], system.n_states)
     results = []
-    for run in (double_bridge.advance, double_bridge.advance.py_func):
+    for run in (kernels.advance, kernels.advance.py_func):
         states, rewards = starts.copy(), np.empty(starts.size)
         reached = np.empty(starts.size, dtype=np.bool_)
         run(states, actions, system._next_state, rewards, reached)

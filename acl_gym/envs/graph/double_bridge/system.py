@@ -1,4 +1,4 @@
-"""The double bridge of §2.3.2 as environments, single and vector."""
+"""The double bridge of §2.3.2: where its branches lead."""
 
 from __future__ import annotations
 
@@ -9,11 +9,9 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 from gymnasium import spaces
 
-from acl_gym.envs.control.environments import ControlVectorEnv
 from acl_gym.envs.control.families import NumberedSystem
-from acl_gym.envs.control.single import ControlEnv
+from acl_gym.envs.graph.double_bridge import kernels
 from acl_gym.utils import validation
-from acl_gym.utils.compiling import njit
 from acl_gym.utils.typing import BoolArray, FloatArray, IntArray
 
 NEST = 0
@@ -21,31 +19,6 @@ NEST = 0
 
 MOST_STATES = 1_000_000
 """Places on a bridge: an agent keeps levels for each of them."""
-
-
-@njit
-def advance(
-    states: FloatArray,
-    actions: IntArray,
-    next_state: IntArray,
-    rewards: FloatArray,
-    reached: BoolArray,
-) -> None:
-    """Move each ant to the next place, in place; an ant at the food stays there.
-
-    Args:
-        states: `(n,)`, replaced by the next states.
-        actions: `(n,)`.
-        next_state: where each action leads, `(n_states, 2)`; the food is last.
-        rewards: `(n,)`, receives -1, and 0 at the food.
-        reached: `(n,)`, receives whether the next state is the food.
-    """
-    food = next_state.shape[0] - 1
-    for i in range(actions.size):
-        state = int(states[i])
-        rewards[i] = 0.0 if state == food else -1.0
-        states[i] = next_state[state, actions[i]]
-        reached[i] = states[i] == food
 
 
 class Place(NamedTuple):
@@ -69,9 +42,9 @@ class DoubleBridge(NumberedSystem):
     Attributes:
         lengths: of the two branches in steps, integers >= 1. The default is twice as
             long for the second one, the ratio of Goss et al. (1989).
-        modules: how many double bridges lie one behind the other, >= 1. They are turned
-            by turns: what is left in the first is right in the second. Goss et al. had
-            two, so that ants that prefer a side gain nothing by it.
+        modules: how many double bridges lie one behind the other, >= 1. Each is the
+            mirror image of the one before: what is left in the first is right in the
+            second. Goss et al. had two, so that ants that prefer a side gain nothing.
         closed: the branch that is missing, 0 or 1, in each module; None: both are
             there. A colony that has learned on the long branch alone meets the short
             one late if it then goes on with an environment without `closed`.
@@ -209,7 +182,7 @@ class DoubleBridge(NumberedSystem):
         reached: BoolArray,
     ) -> None:
         """One step of each ant; see `ControlSystem.advance`. Ants stay at the food."""
-        advance(states[0], actions, self._next_state, rewards, reached)
+        kernels.advance(states[0], actions, self._next_state, rewards, reached)
 
     def action_mask(self, states: FloatArray) -> BoolArray:
         """U_q of (3.4), `(n, 2)`: both sides where ants choose, 0 on a branch."""
@@ -218,65 +191,3 @@ class DoubleBridge(NumberedSystem):
     def evaluation_states(self) -> FloatArray:
         """The nest, `(1, 1)`."""
         return np.array([[float(NEST)]])
-
-
-class DoubleBridgeEnv(ControlEnv):
-    """The bridge on which real ants find the shorter way without seeing it.
-
-    ## Description
-    §2.3.2 of the thesis, after Deneubourg et al. (1990) and Goss et al. (1989): a nest
-    and a food source are joined by a bridge that forks into two branches, of equal or of
-    unequal length. An ant walks from the nest to the food, chooses a branch where the
-    bridge forks, and then walks on along it. What other ants have left on the branches
-    is not part of the environment but of the colony, as in every environment of this
-    package: a slot is one ant. What (2.1) makes of colonies of real ants is in
-    `acl_gym.theory`, `simulate_crossings` and `crossing_law`.
-
-    ## Action Space
-    `Discrete(2)`: 0 is left, 1 is right. In the first module, the branch of
-    `lengths[0]` is on the left; in the second, if there is one, on the right. On a
-    branch only action 0 is available (`infos["action_mask"]`); the other has the same
-    effect.
-
-    ## Observation Space
-    `Discrete(15)`, in general modules (lengths[0] + lengths[1] - 1) + 1: 0 is the nest,
-    then come the places on the branch of `lengths[0]`, those on the other one and the
-    end of the module, which is the food, or where the next module forks.
-
-    ## Rewards
-    -1 a step, so that the return is minus the length of the way.
-
-    ## Starting State
-    The nest.
-
-    ## Episode End
-    Terminated at the food. The registered limit is 100 steps, ten times the longer
-    branch; `max_episode_steps` sets another (-1: none). `info["is_success"]` says
-    whether the food was reached.
-
-    ## Arguments
-    `lengths`, `modules` and `closed`, see `DoubleBridge`. An ant that tries a closed
-    branch, which is not available, finds out and turns back: it stays where it is, for
-    the cost of a step.
-
-    >>> import gymnasium as gym, acl_gym
-    >>> env = gym.make("acl_gym/DoubleBridge-v0", lengths=(2, 3))
-    >>> observation, info = env.reset()
-    >>> info["action_mask"].tolist()
-    [True, True]
-    >>> [int(env.step(action)[0]) for action in (1, 0, 0)]
-    [2, 3, 4]
-
-    ## Version History
-    - v0: first version.
-    """
-
-    system_type = DoubleBridge
-    painter = "acl_gym.envs.graph.double_bridge_painter:DoubleBridgePainter"
-
-
-class DoubleBridgeVectorEnv(ControlVectorEnv):
-    """Many ants, one a slot; see `DoubleBridgeEnv`."""
-
-    system_type = DoubleBridge
-    painter = "acl_gym.envs.graph.double_bridge_painter:DoubleBridgePainter"

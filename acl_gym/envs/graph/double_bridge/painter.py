@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from acl_gym.envs.control.rendering import Painter
-from acl_gym.envs.graph.double_bridge import NEST, DoubleBridge
+from acl_gym.envs.graph.double_bridge.system import NEST, DoubleBridge
 from acl_gym.utils.typing import FloatArray
 
 _PAPER = (255, 255, 255)

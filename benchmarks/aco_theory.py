@@ -118,7 +118,7 @@ def draw_levels(ax: Axes, found: LimitedAnts, reading: str) -> None:
         line = {"color": colour, "label": name}
         style.draw_band(ax, trials, levels / tau_max, line)
     ax.axhline(1.0, **style.BOUND)
-    ax.text(WATCHED, 1.02, "τ_max", ha="right", va="bottom", fontsize=7.5)
+    ax.text(WATCHED, 1.02, r"$\tau_{\max}$", ha="right", va="bottom", fontsize=7.5)
     allowed = float(trials_to_dominate(SHOWN))
     ax.axvline(allowed, **{**style.BOUND, "linestyle": ":"})
     ax.text(allowed + 1, 0.03, f"k₀ = {allowed:.0f}", fontsize=7.5)
@@ -130,7 +130,7 @@ def draw_levels(ax: Axes, found: LimitedAnts, reading: str) -> None:
 def draw_found(ax: Axes, n_colonies: int, seed: int) -> None:
     """The share of colonies that have found the optimum, and its bound."""
     n_trials = 2_000
-    trials = np.unique(np.geomspace(1, 1e15, 400).round())
+    trials = np.unique(np.geomspace(1, 1e16, 400).round())
     for cities, colour in ((CITIES, style.ORANGE), (CITIES[:4, :4], style.BLUE)):
         n = len(cities)
         found = simulate_limited_ants(
@@ -146,10 +146,10 @@ def draw_found(ax: Axes, n_colonies: int, seed: int) -> None:
         bound = probability_found(least, n, trials)
         ax.plot(trials, bound, color=colour, linestyle="--", label="its bound")
     ax.set_xscale("log")
-    ax.set(xlim=(1, 1e15), ylim=(0.0, 1.05), xlabel="trials")
-    ax.set_ylabel("P*: share that has found the optimum")
+    ax.set(xlim=(1, 1e16), ylim=(0.0, 1.05), xlabel="trials")
+    ax.set_ylabel("share that has found the optimum")
     ax.set_title("how soon the optimum is found")
-    ax.legend(loc="center", bbox_to_anchor=(0.62, 0.5))
+    ax.legend(loc="center right", handlelength=1.6)
 
 
 def draw(n_colonies: int, seed: int, path: Path) -> None:
@@ -163,7 +163,7 @@ def draw(n_colonies: int, seed: int, path: Path) -> None:
                 global_decay=SHOWN, tau_min=TAU_MIN, evaporation=reading, seed=seed,
             )  # fmt: skip
             draw_levels(ax, found, reading)
-        axes[0].set_ylabel("level / τ_max")
+        axes[0].set_ylabel(r"level / $\tau_{\max}$")
         axes[0].legend(loc="center right")
         draw_found(axes[2], n_colonies, seed)
         figure.savefig(path, dpi=200)
@@ -185,7 +185,12 @@ def main() -> None:
         parser.error(str(error))
     rows = measure(options.colonies, options.seed)
     if options.json:
-        print(json.dumps({"colonies": options.colonies, "rows": rows}))
+        # JSON has no infinity: trials of colonies in which it never happens are null.
+        finite = [
+            {name: None if value == math.inf else value for name, value in row.items()}
+            for row in rows
+        ]
+        print(json.dumps({"colonies": options.colonies, "rows": finite}))
         return
     for row in rows:
         print(", ".join(f"{name} {value}" for name, value in row.items()))

@@ -16,11 +16,11 @@ from typing import Any
 import numpy as np
 from matplotlib.ticker import NullFormatter
 
-from acl_gym.plotting import style
-from acl_gym.plotting.double_bridge import (
+from acl_gym.plotting import (
     plot_branch_choice,
     plot_crossing_law,
     plot_crossings,
+    style,
 )
 from acl_gym.theory import (
     crossing_law,
@@ -123,7 +123,7 @@ def draw(
             more = () if alpha == 1.0 else (alpha,)
             exact = [majority_probability(law(int(n), *more)) for n in counts]
             colour = line.get_color()
-            ax.plot(counts, exact, color=colour, label=f"α = {alpha:g}")
+            ax.plot(counts, exact, color=colour)
             dots = [row["simulated"] for row in equal if row["alpha"] == alpha]
             ax.plot(ANTS, dots, ".", color=colour, clip_on=False)
         ax.set_xscale("log")
@@ -134,7 +134,7 @@ def draw(
         ax.yaxis.set_major_formatter(lambda value, _: f"{value:.0%}")
         ax.set_ylabel("probability")
         ax.set_title("equal branches: one holds more than 80%")
-        ax.legend()
+        ax.text(0.98, 0.06, "colours as above", ha="right", transform=ax.transAxes)
         figure.savefig(path, dpi=200)
 
 

@@ -58,7 +58,9 @@ def plot_crossings(
         ax.set_xscale("log")
         style.plain_numbers(ax.xaxis)
         ax.xaxis.set_major_formatter(lambda value, _: f"{value:,.0f}")
-        ax.set(xlim=(after[0], after[-1]), xlabel="ants that have crossed")
+        if after.size > 1:
+            ax.set_xlim(after[0], after[-1])
+        ax.set_xlabel("ants that have crossed")
         _share_axis(ax.yaxis)
         ax.set(ylim=(0.0, 1.0), ylabel=f"share of {branch}")
     return ax
@@ -74,7 +76,8 @@ def plot_crossing_law(
     """Draw how likely each share of branch A is, exactly and in simulation.
 
     Args:
-        laws: from names to laws of N_A, as `acl_gym.theory.crossing_law` returns them.
+        laws: from names, for the legend, to laws of N_A, as
+            `acl_gym.theory.crossing_law` returns them.
         ax: where to draw; None makes a figure, see `plot_policy`.
         simulated: from some of the names to how many ants of each colony chose branch
             A; drawn as points. None draws none.
@@ -105,25 +108,24 @@ def plot_crossing_law(
                     f"laws[{name!r}] must hold the probabilities of 0 to N crossings "
                     f"with N >= 1, got the shape {law.shape}."
                 )
-            line = {
-                "color": _COLOURS[i % len(_COLOURS)],
-                "linestyle": _LINES[i // len(_COLOURS) % len(_LINES)],
-            }
+            colour = _COLOURS[i % len(_COLOURS)]
+            dashes = _LINES[i // len(_COLOURS) % len(_LINES)]
             n_ants = law.size - 1
-            ax.plot(centres, _density(np.arange(n_ants + 1), law, edges), **line)
-            ax.lines[-1].set_label(name)
+            exact = _density(np.arange(n_ants + 1), law, edges, n_ants)
+            ax.plot(centres, exact, color=colour, linestyle=dashes, label=name)
             if name in simulated:
                 counts = ranges.checked(
                     f"simulated[{name!r}]", simulated[name], at_least=0, at_most=n_ants
                 )
                 weights = np.full(counts.shape, 1.0 / counts.size)
                 found = _density(counts, weights, edges, n_ants)
-                ax.plot(centres, found, ".", color=line["color"], markersize=3.5)
+                ax.plot(centres, found, ".", color=colour, markersize=3.5)
         _share_axis(ax.xaxis)
         ax.set(xlim=(0.0, 1.0), xlabel="share of branch A")
         ax.set_ylim(bottom=0.0)
         ax.set_ylabel("probability density")
-        ax.legend()
+        if any(laws):
+            ax.legend()
     return ax
 
 
@@ -163,12 +165,13 @@ def plot_branch_choice(
         _share_axis(ax.yaxis)
         ax.set(ylim=(0.0, 1.0), ylabel="share of the colonies")
         ax.set_xlabel(f"ants on the {branch}")
-        ax.legend()
+        if any(shares):
+            ax.legend()
     return ax
 
 
 def _density(
-    counts: Any, weights: FloatArray, edges: FloatArray, n_ants: int | None = None
+    counts: Any, weights: FloatArray, edges: FloatArray, n_ants: int
 ) -> FloatArray:
     """The mean density of the share in each class.
 
@@ -176,9 +179,8 @@ def _density(
         counts: numbers of crossings.
         weights: probability of each.
         edges: of the classes.
-        n_ants: of how many; None takes the largest count.
+        n_ants: of how many ants.
     """
-    n_ants = int(counts[-1]) if n_ants is None else n_ants
     # Each number of crossings stands for an equal part of [0, 1].
     shares = (counts + 0.5) / (n_ants + 1)
     mass, _ = np.histogram(shares, edges, weights=weights)

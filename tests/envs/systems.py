@@ -193,7 +193,7 @@ SYSTEMS = [
         env_id="acl_gym/DoubleBridge-v0",
         single=DoubleBridgeEnv,
         vector=DoubleBridgeVectorEnv,
-        # Nine steps are enough for the shorter branch, or if it is closed for no ant.
+        # Nine steps are enough on the shorter branch only.
         easy={"lengths": (4, 12)},
         variant={"modules": 2},
         # Some tests walk a thousand steps.

@@ -38,6 +38,30 @@ def test_asynchronous() -> None:
     assert walking["synchronous"] < walking["asynchronous"] == 1.0
 
 
+def test_double_bridge() -> None:
+    found = output_of("double_bridge.py", "--colonies", "1000")
+    for row in found["equal"]:
+        # Four and a half standard errors: wrong once in 7,000 seeds for 20 rows.
+        error = (row["exact"] * (1 - row["exact"]) / 1_000) ** 0.5
+        assert abs(row["simulated"] - row["exact"]) <= 4.5 * error + 0.002
+    short = [row["short"] for row in found["unequal"]]
+    assert short[0] < short[1] < short[2]
+    assert found["unequal"][3] == {
+        "experiment": "2, short branch late",
+        "short": 0.0,
+        "long": 1.0,
+    }
+
+
+def test_aco_theory() -> None:
+    for row in output_of("aco_theory.py", "--colonies", "50")["rows"]:
+        assert row["highest_level"] <= 1 + 1e-12
+        never = row["trials_most"] is None
+        assert never == (row["evaporation"] == "tour" and row["tau0"] == "tau_max")
+        if row["evaporation"] == "all":
+            assert row["later_than_k0"] == 0.0
+
+
 def test_plant() -> None:
     cases = output_of("plant.py", "--slots", "3", *ONCE)["cases"]
     assert [case["slots"] for case in cases] == [1, 3, 3, 3]

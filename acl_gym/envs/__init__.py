@@ -10,6 +10,7 @@ it.
 
 | Id | T | Where it comes from |
 | --- | --- | --- |
+| DoubleBridge-v0 | 100 | ten times the longer branch |
 | GridSearch1D-v0 | 50 | 5 times the 10 states, see `GridSearch.evaluation_steps` |
 | GridSearch2D-v0 | 435 | 5 times the 87 states of the default map |
 | Navigation-v0 | 150 | Table 4.1 |
@@ -77,6 +78,11 @@ ENVIRONMENTS = {
         "acl_gym.envs.two_state:TwoStateEnv",
         "acl_gym.envs.two_state:TwoStateVectorEnv",
         2,
+    ),
+    "acl_gym/DoubleBridge-v0": Entry(
+        "acl_gym.envs.graph.double_bridge:DoubleBridgeEnv",
+        "acl_gym.envs.graph.double_bridge:DoubleBridgeVectorEnv",
+        100,
     ),
 }
 

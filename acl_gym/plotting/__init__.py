@@ -1,7 +1,8 @@
 """Pictures of policies, of what they do, and of how they were learned.
 
 `plot_policy`, `plot_pheromone`, `plot_learning_curve`, `plot_trajectory` and `animate`
-take any agent of this package. They draw on axes of the caller or make a figure of their
+take any agent of this package; `plot_crossings`, `plot_crossing_law` and
+`plot_branch_choice` take colonies that cross a double bridge. They draw on axes of the caller or make a figure of their
 own, leave pyplot and the global settings of Matplotlib alone, and never open a window.
 The functions named `draw_...` make the figures of the experiments.
 """
@@ -17,6 +18,11 @@ from acl_gym.envs.navigation.system import Navigation
 from acl_gym.envs.pendulum.system import Pendulum
 from acl_gym.plotting import grid_search, navigation, pendulum
 from acl_gym.plotting.animation import animate
+from acl_gym.plotting.double_bridge import (
+    plot_branch_choice,
+    plot_crossing_law,
+    plot_crossings,
+)
 from acl_gym.plotting.learning import draw_learning_curves, plot_learning_curve
 from acl_gym.plotting.maps import plot_pheromone, plot_policy
 from acl_gym.plotting.shown import Shown
@@ -28,6 +34,9 @@ __all__ = [
     "draw_learning_curves",
     "draw_policies",
     "draw_trajectories",
+    "plot_branch_choice",
+    "plot_crossing_law",
+    "plot_crossings",
     "plot_learning_curve",
     "plot_pheromone",
     "plot_policy",

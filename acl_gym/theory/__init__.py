@@ -1,11 +1,14 @@
-"""The thesis's theory as functions: bounds and limits of §2.6 and §3.4.
+"""The thesis's theory as functions: §2.3.2, §2.6 and §3.4, and simulations beside it.
 
-All functions take numbers or arrays and broadcast them. Costs enter as deposits, 1 / J,
-as in the thesis. The special cases of §3.4.7 and §3.4.8 follow from the general gaps of
-the levels (3.29) and of the policy (3.31), as the tests show. Where the thesis claims
-more than its formulas give, the docstring says so, and docs/theory.md has the algebra.
-§2.6 is in `aco`, §3.4.3 to §3.4.6 in `levels`, the rest in `convergence`; import
-everything from this package.
+The functions of §2.6 and §3.4 take numbers or arrays and broadcast them. Costs enter as
+deposits, 1 / J, as in the thesis. The special cases of §3.4.7 and §3.4.8 follow from the
+general gaps of the levels (3.29) and of the policy (3.31), as the tests show. Where the
+thesis claims more than its formulas give, the docstring says so, and docs/theory.md has
+the algebra.
+
+The double bridge of §2.3.2 is in `double_bridge` and, simulated, in `crossings`, §2.6 in
+`aco` and, simulated, in `limited_ants`, §3.4.3 to §3.4.6 in `levels`, the rest in
+`convergence`; import everything from this package.
 
 Common arguments:
     n_ants: M, >= 1.
@@ -22,6 +25,7 @@ An argument that is out of range or NaN raises a ValueError.
 from acl_gym.theory.aco import (
     aco_level_limit,
     least_probability,
+    probability_found,
     trials_to_dominate,
     trials_to_find,
 )
@@ -37,6 +41,13 @@ from acl_gym.theory.convergence import (
     policy_gap_with_full_local_update,
     policy_gap_without_global_update,
     policy_gap_without_local_update,
+)
+from acl_gym.theory.crossings import simulate_crossings
+from acl_gym.theory.double_bridge import (
+    choice_probability,
+    crossing_law,
+    linear_crossing_law,
+    majority_probability,
 )
 from acl_gym.theory.levels import (
     Coefficients,
@@ -56,11 +67,15 @@ from acl_gym.theory.levels import (
     update_coefficients,
     upper_coefficients,
 )
+from acl_gym.theory.limited_ants import LimitedAnts, simulate_limited_ants
 
 __all__ = [
     "Coefficients",
+    "LimitedAnts",
     "aco_level_limit",
     "action_probability_bound",
+    "choice_probability",
+    "crossing_law",
     "expected_band",
     "expected_deposit",
     "expected_lower_limit",
@@ -71,7 +86,9 @@ __all__ = [
     "level_gap_with_full_local_update",
     "level_gap_without_global_update",
     "level_gap_without_local_update",
+    "linear_crossing_law",
     "lower_coefficients",
+    "majority_probability",
     "most_ants",
     "one_ant_limit",
     "pair_probability_bound",
@@ -80,8 +97,11 @@ __all__ = [
     "policy_gap_with_full_local_update",
     "policy_gap_without_global_update",
     "policy_gap_without_local_update",
+    "probability_found",
     "recursion_limit",
     "recursion_rises",
+    "simulate_crossings",
+    "simulate_limited_ants",
     "state_probability_bound",
     "tau0_bound",
     "total_update",

@@ -17,7 +17,7 @@ def aco_level_limit(optimal_fitness: ArrayLike, global_decay: ArrayLike) -> Floa
 
     This is for the Ant System with the global-best update. The Ant Colony System
     weights its deposit by rho, so that its levels converge to F(s*) instead. The proof
-    needs tau_0 <= F(s), which the thesis uses without stating it.
+    uses tau_0 < F(s) of Assumption 2.1; the bound needs no more than tau_0 <= tau_max.
 
     Args:
         optimal_fitness: fitness of the optimal solution, F(s*), > 0.
@@ -46,6 +46,27 @@ def least_probability(
     return 1.0 / ((choices - 1.0) * ratio + 1.0)
 
 
+def probability_found(
+    probability: ArrayLike, length: ArrayLike, trials: ArrayLike
+) -> FloatArray:
+    """1 - (1 - p_min^n)^k: least chance to have found an optimum (Theorem 2.4).
+
+    It counts one ant a trial and the worst levels that there can be, so that a colony
+    finds an optimum much sooner (docs/aco-theory.md).
+
+    Args:
+        probability: p_min, in (0, 1].
+        length: n, the number of choices in the longest solution, >= 1.
+        trials: k, >= 0.
+    """
+    chance = _chance_of_a_solution(probability, length)
+    trials = ranges.checked("trials", trials, at_least=0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        missed = np.log1p(-chance) * trials
+    # Where the optimum is certain, 0 trials are still none.
+    return np.where(trials == 0.0, 0.0, -np.expm1(missed))
+
+
 def trials_to_find(
     probability: ArrayLike, length: ArrayLike, failure: ArrayLike
 ) -> FloatArray:
@@ -59,8 +80,7 @@ def trials_to_find(
     Returns:
         Whole numbers as floats; infinite where p_min^n underflows.
     """
-    chance = ranges.checked("probability", probability, above=0, at_most=1)
-    chance = chance ** ranges.checked("length", length, at_least=1)
+    chance = _chance_of_a_solution(probability, length)
     failure = ranges.checked("failure", failure, above=0, at_most=1)
     with np.errstate(divide="ignore", invalid="ignore"):
         trials = np.log(failure) / np.log1p(-chance)
@@ -76,7 +96,8 @@ def trials_to_dominate(global_decay: ArrayLike) -> FloatArray:
     This requires evaporation on all edges, tau <- (1 - rho) tau: after k trials the
     optimum then has at least k (1 - rho)^(k - 1) F(s*), and all others have at most
     (1 - rho)^k F(s*) / rho. The proof in the thesis says that the others "remain the
-    same"; in that case an edge at tau_max would never be exceeded.
+    same"; then it may take much longer, and an edge at tau_max is never exceeded
+    (docs/aco-theory.md).
     """
     rho = ranges.global_decay_checked(global_decay)
     quotient = (1.0 - rho) / rho
@@ -84,3 +105,9 @@ def trials_to_dominate(global_decay: ArrayLike) -> FloatArray:
     nearest = np.round(quotient)
     close = np.isclose(quotient, nearest, rtol=1e-12, atol=0.0)
     return np.where(close, nearest, np.ceil(quotient))
+
+
+def _chance_of_a_solution(probability: ArrayLike, length: ArrayLike) -> FloatArray:
+    """p_min^n: an ant finds any given solution with at least this probability."""
+    chance = ranges.checked("probability", probability, above=0, at_most=1)
+    return np.asarray(chance ** ranges.checked("length", length, at_least=1))

@@ -7,6 +7,7 @@ import numpy as np
 
 from acl_gym.envs.control.environments import ControlVectorEnv
 from acl_gym.envs.control.single import ControlEnv
+from acl_gym.envs.graph.double_bridge import DoubleBridgeEnv, DoubleBridgeVectorEnv
 from acl_gym.envs.grid_search import (
     GridSearch1DEnv,
     GridSearch1DVectorEnv,
@@ -186,6 +187,21 @@ SYSTEMS = [
         away=(0,),
         bad_states=_GRID_BAD,
         lasting=False,
+        one_start=True,
+    ),
+    SystemCase(
+        env_id="acl_gym/DoubleBridge-v0",
+        single=DoubleBridgeEnv,
+        vector=DoubleBridgeVectorEnv,
+        # Nine steps are enough on the shorter branch only.
+        easy={"lengths": (4, 12)},
+        variant={"modules": 2},
+        # Some tests walk a thousand steps.
+        narrow={"lengths": (1_200, 1_500)},
+        near=(1_199,),
+        near_action=0,
+        away=(0,),
+        bad_states=_GRID_BAD,
         one_start=True,
     ),
 ]

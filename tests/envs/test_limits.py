@@ -19,6 +19,7 @@ LIMITS = {
     "acl_gym/Pendulum-v0": 300,
     "acl_gym/Navigation-v0": 150,
     "acl_gym/TwoState-v0": 2,
+    "acl_gym/DoubleBridge-v0": 100,
 }
 ROW = "acl_gym/GridSearch1D-v0"
 WEST = 0  # never reaches the goal, in the east

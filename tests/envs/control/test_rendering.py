@@ -141,8 +141,9 @@ def test_an_environment_without_a_painter_cannot_be_drawn() -> None:
 def test_environments_import_painters_only_to_draw() -> None:
     program = """
 import sys, gymnasium as gym, acl_gym
-for name in ("Pendulum", "Navigation", "GridSearch1D", "GridSearch2D", "TwoState"):
-    gym.make_vec(f"acl_gym/{name}-v0", 2).reset(seed=0)
+from acl_gym.envs import ENVIRONMENTS
+for name in ENVIRONMENTS:
+    gym.make_vec(name, 2).reset(seed=0)
 print([name for name in sys.modules if "painter" in name or "pygame" in name])
 """
     done = subprocess.run(

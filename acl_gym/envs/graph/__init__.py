@@ -1,0 +1,1 @@
+"""Environments on graphs: an ant walks from vertex to vertex."""

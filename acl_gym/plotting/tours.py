@@ -14,7 +14,10 @@ from acl_gym.envs.graph.pictures import checked_levels, places_of, strongest_arc
 from acl_gym.plotting import style
 from acl_gym.utils import validation
 
-_FAINTEST, _DARKEST = 0.92, 0.35  # grey of arcs with little pheromone, and with the most
+_FAINTEST, _DARKEST = (
+    0.92,
+    0.35,
+)  # grey of arcs with little pheromone, and with the most
 
 
 def plot_tour(
@@ -71,7 +74,12 @@ def plot_tour(
             way = places[np.append(order, order[0])]
             ax.plot(*way.T, color=style.BLUE, linewidth=1.2, zorder=2.0)
         ax.plot(
-            *places.T, color="0.25", linestyle="", marker="o", markersize=size, zorder=3.0
+            *places.T,
+            color="0.25",
+            linestyle="",
+            marker="o",
+            markersize=size,
+            zorder=3.0,
         )
         ax.set_aspect("equal")
         ax.grid(visible=False)

@@ -223,6 +223,8 @@ def test_learn_names_what_is_here_instead(kind: Any, theirs: str, ours: str) -> 
     assert hasattr(acl_gym, ours) or ours in signature(kind.learn).parameters
 
 
+# Tours cost more than the default tau0 is meant for.
+@pytest.mark.filterwarnings("ignore::acl_gym.agents.bounds.PheromoneBoundWarning")
 @EVERY_ID
 @pytest.mark.parametrize("kind", [ACL, QLearning])
 @pytest.mark.parametrize("deterministic", [True, False])

@@ -13,7 +13,14 @@ import numpy as np
 import pytest
 from gymnasium.vector import SyncVectorEnv
 
-from acl_gym import ACL, QLearning, ReturningACL, evaluate_policy_cost
+from acl_gym import (
+    ACL,
+    QLearning,
+    ReturningACL,
+    automatic_partition,
+    evaluate_policy_cost,
+    fuzzy_q_iteration,
+)
 from acl_gym.agents.base import time_limit
 from acl_gym.envs.graph import (
     TravellingSalesmanInstance,
@@ -336,6 +343,9 @@ def test_what_agents_know_of_the_system() -> None:
     # The city alone does not tell which cities are left: no model of a finite MDP.
     with pytest.raises(TypeError, match="must publish its model"):
         TabularModel.from_env(TravellingSalesmanEnv())
+    env = gym.make_vec(TOUR, distances=ASYMMETRIC)
+    with pytest.raises(TypeError, match="must show its state"):
+        fuzzy_q_iteration(env, automatic_partition(env))
 
 
 def test_native_is_the_synchronous_one_with_masks() -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from gymnasium import spaces
@@ -49,6 +49,8 @@ class TravellingSalesman(ControlSystem):
         tsplib: the path of a file of TSPLIB.
         start: "random", or the number of the city where every tour begins.
     """
+
+    fully_observed: ClassVar[bool] = False
 
     instance: TravellingSalesmanInstance | str | None = None
     distances: Any = None

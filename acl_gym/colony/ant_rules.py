@@ -30,6 +30,7 @@ from acl_gym.colony.best_solution import BestSolution
 from acl_gym.colony.candidates import NONE
 from acl_gym.colony.greedy import ALL, check_choice, drawn_numbers
 from acl_gym.colony.pheromone import Pheromone
+from acl_gym.colony.tours import build_tours, build_tours_in_turn, weigh_candidates
 from acl_gym.colony.update_rule import TrialResult, UpdateRule
 from acl_gym.utils import validation
 from acl_gym.utils.typing import BoolArray, CellArray, FloatArray, IntArray
@@ -114,6 +115,41 @@ class AntRule(UpdateRule):
         local_decay: float,
     ) -> None:
         """Do nothing: pairs decay at the end of the trial, or when the ants choose."""
+
+    def build(
+        self,
+        pheromone: Pheromone,
+        starts: IntArray,
+        draws: FloatArray,
+        lists: CellArray,
+        local_decay: float,
+        tours: CellArray,
+    ) -> None:
+        """Let all ants build their tours at once, as `choose` would step by step.
+
+        Args:
+            pheromone: the shared table, `(n, n)`.
+            starts: the first city of each ant, `(m,)`.
+            draws: uniform in [0, 1), `(n, 2, m)`, what `choose` draws in n steps.
+            lists: the candidates of each city, `(n, k)`, each row ascending; all cities
+                where `candidates` is empty.
+            local_decay: gamma of (2.6), in [0, 1).
+            tours: receives the tours, int32 `(m, n)`.
+        """
+        weighed = np.empty(lists.shape)
+        alpha, weights = pheromone.alpha, pheromone.weights
+        weigh_candidates(pheromone.levels, alpha, weights, lists, weighed)
+        build_tours(
+            starts,
+            draws,
+            lists,
+            weighed,
+            pheromone.levels,
+            alpha,
+            weights,
+            pheromone.greedy_weights,
+            tours,
+        )
 
     def global_update(
         self,
@@ -310,6 +346,32 @@ class AntColonySystemUpdate(AntRule):
     def decays_on_the_way(self) -> bool:
         """See `AntRule`."""
         return True
+
+    def build(
+        self,
+        pheromone: Pheromone,
+        starts: IntArray,
+        draws: FloatArray,
+        lists: CellArray,
+        local_decay: float,
+        tours: CellArray,
+    ) -> None:
+        """See `AntRule`; each ant's arc decays before the next ant chooses."""
+        build_tours_in_turn(
+            starts,
+            draws,
+            lists,
+            pheromone.levels,
+            pheromone.alpha,
+            pheromone.weights,
+            pheromone.greedy_weights,
+            self.q0,
+            local_decay,
+            pheromone.tau0,
+            self.symmetric,
+            pheromone.stale,
+            tours,
+        )
 
     def initial_level(self, fitness: float, steps: int, ants: int, rho: float) -> float:
         """1 / (n L_nn)."""

@@ -130,15 +130,17 @@ class Pheromone(Fixed):
         # With an exponent of 0 an action that is ruled out stays so.
         return np.where(eta > 0.0, powers, 0.0)
 
-    def restart(self, tau0: float) -> None:
-        """Set all levels to a new initial level, where it was not known before.
+    def set_tau0(self, tau0: float, everywhere: bool) -> None:
+        """Set the initial level, where it was not known before.
 
         Args:
             tau0: > 0.
+            everywhere: give all pairs that level.
         """
         self.__dict__["tau0"] = validation.number("tau0", tau0, above=0)
-        self.levels[:] = self.tau0
-        self.stale[:] = True
+        if everywhere:
+            self.levels.fill(self.tau0)
+            self.stale[:] = True
 
     def set_levels(self, levels: FloatArray) -> None:
         """Replace all levels.

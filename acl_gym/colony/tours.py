@@ -488,11 +488,3 @@ def _drawn_candidate(
     if place == k:
         place = _last_increase(sums)
     return int(candidates[city, place])
-
-
-def start_cities(start: int | str, n: int, m: int, rng: np.random.Generator) -> IntArray:
-    """The first city of each of m ants: any of n, or always the same."""
-    if isinstance(start, str):
-        return rng.integers(n, size=m)
-    return np.full(m, start)
-

@@ -137,6 +137,7 @@ class AntOptimizer(TabularAgent):
             )
         self._rule = rule
         self._solutions: Solutions | None = None
+        self._tours: Tours | None = None
         self._result: TrialResult | None = None
         self.pheromone = Pheromone(
             self.partition.n_cells,
@@ -347,20 +348,20 @@ class AntOptimizer(TabularAgent):
         starts = np.full(m, start)
         if isinstance(start, str):
             starts = self.rng.integers(n, size=m)
-        tours = np.empty((m, n), np.int32)
+        solutions = self._tours
+        if solutions is None or solutions.tours.shape != (m, n):
+            solutions = self._tours = Tours(m, n)
+        tours = solutions.tours
         if self._lists is None:
             self._lists = np.tile(np.arange(n, dtype=np.int32), (n, 1))
         draws = self.rng.random((n, 2, m))
-        self._rule.build(
-            self.pheromone, starts, draws, self._lists, self._decay, tours
-        )
+        self._rule.build(self.pheromone, starts, draws, self._lists, self._decay, tours)
         if self._local_search is None:
             lengths = tour_lengths(tours, env.distances)
         else:
             lengths = self._improve(tours, env.distances)
-        return TrialResult(
-            Tours(tours), lengths, self._fitness(lengths), np.ones(m, np.bool_)
-        )
+        complete = np.ones(m, np.bool_)
+        return TrialResult(solutions, lengths, self._fitness(lengths), complete)
 
     def _improve(self, tours: CellArray, distances: FloatArray) -> FloatArray:
         """Improve tours by local search, in place; return their lengths."""

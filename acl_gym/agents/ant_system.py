@@ -175,7 +175,9 @@ class AntSystem(AntOptimizer):
     def parameters(self) -> dict[str, Any]:
         """The keyword arguments of the constructor, except `heuristic`, an array."""
         rule: Any = self.update
-        own = {name: getattr(rule, name) for name in ("update_set", "elitists", "ranks")}
+        own = {
+            name: getattr(rule, name) for name in ("update_set", "elitists", "ranks")
+        }
         return {**super().parameters(), **own}
 
 

@@ -54,7 +54,9 @@ class AntRule(UpdateRule):
     @property
     def best(self) -> BestSolution:
         """The best solution since the beginning."""
-        if "_best" not in self.__dict__:  # the fields of dataclasses are parameters only
+        if (
+            "_best" not in self.__dict__
+        ):  # the fields of dataclasses are parameters only
             self._best = BestSolution()
         return self._best
 

@@ -11,7 +11,6 @@ walks goes the same way.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from functools import cached_property
 
 import numpy as np
 
@@ -31,44 +30,47 @@ _TOGETHER = 8
 class Tours:
     """The tours of all ants as solutions: a component for each arc, the last one too.
 
-    Offers what update rules take of `Solutions`.
+    Offers what update rules take of `Solutions`. Its memory is used again in every trial.
 
     Args:
-        tours: int32 `(n_ants, n)`, permutations of the cities.
+        n_ants: m.
+        n_cities: n.
 
     Attributes:
-        tours: the same array.
+        tours: int32 `(n_ants, n)`, permutations of the cities.
         n_ants: m.
+        length: how many components each solution has, `(n_ants,)`.
         may_repeat: False: no solution has a component twice.
     """
 
     may_repeat = False
 
-    def __init__(self, tours: CellArray) -> None:
-        self.tours, self.n_ants = tours, len(tours)
-
-    @cached_property
-    def length(self) -> IntArray:
-        """How many components each solution has, `(n_ants,)`."""
-        return np.full(self.n_ants, self.tours.shape[1])
+    def __init__(self, n_ants: int, n_cities: int) -> None:
+        self.n_ants = n_ants
+        self.tours: CellArray = np.empty((n_ants, n_cities), np.int32)
+        self.length = np.full(n_ants, n_cities)
+        most = min(n_ants, max(1, ROWS_PER_BLOCK // n_cities))
+        self._ends: IntArray = np.arange(1, most + 1) * n_cities
+        self._degree: FloatArray = np.ones((most * n_cities, 1))
+        self._next: CellArray = np.empty((most, n_cities), np.int32)
 
     def blocks(self) -> Iterator[Block]:
-        """All solutions, ant by ant, in parts that fit into the processor's cache."""
-        n = self.tours.shape[1]
-        most = max(1, ROWS_PER_BLOCK // n)
-        degree = np.ones((min(most, self.n_ants) * n, 1))
+        """All solutions, ant by ant, in parts that fit into the processor's cache.
+
+        The arrays of a block are valid until the next block is requested.
+        """
+        most = len(self._next)
         for first in range(0, self.n_ants, most):
             part = self.tours[first : first + most]
-            ants = slice(first, first + len(part))
-            ends = np.arange(1, len(part) + 1) * n
-            index, action = part.reshape(-1, 1), _next_cities(part).ravel()
-            yield Block(ants, index, degree[: len(index)], action, ends)
-
-
-def _next_cities(tours: CellArray) -> CellArray:
-    following = np.empty_like(tours)
-    following[:, :-1], following[:, -1] = tours[:, 1:], tours[:, 0]
-    return following
+            m, following = len(part), self._next[: len(part)]
+            following[:, :-1], following[:, -1] = part[:, 1:], part[:, 0]
+            yield Block(
+                slice(first, first + m),
+                part.reshape(-1, 1),
+                self._degree[: part.size],
+                following.reshape(-1),
+                self._ends[:m],
+            )
 
 
 @njit
@@ -387,15 +389,35 @@ def build_tours_in_turn(
                 chosen = -1
                 if coin < q0:
                     chosen = _best_candidate(
-                        city, free[a], candidates, choice, levels, greedy_weights, values
+                        city,
+                        free[a],
+                        candidates,
+                        choice,
+                        levels,
+                        greedy_weights,
+                        values,
                     )
                 else:
                     chosen = _drawn_candidate(
-                        city, free[a], candidates, choice, levels, alpha, whole, weights, values
+                        city,
+                        free[a],
+                        candidates,
+                        choice,
+                        levels,
+                        alpha,
+                        whole,
+                        weights,
+                        values,
                     )
                 if chosen < 0 and coin < q0:
                     chosen, n_rest[a] = _best_of_rest(
-                        city, free[a], choice, levels, greedy_weights, rest[a], n_rest[a]
+                        city,
+                        free[a],
+                        choice,
+                        levels,
+                        greedy_weights,
+                        rest[a],
+                        n_rest[a],
                     )
                 elif chosen < 0:
                     chosen, n_rest[a] = _choose_otherwise(

@@ -8,7 +8,10 @@ backwards (-1); where distances are symmetric, it is the same tour.
 from __future__ import annotations
 
 from acl_gym.utils.compiling import njit
-from acl_gym.utils.typing import BoolArray, CellArray, FloatArray
+from acl_gym.utils.typing import CellArray, FloatArray
+
+NONE, TWO, REVERSED, EXCHANGED, BOTH_REVERSED = range(5)
+"""Kinds of moves, see `apply`."""
 
 TOLERANCE = 1e-12
 """A move must gain more than this share of what it removes.
@@ -138,6 +141,49 @@ def exchange_segments(
 
 
 @njit
+def apply(
+    tour: CellArray,
+    places: CellArray,
+    t1: int,
+    direction: int,
+    move: CellArray,
+    kept: CellArray,
+) -> None:
+    """Replace the arcs t1-t2, t3-t4 and t5-t6 by t2-t3, t4-t5 and t6-t1.
+
+    Walked in the direction in which t2 follows t1, the tour becomes, by kind:
+
+    - `TWO`: t1, t4 .. t2, t3, two arcs only.
+    - `EXCHANGED`: t1, t6 .. t3, t2 .. t5, t4.
+    - `BOTH_REVERSED`: t1, t6 .. t2, t3 .. t5, t4.
+    - `REVERSED`: t1, t6 .. t4, t5 .. t2, t3 or t1, t6 .. t3, t2 .. t4, t5.
+
+    Args:
+        tour: changed in place.
+        places: changed in place.
+        t1: where the first arc begins.
+        direction: where t2 is, 1 ahead or -1 behind.
+        move: the kind and t2 to t6.
+        kept: room for n cities.
+    """
+    kind, t2, t3, t4, t5, t6 = move
+    if kind == EXCHANGED:
+        left = ahead(places, t2, t5, direction) + 1
+        right = ahead(places, t6, t3, direction) + 1
+        if direction == 1:
+            exchange_segments(tour, places, places[t2], left, right, kept)
+        else:
+            exchange_segments(tour, places, places[t3], right, left, kept)
+    elif kind == BOTH_REVERSED:
+        exchange_two(tour, places, t1, t2, t5, t6)
+        exchange_two(tour, places, t2, t5, t4, t3)
+    else:
+        exchange_two(tour, places, t1, t2, t3, t4)
+        if kind == REVERSED:
+            exchange_two(tour, places, t1, t4, t5, t6)
+
+
+@njit
 def find_places(tour: CellArray, places: CellArray) -> bool:
     """Fill in the places of all cities; False where the tour is no permutation."""
     n = tour.size
@@ -160,15 +206,3 @@ def length_of(tour: CellArray, distances: FloatArray) -> float:
         last = city
     return total
 
-
-@njit
-def wake(waiting: CellArray, awake: BoolArray, tail: int, count: int, city: int) -> int:
-    """Put a city into the queue of those to look at, unless it is there; new count.
-
-    Its don't-look bit is cleared thereby.
-    """
-    if awake[city]:
-        return count
-    awake[city] = True
-    waiting[(tail + count) % waiting.size] = city
-    return count + 1

@@ -10,7 +10,9 @@ import gymnasium as gym
 
 import acl_gym
 
-SUFFIXES = {".py", ".typed", ".j2", ".json", ".mplstyle", ".toml", ".txt"}
+SUFFIXES = {
+    *(".py", ".typed", ".j2", ".json", ".mplstyle", ".toml", ".tour", ".tsp", ".txt")
+}
 LARGEST = 100_000  # bytes; logs, results and figures do not belong in the wheel
 
 package = Path(acl_gym.__file__).parent

@@ -76,7 +76,7 @@ def fuzzy_q_iteration(
         progress_bar: show a progress bar.
 
     Raises:
-        TypeError: `env` is of another package, or random.
+        TypeError: `env` is of another package, or random, or does not show its state.
         ValueError: a parameter is out of range.
     """
     base = getattr(env, "unwrapped", env)
@@ -84,6 +84,12 @@ def fuzzy_q_iteration(
         raise TypeError(
             "env must be a deterministic vector environment of acl_gym, which can "
             f"start from any state, got {type(base).__name__}."
+        )
+    if not base.system.fully_observed:
+        raise TypeError(
+            "env must show its state, but the observations of "
+            f"{type(base).__name__} do not tell it; learn with an agent, such as "
+            "QLearning."
         )
     checked_partition(partition)
     discount, tolerance, max_iterations = checked_settings(

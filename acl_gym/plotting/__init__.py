@@ -1,8 +1,9 @@
 """Pictures of policies, of what they do, and of how they were learned.
 
 `plot_policy`, `plot_pheromone`, `plot_learning_curve`, `plot_trajectory` and `animate`
-take any agent of this package. They draw on axes of the caller or make a figure of their
-own, leave pyplot and the global settings of Matplotlib alone, and never open a window.
+take any agent of this package, and `plot_tour` a tour of a travelling salesman. They
+draw on axes of the caller or make a figure of their own, leave pyplot and the global
+settings of Matplotlib alone, and never open a window.
 The functions named `draw_...` make the figures of the experiments.
 """
 
@@ -20,6 +21,7 @@ from acl_gym.plotting.animation import animate
 from acl_gym.plotting.learning import draw_learning_curves, plot_learning_curve
 from acl_gym.plotting.maps import plot_pheromone, plot_policy
 from acl_gym.plotting.shown import Shown
+from acl_gym.plotting.tours import plot_tour
 from acl_gym.plotting.trajectories import plot_trajectory
 
 __all__ = [
@@ -31,6 +33,7 @@ __all__ = [
     "plot_learning_curve",
     "plot_pheromone",
     "plot_policy",
+    "plot_tour",
     "plot_trajectory",
 ]
 

@@ -7,6 +7,7 @@ import numpy as np
 
 from acl_gym.envs.control.environments import ControlVectorEnv
 from acl_gym.envs.control.single import ControlEnv
+from acl_gym.envs.graph.travelling_salesman.kernels import UNVISITED
 from acl_gym.envs.grid_search import (
     GridSearch1DEnv,
     GridSearch1DVectorEnv,
@@ -16,6 +17,7 @@ from acl_gym.envs.grid_search import (
 from acl_gym.envs.navigation import NavigationEnv, NavigationVectorEnv
 from acl_gym.envs.pendulum import PendulumEnv, PendulumVectorEnv
 from acl_gym.envs.two_state import TwoStateEnv, TwoStateVectorEnv
+from tests.envs.obedient import ObedientSalesmanEnv, ObedientSalesmanVectorEnv
 
 NAN, INF = float("nan"), float("inf")
 State = tuple[float, ...]
@@ -27,8 +29,8 @@ class SystemCase:
 
     Attributes:
         env_id: as registered.
-        single: class of the single environment.
-        vector: class of the vector environment.
+        single: class of the single environment, which takes any action.
+        vector: class of the vector environment, which takes any action.
         easy: parameters with which some walks of nine random actions from random
             states reach the goal, and some do not.
         variant: more parameters to be tried on top of `easy`, deterministic ones.
@@ -57,6 +59,11 @@ class SystemCase:
     bad_states: dict[str, Any] = field(default_factory=dict)
     lasting: bool = True
     one_start: bool = False
+
+    @property
+    def takes_any_action(self) -> bool:
+        """Whether those of `single` and `vector` are the ones that are registered."""
+        return self.single is not ObedientSalesmanEnv
 
     @property
     def n_actions(self) -> int:
@@ -92,6 +99,19 @@ _GRID_BAD = {
     "bool": True,
     "dict": {"cell": 0},
 }
+
+# Five cities each, so that tours end soon and all have the same actions.
+_LINE = [[float(i), 0.0] for i in range(5)]
+_FIVE = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0], [0.3, 0.4]]
+
+
+def tour_state(*visited: int, n_cities: int) -> State:
+    """The state of an ant that has visited these cities in this order."""
+    ranks = [UNVISITED] * n_cities
+    for rank, city in enumerate(visited):
+        ranks[city] = float(rank)
+    return (visited[-1], visited[0], len(visited) - 1.0, *ranks)
+
 
 SYSTEMS = [
     SystemCase(
@@ -187,6 +207,32 @@ SYSTEMS = [
         bad_states=_GRID_BAD,
         lasting=False,
         one_start=True,
+    ),
+    SystemCase(
+        env_id="acl_gym/TravellingSalesman-v0",
+        single=ObedientSalesmanEnv,
+        vector=ObedientSalesmanVectorEnv,
+        easy={"coordinates": _FIVE},
+        variant={"start": 2},
+        narrow={"coordinates": _LINE},
+        near=tour_state(*range(5), n_cities=5),
+        near_action=0,
+        away=tour_state(0, n_cities=5),
+        bad_states={
+            **{name: bad for name, bad in _GRID_BAD.items() if name != "two numbers"},
+            "deep": [[[0]]],
+            "too short": [0.0] * 10,
+            "rank twice": (1.0, 0.0, 1.0, 0.0, 1.0, 1.0, *[UNVISITED] * 45),
+            "rank missing": (1.0, 0.0, 2.0, 0.0, 2.0, *[UNVISITED] * 46),
+            "elsewhere": (2.0, 0.0, 1.0, 0.0, 1.0, *[UNVISITED] * 46),
+            "another first": (1.0, 1.0, 1.0, 0.0, 1.0, *[UNVISITED] * 46),
+            "too many arcs": (0.0, 0.0, 49.0, *map(float, range(48))),
+            "half an arc": (0.0, 0.0, 0.5, 0.0, *[UNVISITED] * 47),
+            "rank nan": (0.0, 0.0, 0.0, 0.0, NAN, *[UNVISITED] * 46),
+            "city infinite": (INF, 0.0, 0.0, 0.0, *[UNVISITED] * 47),
+        },
+        # Each tour ends after as many steps as there are cities.
+        lasting=False,
     ),
 ]
 

@@ -20,6 +20,7 @@ LIMITS = {
     "acl_gym/Navigation-v0": 150,
     "acl_gym/TwoState-v0": 2,
 }
+TOUR = "acl_gym/TravellingSalesman-v0"  # see tests/envs/graph
 ROW = "acl_gym/GridSearch1D-v0"
 WEST = 0  # never reaches the goal, in the east
 
@@ -27,7 +28,8 @@ ids = pytest.mark.parametrize("env_id", LIMITS)
 
 
 def test_every_id_has_a_limit() -> None:
-    assert set(LIMITS) == set(ENVIRONMENTS)
+    assert {*LIMITS, TOUR} == set(ENVIRONMENTS)
+    assert gym.spec(TOUR).max_episode_steps == 100_000
 
 
 @ids

@@ -35,7 +35,10 @@ class Always:
         return np.full(np.shape(observation)[:1] or (1,), self.action), None
 
 
-@pytest.mark.parametrize("env_id", ENVIRONMENTS)
+# Stable-Baselines3 knows no masks, and one id takes no action that its mask rules out.
+@pytest.mark.parametrize(
+    "env_id", [each for each in ENVIRONMENTS if "TravellingSalesman" not in each]
+)
 def test_the_evaluation_loop_of_sb3_comes_to_an_end(env_id: str) -> None:
     env = Monitor(gym.make(env_id))
     model = DQN("MlpPolicy", env, learning_starts=10, buffer_size=50)

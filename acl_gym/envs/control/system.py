@@ -53,6 +53,10 @@ class ControlSystem(ABC):
     circular: ClassVar[tuple[int, ...]] = ()
     """The state variables that wrap around, such as angles: both ends are one value."""
 
+    fully_observed: ClassVar[bool] = True
+    """Whether an observation tells the state, so that a table over observations can be a
+    model of the system."""
+
     evaluation_steps: ClassVar[int] = 300
     """T, the longest episode when a policy is evaluated from `evaluation_states`."""
 

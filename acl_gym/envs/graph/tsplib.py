@@ -20,7 +20,6 @@ from numpy.typing import NDArray
 from acl_gym.envs.graph.instances import (
     TravellingSalesmanInstance,
     check_size,
-    checked_tours,
 )
 from acl_gym.utils import validation
 from acl_gym.utils.typing import FloatArray
@@ -184,13 +183,13 @@ def parse_tsplib(
             return TravellingSalesmanInstance.from_coordinates(places, metric, **named)
         form = file.choice("EDGE_WEIGHT_FORMAT", ("FULL_MATRIX", *_TRIANGLES))
         matrix = _matrix(file, form, n)
-        places = None
-        for section in ("DISPLAY_DATA_SECTION", "NODE_COORD_SECTION"):
-            if section in file.sections:
-                places = _places(file, section, n)
-                break
+        shown = [
+            _places(file, section, n)
+            for section in ("DISPLAY_DATA_SECTION", "NODE_COORD_SECTION")
+            if section in file.sections
+        ]
         found = TravellingSalesmanInstance.from_distances(
-            matrix, coordinates=places, **named
+            matrix, coordinates=shown[0] if shown else None, **named
         )
     except ValueError as error:
         if str(error).startswith(source):
@@ -269,7 +268,9 @@ def _read(path: str | os.PathLike[str]) -> tuple[str, str]:
             f"{size:,}."
         )
     # Words of text take about twenty times as much memory as in the file.
-    validation.check_memory(f"the words of {checked.name}", 20 * size, "take fewer cities")
+    validation.check_memory(
+        f"the words of {checked.name}", 20 * size, "take fewer cities"
+    )
     text = checked.read_bytes().decode("utf-8", errors="replace")
     return text, checked.name
 

@@ -18,12 +18,31 @@ from acl_gym.envs import ENVIRONMENTS
 
 EVERY_ID = pytest.mark.parametrize("env_id", ENVIRONMENTS)
 BOX_IDS = ("acl_gym/Pendulum-v0", "acl_gym/Navigation-v0")  # others are Discrete
+# Where an action that the mask does not allow is an error, none can be repeated.
+STRICT, REPEATING = "acl_gym/TravellingSalesman-v0", ("MaxAndSkip", "StickyAction")
 LIMIT = 8
 Wrap = Callable[[Any], Any]
 
 
 def single(env_id: str, **keywords: Any) -> Any:
     return gym.make(env_id, max_episode_steps=LIMIT, **keywords)
+
+
+def sample(env: Any, info: dict[str, Any]) -> Any:
+    """A random action, of those that are allowed."""
+    mask = info.get("action_mask")
+    return env.action_space.sample(None if mask is None else mask.astype(np.int8))
+
+
+def sample_all(env: Any, infos: Any) -> Any:
+    """A random action for each slot, of those that are allowed."""
+    if isinstance(infos, list):
+        masks = [row.get("action_mask") for row in infos]
+    else:
+        masks = list(infos.get("action_mask", [None]))
+    if masks[0] is None:
+        return env.action_space.sample()
+    return env.action_space.sample(tuple(mask.astype(np.int8) for mask in masks))
 
 
 def flat(space: spaces.Space[Any], value: Any) -> np.ndarray:
@@ -70,24 +89,23 @@ BOXES: dict[str, Wrap] = {
         (env_id, name)
         for env_id in ENVIRONMENTS
         for name in (*SINGLE, *(BOXES if env_id in BOX_IDS else ()))
+        if env_id != STRICT or not name.startswith(REPEATING)
     ],
 )
 def test_every_wrapper_takes_a_walk(env_id: str, name: str) -> None:
     env = {**SINGLE, **BOXES}[name](single(env_id))
     env.action_space.seed(0)
-    observation, _ = env.reset(seed=0)
+    observation, info = env.reset(seed=0)
     assert env.observation_space.contains(observation)
     ended = 0
     for _ in range(4 * LIMIT):
-        observation, reward, terminated, truncated, _ = env.step(
-            env.action_space.sample()
-        )
+        observation, reward, terminated, truncated, info = env.step(sample(env, info))
         assert env.observation_space.contains(observation)
         assert np.isfinite(reward)
         if terminated or truncated:
             ended += 1
             if name != "Autoreset":
-                env.reset()
+                _, info = env.reset()
     assert ended >= 2
     env.close()
 
@@ -101,13 +119,18 @@ def test_what_observation_wrappers_show(env_id: str) -> None:
         for name in ("Flatten", "TimeAware", "FrameStack")
     )
     envs = (plain, flattened, aware, stacked)
-    first, seen, timed, stack = (env.reset(seed=4)[0] for env in envs)
+    begun = [env.reset(seed=4) for env in envs]
+    first, seen, timed, stack = (each[0] for each in begun)
+    info = begun[0][1]
     for step in range(2):
         np.testing.assert_array_equal(seen, flat(space, first))
         np.testing.assert_array_equal(timed[:-1], flat(space, first))
         assert timed[-1] == step
         np.testing.assert_array_equal(stack[-1], first)
-        first, seen, timed, stack = (env.step(0)[0] for env in envs)
+        action = int(np.argmax(info.get("action_mask", [True])))
+        steps = [env.step(action) for env in envs]
+        first, seen, timed, stack = (each[0] for each in steps)
+        info = steps[0][4]
 
 
 @EVERY_ID
@@ -174,18 +197,18 @@ def test_every_vector_wrapper_takes_a_walk(env_id: str, name: str, mode: str) ->
     env = gym.make_vec(env_id, num_envs=3, autoreset_mode=mode, max_episode_steps=LIMIT)
     env = VECTOR[name][0](env)
     env.action_space.seed(0)
-    observations, _ = env.reset(seed=0)
+    observations, infos = env.reset(seed=0)
     ended = np.zeros(3, dtype=int)
     for _ in range(4 * LIMIT):
         assert env.observation_space.contains(observations)
-        observations, rewards, terminated, truncated, _ = env.step(
-            env.action_space.sample()
+        observations, rewards, terminated, truncated, infos = env.step(
+            sample_all(env, infos)
         )
         assert np.isfinite(rewards).all()
         done = terminated | truncated
         ended += done
         if mode == "Disabled" and done.any():
-            observations, _ = env.reset(options={"reset_mask": done})
+            observations, infos = env.reset(options={"reset_mask": done})
     assert (ended >= 2).all()
     env.close()
 
@@ -264,10 +287,10 @@ def test_recorded_episodes_can_be_replayed_from_what_was_kept(env_id: str) -> No
     env = Collector(single(env_id))
     env.action_space.seed(0)
     for seed in range(3):
-        env.reset(seed=seed)
+        _, info = env.reset(seed=seed)
         done = False
         while not done:
-            _, _, terminated, truncated, _ = env.step(env.action_space.sample())
+            _, _, terminated, truncated, info = env.step(sample(env, info))
             done = terminated or truncated
     again = gym.make(EnvSpec.from_json(env.made_by))
     for episode in env.episodes:

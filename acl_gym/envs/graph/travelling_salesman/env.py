@@ -10,7 +10,10 @@ from gymnasium.vector import AutoresetMode
 from acl_gym.envs.control.environments import ControlVectorEnv
 from acl_gym.envs.control.single import ControlEnv
 from acl_gym.envs.graph.instances import TravellingSalesmanInstance
-from acl_gym.envs.graph.travelling_salesman.system import TravellingSalesman
+from acl_gym.envs.graph.travelling_salesman.system import (
+    TravellingSalesman,
+    instance_of,
+)
 from acl_gym.envs.limits import RegisteredLimit
 from acl_gym.utils import validation
 from acl_gym.utils.typing import FloatArray, IntArray
@@ -18,15 +21,14 @@ from acl_gym.utils.typing import FloatArray, IntArray
 _PAINTER = "acl_gym.envs.graph.travelling_salesman.painter:TravellingSalesmanPainter"
 
 
-class _Instance:
-    """What both environments tell of their instance."""
+class _WithInstance:
+    """What both environments tell of their instance.
 
-    system: TravellingSalesman
+    Attributes:
+        instance: the cities and the distances between them.
+    """
 
-    @property
-    def instance(self) -> TravellingSalesmanInstance:
-        """The cities and the distances between them."""
-        return self.system.cities
+    instance: TravellingSalesmanInstance
 
     @property
     def distances(self) -> FloatArray:
@@ -44,7 +46,7 @@ class _Instance:
         return self.instance.optimum
 
 
-class TravellingSalesmanEnv(_Instance, ControlEnv):
+class TravellingSalesmanEnv(_WithInstance, ControlEnv):
     """Visit all cities once and come back to the first, on a short way.
 
     ## Description
@@ -96,8 +98,12 @@ class TravellingSalesmanEnv(_Instance, ControlEnv):
     system_type = TravellingSalesman
     painter = _PAINTER
 
+    def __init__(self, render_mode: str | None = None, **parameters: Any) -> None:
+        super().__init__(render_mode, **parameters)
+        self.instance = instance_of(self.system)
 
-class TravellingSalesmanVectorEnv(_Instance, ControlVectorEnv):
+
+class TravellingSalesmanVectorEnv(_WithInstance, ControlVectorEnv):
     """Many ants on one graph, one a slot; see `TravellingSalesmanEnv`.
 
     A state takes 8 (n + 3) bytes a slot, the distances 8 n^2 bytes for all.
@@ -122,25 +128,19 @@ class TravellingSalesmanVectorEnv(_Instance, ControlVectorEnv):
             render_mode=render_mode,
             **parameters,
         )
-        n_cities = self.system.n_cities
+        self.instance = instance_of(self.system)
+        n_cities = self.instance.n_cities
         validation.check_memory(
             f"tours of {self.num_envs:,} slots through {n_cities:,} cities",
             self.num_envs * (2 * 8 * (n_cities + 3) + n_cities),
             "use fewer ants or slots",
         )
         # What `with_slots` makes others of: a file may change.
-        self.parameters = {"instance": self.instance, "start": self.system.start}
+        start = parameters.get("start", TravellingSalesman.start)
+        self.parameters = {"instance": self.instance, "start": start}
         if isinstance(self.max_episode_steps, RegisteredLimit):
             steps = min(self.max_episode_steps, n_cities + 1)
             self.max_episode_steps = RegisteredLimit(steps)
-
-    @property
-    def system(self) -> TravellingSalesman:
-        """The cities, and how ants walk between them."""
-        system = self._system
-        if not isinstance(system, TravellingSalesman):
-            raise TypeError(f"no tours: {validation.shown(system)}")
-        return system
 
     def _checked_states(self, given: Any, slots: IntArray) -> FloatArray:
         if self._state is not None:

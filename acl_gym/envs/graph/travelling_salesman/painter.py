@@ -74,6 +74,9 @@ class TravellingSalesmanPainter(Painter[TravellingSalesman]):
     def draw_table(self, pygame: Any, canvas: Any, table: FloatArray) -> None:
         """Draw the arcs with the highest levels of each city, the higher the darker."""
         self.check_table(table)
+        above = canvas.copy()
+        above.set_colorkey(_PAPER)
+        canvas.fill(_PAPER)
         size = canvas.get_width()
         pixels = np.rint(self._shares * size).astype(np.int64).tolist()
         arcs, shares = strongest_arcs(table)
@@ -82,6 +85,7 @@ class TravellingSalesmanPainter(Painter[TravellingSalesman]):
         for (tail, head), grey in zip(arcs.tolist(), greys, strict=True):
             colour = (grey, grey, grey)
             pygame.draw.line(canvas, colour, pixels[tail], pixels[head], thin)
+        canvas.blit(above, (0, 0))  # the tour and the cities
 
 
 def tour_so_far(state: FloatArray) -> IntArray:

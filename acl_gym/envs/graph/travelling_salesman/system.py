@@ -50,6 +50,8 @@ class TravellingSalesman(ControlSystem):
         start: "random", or the number of the city where every tour begins.
     """
 
+    fully_observed: ClassVar[bool] = False
+
     instance: TravellingSalesmanInstance | str | None = None
     distances: Any = None
     coordinates: Any = None
@@ -107,12 +109,10 @@ class TravellingSalesman(ControlSystem):
             DEFAULT_INSTANCE if self.instance is None else self.instance
         )
 
-    @cached_property
+    @property
     def cities(self) -> TravellingSalesmanInstance:
         """The instance."""
-        if not isinstance(self.instance, TravellingSalesmanInstance):
-            raise TypeError(f"no instance: {validation.shown(self.instance)}")
-        return self.instance
+        return instance_of(self)
 
     @property
     def n_cities(self) -> int:
@@ -147,9 +147,13 @@ class TravellingSalesman(ControlSystem):
 
     def sample_states(self, rng: np.random.Generator, count: int) -> FloatArray:
         """Draw first cities uniformly, or take `start`; `(state_size, count)`."""
-        if self.start == "random":
-            return self.starting_in(rng.integers(self.n_cities, size=count))
-        return self.starting_in(np.full(count, self.start, np.int64))
+        if self.start != "random":
+            return self.starting_in(np.full(count, self.start, np.int64))
+        # Not with `integers`, counted from 0: an action space with the same seed would
+        # sample the very cities where the ants are.
+        n = self.n_cities
+        drawn = np.minimum((n * rng.random(count)).astype(np.int64), n - 1)
+        return self.starting_in(n - 1 - drawn)
 
     def checked_states(self, states: Any) -> FloatArray:
         """Return states, validated; first cities stand for tours that begin there.
@@ -209,8 +213,7 @@ class TravellingSalesman(ControlSystem):
         good &= whole[rows, RANKS + first] == 0.0
         closed = arcs == n
         return np.asarray(
-            good
-            & np.where(closed, here == first, whole[rows, RANKS + here] == arcs)
+            good & np.where(closed, here == first, whole[rows, RANKS + here] == arcs)
         )
 
     def advance(
@@ -268,3 +271,18 @@ class TravellingSalesman(ControlSystem):
             count = min(self.n_cities, _MOST_EVALUATED)
             cities = np.arange(count) * self.n_cities // count
         return self.starting_in(cities).T.copy()
+
+
+def instance_of(system: ControlSystem) -> TravellingSalesmanInstance:
+    """The cities of a travelling salesman's system.
+
+    Raises:
+        TypeError: it is another system.
+    """
+    instance = getattr(system, "instance", None)
+    if not isinstance(instance, TravellingSalesmanInstance):
+        raise TypeError(
+            "system must be that of the travelling salesman, got "
+            f"{validation.shown(system)}."
+        )
+    return instance

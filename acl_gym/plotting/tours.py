@@ -1,0 +1,100 @@
+"""Tours of a travelling salesman over the map of the cities, with pheromone on the arcs."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
+from numpy.typing import ArrayLike
+
+from acl_gym.envs.graph.instances import TravellingSalesmanInstance, checked_tours
+from acl_gym.envs.graph.pictures import checked_levels, places_of, strongest_arcs
+from acl_gym.plotting import style
+from acl_gym.utils import validation
+
+_FAINTEST, _DARKEST = (
+    0.92,
+    0.35,
+)  # grey of arcs with little pheromone, and with the most
+
+
+def plot_tour(
+    instance: TravellingSalesmanInstance,
+    tour: ArrayLike | None,
+    pheromone: Any = None,
+    ax: Axes | None = None,
+) -> Axes:
+    """Draw a tour over the map, and below it the arcs with much pheromone in grey.
+
+    Cities whose coordinates are unknown lie on a circle. The title tells the length of
+    the tour and, where the optimum is known, by how much it exceeds that.
+
+    Args:
+        instance: the cities.
+        tour: each city once, numbered from 0, `(n,)`; None draws the cities only.
+        pheromone: levels on the arcs, >= 0, `(n, n)`, such as the table of a colony. Of
+            each city the eight highest are drawn, the higher the darker.
+        ax: where to draw; None makes a figure, see `plot_policy`.
+
+    Returns:
+        The axes.
+
+    Raises:
+        TypeError: `instance`, `pheromone` or `ax` is of the wrong kind.
+        ValueError: the tour or the pheromone does not fit the instance.
+    """
+    if not isinstance(instance, TravellingSalesmanInstance):
+        raise TypeError(
+            "instance must be a TravellingSalesmanInstance, got "
+            f"{validation.shown(instance)}; take env.unwrapped.instance."
+        )
+    n_cities = instance.n_cities
+    order = None if tour is None else checked_tours(tour, n_cities)
+    if order is not None and order.ndim != 1:
+        raise ValueError(
+            f"tour must be one tour, shape ({n_cities},), got shape {order.shape}."
+        )
+    levels = None if pheromone is None else checked_levels(pheromone, n_cities)
+    places = places_of(instance)
+    size = float(np.clip(60.0 / np.sqrt(n_cities), 1.0, 5.0))
+    with style.axes_or_new(ax, 4.6, 3.9) as ax:
+        if levels is not None:
+            arcs, shares = strongest_arcs(levels)
+            greys = _FAINTEST + shares * (_DARKEST - _FAINTEST)
+            lines = LineCollection(
+                list(places[arcs]),
+                colors=[str(grey) for grey in greys],
+                linewidths=1.0,
+                zorder=1.0,
+            )
+            ax.add_collection(lines)
+        if order is not None:
+            way = places[np.append(order, order[0])]
+            ax.plot(*way.T, color=style.BLUE, linewidth=1.2, zorder=2.0)
+        ax.plot(
+            *places.T,
+            color="0.25",
+            linestyle="",
+            marker="o",
+            markersize=size,
+            zorder=3.0,
+        )
+        ax.set_aspect("equal")
+        ax.grid(visible=False)
+        ax.set_xticks([])
+        ax.set_yticks([])
+        ax.spines[:].set_visible(False)
+        ax.set_title(_title(instance, order))
+    return ax
+
+
+def _title(instance: TravellingSalesmanInstance, order: Any) -> str:
+    if order is None:
+        return instance.name
+    length, best = instance.length(order), instance.optimum
+    title = f"{instance.name}: {length:,.6g}"
+    if best:
+        title += f", {100.0 * (length / best - 1.0):.1f}% above the optimum"
+    return title

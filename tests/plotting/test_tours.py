@@ -1,0 +1,68 @@
+"""Tours over the map."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from matplotlib.collections import LineCollection
+from matplotlib.figure import Figure
+
+from acl_gym.envs.graph import (
+    TravellingSalesmanInstance,
+    load_instance,
+    optimal_tour,
+)
+from acl_gym.plotting import plot_tour
+
+ATT48, WAY = load_instance("att48"), optimal_tour("att48")
+
+
+def test_the_tour_is_closed_and_the_title_tells_its_length() -> None:
+    ax = plot_tour(ATT48, WAY)
+    line, cities = ax.lines
+    assert ATT48.coordinates is not None
+    np.testing.assert_array_equal(
+        np.transpose(line.get_data()), ATT48.coordinates[[*WAY, WAY[0]]]
+    )
+    assert len(cities.get_xdata()) == 48
+    title = ax.get_title(loc="left") or ax.get_title()
+    assert title == "att48: 10,628, 0.0% above the optimum"
+    ax.figure.canvas.draw()
+
+
+def test_pheromone_lies_below_the_tour() -> None:
+    pheromone = 1.0 / (ATT48.distances + np.eye(48))
+    figure = Figure()
+    ax = figure.subplots()
+    assert plot_tour(ATT48, WAY, pheromone, ax) is ax
+    (arcs,) = (each for each in ax.collections if isinstance(each, LineCollection))
+    assert len(arcs.get_segments()) <= 8 * 48
+    assert arcs.get_zorder() < ax.lines[0].get_zorder()
+    figure.savefig("/dev/null", format="png")
+
+
+def test_cities_alone_and_without_an_optimum() -> None:
+    instance = TravellingSalesmanInstance.from_distances(np.ones((4, 4)), name="four")
+    ax = plot_tour(instance, None)
+    assert len(ax.lines) == 1
+    assert (ax.get_title(loc="left") or ax.get_title()) == "four"
+    ax = plot_tour(instance, [0, 1, 2, 3])
+    assert (ax.get_title(loc="left") or ax.get_title()) == "four: 4"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "error", "message"),
+    [
+        (("att48", WAY), TypeError, "instance must be a TravellingSalesmanInstance"),
+        ((ATT48, [0, 1]), ValueError, "tour must hold"),
+        ((ATT48, [WAY, WAY]), ValueError, r"one tour, shape \(48,\)"),
+        ((ATT48, WAY, np.ones((2, 2))), ValueError, r"shape \(48, 48\)"),
+        ((ATT48, WAY, [[1.0]]), TypeError, "must be a NumPy array"),
+        ((ATT48, WAY, None, "axes"), TypeError, "ax must be Matplotlib axes"),
+    ],
+)
+def test_mistakes(
+    arguments: tuple[Any, ...], error: type[Exception], message: str
+) -> None:
+    with pytest.raises(error, match=message):
+        plot_tour(*arguments)

@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from acl_gym.colony.solutions import Solutions
+from acl_gym.colony.tours import Tours
 from acl_gym.colony.update_rule import TrialResult
 from acl_gym.utils.typing import CellArray, FloatArray, IntArray
 
@@ -97,27 +99,20 @@ class BestSolution:
         return solution
 
 
-def _pairs(solutions: Any, ant: int) -> tuple[CellArray, IntArray, FloatArray]:
+def _pairs(
+    solutions: Solutions | Tours, ant: int
+) -> tuple[CellArray, IntArray, FloatArray]:
     """The pairs of one ant, each once, with its largest degree, in order of first visits."""
-    for block in solutions.blocks():
-        if not block.ants.start <= ant < block.ants.stop:
-            continue
-        own = ant - block.ants.start
-        rows = slice(int(block.ends[own - 1]) if own else 0, int(block.ends[own]))
-        index, degree = block.index[rows], block.degree[rows]
-        actions = np.repeat(block.action[rows].astype(np.int64), index.shape[1])
-        cells, degrees = index.ravel().copy(), degree.ravel().copy()
-        if solutions.may_repeat:
-            width = int(actions.max()) + 1
-            pairs, first, which = np.unique(
-                cells * np.int64(width) + actions,
-                return_index=True,
-                return_inverse=True,
-            )
-            most = np.zeros(pairs.size)
-            np.maximum.at(most, which, degrees)
-            order = np.argsort(first)
-            kept = first[order]
-            return cells[kept], actions[kept], most[order]
+    block = next(solutions.of(np.array([ant])).blocks())
+    actions = np.repeat(block.action.astype(np.int64), block.index.shape[1])
+    cells, degrees = block.index.ravel().copy(), block.degree.ravel().copy()
+    if not solutions.may_repeat:
         return cells, actions, degrees
-    raise IndexError(f"there is no ant {ant}")  # pragma: no cover - it was found there
+    pairs, first, which = np.unique(
+        cells * (actions.max() + 1) + actions, return_index=True, return_inverse=True
+    )
+    most = np.zeros(pairs.size)
+    np.maximum.at(most, which, degrees)
+    order = np.argsort(first)
+    kept = first[order]
+    return cells[kept], actions[kept], most[order]

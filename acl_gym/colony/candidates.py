@@ -41,7 +41,7 @@ def inverse_distances(distances: FloatArray) -> FloatArray:
     """
     apart = distances > 0.0
     nearest = distances[apart].min() if apart.any() else 10.0
-    eta = np.divide(
+    eta: FloatArray = np.divide(
         1.0, distances, out=np.full(distances.shape, 10.0 / nearest), where=apart
     )
     np.fill_diagonal(eta, 0.0)

@@ -14,14 +14,18 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from acl_gym.colony.selection import boltzmann_allowed
+from acl_gym.colony.city_choice import (
+    best_candidate,
+    best_of_rest,
+    choose_otherwise,
+    drawn_candidate,
+    last_increase,
+    whole_exponent,
+)
 from acl_gym.colony.solutions import ROWS_PER_BLOCK, Block
 from acl_gym.colony.update_kernels import decay_pair
 from acl_gym.utils.compiling import njit
 from acl_gym.utils.typing import BoolArray, CellArray, FloatArray, IntArray
-
-_WHOLE = 8
-"""Powers up to this are products, which are cheaper than `pow`."""
 
 _TOGETHER = 8
 """Ants whose random numbers, which lie side by side, are taken at a time."""
@@ -53,6 +57,16 @@ class Tours:
         self._ends: IntArray = np.arange(1, most + 1) * n_cities
         self._degree: FloatArray = np.ones((most * n_cities, 1))
         self._next: CellArray = np.empty((most, n_cities), np.int32)
+
+    def of(self, ants: IntArray) -> Tours:
+        """The tours of some ants, which are 0, 1, ... m - 1 in what is returned.
+
+        Args:
+            ants: different ones in ascending order, `(m,)`.
+        """
+        some = Tours(ants.size, self.tours.shape[1])
+        some.tours[:] = self.tours[ants]
+        return some
 
     def blocks(self) -> Iterator[Block]:
         """All solutions, ant by ant, in parts that fit into the processor's cache.
@@ -111,56 +125,6 @@ def tour_lengths(tours: CellArray, distances: FloatArray) -> FloatArray:
 
 
 @njit(error_model="numpy")
-def weigh_candidates(
-    levels: FloatArray,
-    alpha: float,
-    weights: FloatArray | None,
-    candidates: CellArray,
-    weighed: FloatArray,
-) -> None:
-    """Write tau^alpha eta^beta of each city's candidates to `weighed`, `(n, k)`.
-
-    Once per trial, where levels do not change within it. Levels are scaled by the
-    largest of their row: no underflow of what matters.
-
-    Args:
-        levels: `(n, n)`, > 0.
-        alpha: exponent of the levels.
-        weights: `Pheromone.weights`; None: 1 everywhere.
-        candidates: `(n, k)`.
-        weighed: receives the products.
-    """
-    whole = _whole(alpha)
-    for i in range(candidates.shape[0]):
-        largest = 0.0
-        for c in range(candidates.shape[1]):
-            largest = max(largest, levels[i, candidates[i, c]])
-        for c in range(candidates.shape[1]):
-            j = candidates[i, c]
-            weight = _power(levels[i, j] / largest, alpha, whole)
-            if weights is not None:
-                weight *= weights[i, j]
-            weighed[i, c] = weight
-
-
-@njit(inline="always")
-def _whole(alpha: float) -> int:
-    """Alpha, where powers are to be products; else 0."""
-    whole = int(min(alpha, _WHOLE + 1.0))  # what no integer holds would be anything
-    return whole if whole == alpha and whole <= _WHOLE else 0
-
-
-@njit(inline="always")
-def _power(ratio: float, alpha: float, whole: int) -> float:
-    if whole == 0:
-        return float(ratio**alpha)
-    value = ratio
-    for _ in range(1, whole):
-        value *= ratio
-    return value
-
-
-@njit(error_model="numpy")
 def build_tours(
     starts: IntArray,
     draws: FloatArray,
@@ -213,10 +177,10 @@ def build_tours(
                 for c in range(k):
                     place += np.uint64(sums[c] <= target)
                 if place == k:  # the product was rounded up to the total
-                    place = _last_increase(sums)
+                    place = last_increase(sums)
                 chosen = np.uint64(candidates[city, place])
             else:
-                slow, n_rest = _choose_otherwise(
+                slow, n_rest = choose_otherwise(
                     city,
                     free,
                     candidates,
@@ -231,109 +195,6 @@ def build_tours(
                 chosen = np.uint64(slow)
             tours[a, t], free[chosen] = chosen, 0.0
             city = chosen
-
-
-@njit
-def _last_increase(sums: FloatArray) -> np.uint64:
-    """The first place at which cumulated sums have reached their last value."""
-    place = sums.size - 1
-    while place > 0 and sums[place - 1] == sums[place]:
-        place -= 1
-    return np.uint64(place)
-
-
-@njit(error_model="numpy")
-def _choose_otherwise(
-    city: np.uint64,
-    free: FloatArray,
-    candidates: CellArray,
-    choice: float,
-    levels: FloatArray,
-    alpha: float,
-    weights: FloatArray | None,
-    greedy_weights: FloatArray | None,
-    rest: CellArray,
-    n_rest: int,
-) -> tuple[int, int]:
-    """Choose where the candidates seem to offer nothing: their weights sum to 0.
-
-    Either they are merely too small, and are scaled by the largest of those that are
-    left; or no candidate is left, and then the best of all cities that are left is
-    taken.
-
-    Returns:
-        The city, and how many cities are in `rest` now.
-    """
-    allowed: BoolArray = np.zeros(free.size, np.bool_)
-    some = False
-    for c in range(candidates.shape[1]):
-        j = candidates[city, c]
-        if free[j] > 0.0 and (weights is None or weights[city, j] > 0.0):
-            allowed[j] = some = True
-    if some:
-        cell, degree = np.array([np.int32(city)]), np.ones(1)
-        found = boltzmann_allowed(levels, alpha, weights, cell, degree, allowed, choice)
-        return found, n_rest
-    return _best_of_rest(city, free, choice, levels, greedy_weights, rest, n_rest)
-
-
-@njit(error_model="numpy")
-def _best_of_rest(
-    city: np.uint64,
-    free: FloatArray,
-    choice: float,
-    levels: FloatArray,
-    greedy_weights: FloatArray | None,
-    rest: CellArray,
-    n_rest: int,
-) -> tuple[int, int]:
-    """The city not yet visited with the largest tau^alpha eta^beta; ties by `choice`.
-
-    `rest` holds the cities that were left when an ant last looked here, in ascending
-    order, or nothing if `n_rest` < 0. It shrinks with the tour, so all cities are looked
-    at only once per tour.
-
-    Returns:
-        The city, and how many cities are in `rest` now.
-    """
-    if n_rest < 0:
-        n_rest = free.size
-        for j in range(n_rest):
-            rest[j] = j
-    count, tied, best = 0, 0, -1.0
-    counts = False  # whether any heuristic variable is positive
-    for r in range(n_rest):
-        j = rest[r]
-        if free[j] > 0.0:
-            rest[count] = j
-            count += 1
-            counts |= greedy_weights is not None and greedy_weights[city, j] > 0.0
-    for r in range(count):
-        value = _value(city, rest[r], levels, greedy_weights, counts)
-        if value > best:
-            best, tied = value, 0
-        tied += value == best
-    skip = int(choice * tied)
-    for r in range(count):
-        if _value(city, rest[r], levels, greedy_weights, counts) == best:
-            if skip == 0:
-                return int(rest[r]), count
-            skip -= 1
-    return int(rest[0]), count
-
-
-@njit(inline="always")
-def _value(
-    city: np.uint64,
-    j: int,
-    levels: FloatArray,
-    greedy_weights: FloatArray | None,
-    counts: bool,
-) -> float:
-    """What the best city has most of."""
-    if greedy_weights is None or not counts:
-        return levels[city, j]
-    return levels[city, j] * greedy_weights[city, j]
 
 
 @njit(error_model="numpy")
@@ -375,7 +236,7 @@ def build_tours_in_turn(
     m, n = tours.shape
     free, rest = np.ones((m, n)), np.empty((m, n), np.int32)
     n_rest = np.full(m, -1)
-    values, whole = np.empty(candidates.shape[1]), _whole(alpha)
+    values, whole = np.empty(candidates.shape[1]), whole_exponent(alpha)
     for a in range(m):
         tours[a, 0] = starts[a]
         free[a, starts[a]] = 0.0
@@ -388,7 +249,7 @@ def build_tours_in_turn(
                 coin, choice = draws[t - 1, 0, a], draws[t - 1, 1, a]
                 chosen = -1
                 if coin < q0:
-                    chosen = _best_candidate(
+                    chosen = best_candidate(
                         city,
                         free[a],
                         candidates,
@@ -398,7 +259,7 @@ def build_tours_in_turn(
                         values,
                     )
                 else:
-                    chosen = _drawn_candidate(
+                    chosen = drawn_candidate(
                         city,
                         free[a],
                         candidates,
@@ -410,7 +271,7 @@ def build_tours_in_turn(
                         values,
                     )
                 if chosen < 0 and coin < q0:
-                    chosen, n_rest[a] = _best_of_rest(
+                    chosen, n_rest[a] = best_of_rest(
                         city,
                         free[a],
                         choice,
@@ -420,7 +281,7 @@ def build_tours_in_turn(
                         n_rest[a],
                     )
                 elif chosen < 0:
-                    chosen, n_rest[a] = _choose_otherwise(
+                    chosen, n_rest[a] = choose_otherwise(
                         city,
                         free[a],
                         candidates,
@@ -438,75 +299,3 @@ def build_tours_in_turn(
             if symmetric:
                 levels[chosen, city] = levels[city, chosen]
                 stale[chosen] = True
-
-
-@njit(inline="always")
-def _best_candidate(
-    city: np.uint64,
-    free: FloatArray,
-    candidates: CellArray,
-    choice: float,
-    levels: FloatArray,
-    greedy_weights: FloatArray | None,
-    values: FloatArray,
-) -> int:
-    """The candidate left with the largest tau^alpha eta^beta; -1 if all have none."""
-    k = np.uint64(candidates.shape[1])
-    best = 0.0
-    for c in range(k):
-        j = np.uint64(candidates[city, c])
-        value = levels[city, j] * free[j]
-        if greedy_weights is not None:
-            value *= greedy_weights[city, j]
-        values[c] = value
-        best = max(best, value)
-    if best == 0.0:
-        return -1
-    tied = 0
-    for c in range(k):
-        tied += values[c] == best
-    skip = int(choice * tied)
-    for c in range(k):
-        if values[c] == best:
-            if skip == 0:
-                return int(candidates[city, c])
-            skip -= 1
-    return -1
-
-
-@njit(inline="always")
-def _drawn_candidate(
-    city: np.uint64,
-    free: FloatArray,
-    candidates: CellArray,
-    choice: float,
-    levels: FloatArray,
-    alpha: float,
-    whole: int,
-    weights: FloatArray | None,
-    sums: FloatArray,
-) -> int:
-    """A candidate left, drawn by (2.2); -1 if their weights sum to 0."""
-    k = np.uint64(candidates.shape[1])
-    largest = 0.0
-    for c in range(k):
-        j = np.uint64(candidates[city, c])
-        largest = max(largest, levels[city, j] * free[j])
-    if largest == 0.0:
-        return -1
-    total = 0.0
-    for c in range(k):
-        j = np.uint64(candidates[city, c])
-        weight = _power(levels[city, j] * free[j] / largest, alpha, whole)
-        if weights is not None:
-            weight *= weights[city, j]
-        total += weight
-        sums[c] = total
-    if not total > 0.0:
-        return -1
-    place, target = np.uint64(0), choice * total
-    for c in range(k):
-        place += np.uint64(sums[c] <= target)
-    if place == k:
-        place = _last_increase(sums)
-    return int(candidates[city, place])

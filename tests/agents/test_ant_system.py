@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import io
-import sys
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import gymnasium as gym
@@ -291,38 +289,31 @@ def test_heuristics_of_ones_own() -> None:
     np.testing.assert_array_equal(loaded.update.candidates, given.update.candidates)
 
 
-class Shortened:
-    """Stands for a local search: sorts the tours and says how long they are."""
-
-    def __init__(self, distances: Array) -> None:
-        self.instance = TravellingSalesmanInstance.from_distances(distances)
-        self.calls = 0
-
-    def nearest_neighbours(self, distances: Array, k: int) -> Array:
-        return np.argsort(distances, axis=1)[:, 1 : k + 1].astype(np.int32)
-
-    def search(self, tours: Array, distances: Array, neighbours: Array) -> Any:
-        assert neighbours.shape == (len(distances), min(20, len(distances) - 1))
-        self.calls += 1
-        tours.sort(axis=1)
-        return self.instance.length(tours)
-
-
 @pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("method", ["2-opt", "or-opt", "3-opt"])
 def test_local_search_improves_tours_before_they_count(
-    kind: type[Any], monkeypatch: pytest.MonkeyPatch
+    kind: type[Any], method: str
 ) -> None:
-    distances = random_distances(9)
-    stand_in = Shortened(distances)
-    module = SimpleNamespace(
-        two_opt=stand_in.search, nearest_neighbours=stand_in.nearest_neighbours
-    )
-    monkeypatch.setitem(sys.modules, "acl_gym.colony.local_search", module)
-    colony = kind(salesman(3, distances=distances), local_search="2-opt", seed=0)
-    colony.learn(trials=2)
-    assert stand_in.calls == 2
-    assert colony.best_tour.tolist() == list(range(9))
-    assert colony.best_cost == stand_in.instance.length(np.arange(9))
+    """The same tours, each then improved: no tour of the first trial becomes longer."""
+    env = salesman(4, start=0)
+    alone = kind(env, seed=0).learn(trials=1)
+    colony = kind(env, local_search=method, seed=0).learn(trials=1)
+    instance = load_instance("att48")
+    assert colony.history[0]["ants_cost"] < alone.history[0]["ants_cost"]
+    assert colony.best_cost == instance.length(colony.best_tour)
+    again = kind(env, local_search=method, seed=0).learn(trials=1)
+    assert rows(again) == rows(colony)
+    loaded = kind.load(io.BytesIO(saved(colony)), env).learn(trials=2)
+    assert rows(loaded)[1:] == rows(again.learn(trials=2))[1:]
+
+
+def test_two_opt_needs_symmetric_distances() -> None:
+    env = salesman(distances=random_distances(9, symmetric=False))
+    with pytest.raises(ValueError, match="2-opt turns paths round"):
+        AntSystem(env, local_search="2-opt")
+    colony = MaxMinAntSystem(env, local_search="3-opt", seed=0).learn(trials=20)
+    assert sorted(colony.best_tour) == list(range(9))
+    assert not colony.update.symmetric
 
 
 @pytest.mark.parametrize(

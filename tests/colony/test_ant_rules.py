@@ -14,9 +14,9 @@ from hypothesis import strategies as st
 
 from acl_gym import ACL, Crisp
 from acl_gym.colony.ant_kernels import LEAST_LEVEL, branching_factor
+from acl_gym.colony.ant_rule import AntRule
 from acl_gym.colony.ant_rules import (
     AntColonySystemUpdate,
-    AntRule,
     AntSystemUpdate,
     MaxMinUpdate,
 )

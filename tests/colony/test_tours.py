@@ -9,7 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from acl_gym.colony.ant_rules import AntColonySystemUpdate, AntRule, AntSystemUpdate
+from acl_gym.colony.ant_rule import AntRule
+from acl_gym.colony.ant_rules import AntColonySystemUpdate, AntSystemUpdate
 from acl_gym.colony.candidates import candidate_lists, inverse_distances
 from acl_gym.colony.pheromone import Pheromone
 from acl_gym.colony.tours import Tours, nearest_neighbour_tour, tour_lengths

@@ -13,11 +13,7 @@ from acl_gym.agents.base import TabularAgent
 from acl_gym.agents.saving import with_prefix
 from acl_gym.colony.ant_rule import AntRule
 from acl_gym.colony.candidates import NONE, candidate_lists, inverse_distances
-from acl_gym.colony.deposits import (
-    Deposit,
-    as_deposit,
-    deposit_from_settings,
-)
+from acl_gym.colony.deposits import Deposit, as_deposit, deposit_from_settings
 from acl_gym.colony.greedy import greedy_actions
 from acl_gym.colony.heuristic import Heuristic, as_heuristic
 from acl_gym.colony.local_search import METHODS

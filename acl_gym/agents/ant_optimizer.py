@@ -12,9 +12,7 @@ from acl_gym.agents.ant_agent import AntAgent
 from acl_gym.agents.training import Training
 from acl_gym.callbacks.base import Callbacks
 from acl_gym.colony.ant_kernels import branching_factor
-from acl_gym.colony.deposits import (
-    checked_deposits,
-)
+from acl_gym.colony.deposits import checked_deposits
 from acl_gym.colony.local_search import LocalSearch, nearest_neighbours
 from acl_gym.colony.solutions import Solutions
 from acl_gym.colony.tours import Tours, nearest_neighbour_tour, tour_lengths
@@ -27,6 +25,9 @@ from acl_gym.utils.typing import BoolArray, CellArray, FloatArray, IntArray, Row
 
 _NEIGHBOURS = 20
 """How many neighbours of a city local search looks at, as in ACOTSP."""
+
+_LEAST_DEPOSIT, _MOST_DEPOSIT = 1e-150, 1e150
+"""What ants may deposit, so that no sum or quotient of levels leaves the range of floats."""
 
 
 class AntOptimizer(AntAgent):
@@ -143,8 +144,15 @@ class AntOptimizer(AntAgent):
 
     def _fitness(self, costs: FloatArray) -> FloatArray:
         """F of solutions, what ants deposit for them."""
-        deposits = self.deposit(costs, self.pheromone.tau0)
-        return checked_deposits(deposits, costs.size)
+        found = self.deposit(costs, self.pheromone.tau0)
+        deposits = checked_deposits(found, costs.size)
+        if not _LEAST_DEPOSIT <= deposits.min() <= deposits.max() <= _MOST_DEPOSIT:
+            raise ValueError(
+                "ants must deposit between "
+                f"{_LEAST_DEPOSIT:g} and {_MOST_DEPOSIT:g}, got {deposits.min():g} to "
+                f"{deposits.max():g}; scale the costs, or take another deposit."
+            )
+        return deposits
 
     def _build_tours(self) -> TrialResult:
         """Let all ants build their tours at once, and improve them by local search."""
@@ -153,7 +161,8 @@ class AntOptimizer(AntAgent):
             raise TypeError("env is not the travelling salesman's")
         n, m = env.instance.n_cities, self.num_envs
         self._next_seed()  # which ants that walk would give to the environment
-        start = env.system.start
+        system: Any = env.system
+        start: str | int = system.start
         starts = np.full(m, start)
         if isinstance(start, str):
             starts = self.rng.integers(n, size=m)

@@ -130,7 +130,7 @@ class TabularAgent(SavedAgent):
         self.metadata: dict[str, Any] = {}
         self.set_random_seed(seed)
 
-    _fixed = ("partition", "pheromone")
+    _fixed: ClassVar[tuple[str, ...]] = ("partition", "pheromone")
 
     @property
     def _n_cells(self) -> int:

@@ -217,4 +217,4 @@ def branching_factor(
         for c in range(k):
             level = levels[i, candidates[i, c] if candidates.size > 0 else c]
             count += level >= cutoff
-    return count / n_cells
+    return float(count / n_cells)

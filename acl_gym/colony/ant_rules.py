@@ -5,7 +5,8 @@ Ant System (§2.5.1), Ant Colony System (§2.5.2) and Max-Min Ant System (Stütz
 works too. F(s) is what an ant deposits, by default 1 / J.
 
 A candidate solution is what an ant has done when it has reached a terminal state, as
-§2.4.2 has it. Ants that were stopped before deposit nothing.
+§2.4.2 has it. Ants that were stopped before deposit nothing. In an asynchronous colony
+each group of ants that come back together counts as a trial.
 """
 
 from __future__ import annotations

@@ -161,8 +161,8 @@ def _value(
 ) -> float:
     """What the best city has most of."""
     if greedy_weights is None or not counts:
-        return levels[city, j]
-    return levels[city, j] * greedy_weights[city, j]
+        return float(levels[city, j])
+    return float(levels[city, j] * greedy_weights[city, j])
 
 
 @njit(inline="always")

@@ -148,6 +148,13 @@ def test_all_cities_at_one_place_give_one_clear_error(kind: type[Any]) -> None:
         colony.learn(trials=1)
 
 
+def test_deposits_beyond_all_sums_give_one_clear_error() -> None:
+    """1 / 1e-200 may be added up a few times, but weighs nothing in a sum with others."""
+    env = salesman(2, distances=np.full((4, 4), 1e-200))
+    with pytest.raises(ValueError, match="ants must deposit between 1e-150 and 1e"):
+        AntSystem(env, seed=0)
+
+
 @pytest.mark.parametrize("kind", KINDS)
 def test_shortest_paths_where_ants_walk(kind: type[Any]) -> None:
     """On a chain, every start is a problem of its own; its neighbour's solution is best."""
@@ -161,10 +168,10 @@ def test_shortest_paths_where_ants_walk(kind: type[Any]) -> None:
 def test_finite_spaces_of_other_packages(kind: type[Any]) -> None:
     """CliffWalking: the first ways to the goal cost 998 and more, the shortest 13."""
     env = gym.make_vec(
-        "CliffWalking-v1", num_envs=40, vectorization_mode="sync", max_episode_steps=400
+        "CliffWalking-v1", num_envs=10, vectorization_mode="sync", max_episode_steps=200
     )
-    colony = kind(env, tabu=True, max_steps=400, global_decay=0.3, seed=1)
-    colony.learn(trials=15)
+    colony = kind(env, tabu=True, max_steps=200, global_decay=0.3, seed=1)
+    colony.learn(trials=25)
     assert 13.0 <= colony.best_cost <= 100.0
     cells, actions = colony.best_solution.T
     assert cells[0] == 36  # the start

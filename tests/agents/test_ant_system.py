@@ -166,13 +166,14 @@ def test_shortest_paths_where_ants_walk(kind: type[Any]) -> None:
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_finite_spaces_of_other_packages(kind: type[Any]) -> None:
-    """CliffWalking: the first ways to the goal cost 998 and more, the shortest 13."""
+    """CliffWalking: the first ways to the goal cost some hundred, the shortest 13."""
     env = gym.make_vec(
         "CliffWalking-v1", num_envs=10, vectorization_mode="sync", max_episode_steps=200
     )
     colony = kind(env, tabu=True, max_steps=200, global_decay=0.3, seed=1)
     colony.learn(trials=25)
-    assert 13.0 <= colony.best_cost <= 100.0
+    first = next(row["best_cost"] for row in colony.history if "best_cost" in row)
+    assert 13.0 <= colony.best_cost <= first / 3.0
     cells, actions = colony.best_solution.T
     assert cells[0] == 36  # the start
     assert len(set(zip(cells, actions, strict=True))) == len(cells)

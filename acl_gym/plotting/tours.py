@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from numpy.typing import ArrayLike
 
-from acl_gym.envs.graph.instances import TravellingSalesmanInstance, checked_tours
+from acl_gym.envs.graph.cities import TravellingSalesmanInstance, checked_tours
 from acl_gym.envs.graph.pictures import checked_levels, places_of, strongest_arcs
 from acl_gym.plotting import style
 from acl_gym.utils import validation

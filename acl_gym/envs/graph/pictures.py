@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from acl_gym.envs.graph.instances import TravellingSalesmanInstance
+from acl_gym.envs.graph.cities import TravellingSalesmanInstance
 from acl_gym.utils import validation
 from acl_gym.utils.typing import FloatArray, IntArray
 

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from acl_gym.envs.graph.instances import (
+from acl_gym.envs.graph.cities import (
     TravellingSalesmanInstance,
     check_size,
 )

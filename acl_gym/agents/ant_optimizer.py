@@ -1,0 +1,308 @@
+"""How Ant System, Ant Colony System and Max-Min Ant System learn."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from typing import Any, Self
+
+import numpy as np
+from gymnasium.vector import VectorEnv
+
+from acl_gym.agents.ant_agent import AntAgent
+from acl_gym.agents.training import Training
+from acl_gym.callbacks.base import Callbacks
+from acl_gym.colony.ant_kernels import branching_factor
+from acl_gym.colony.deposits import checked_deposits
+from acl_gym.colony.local_search import LocalSearch, nearest_neighbours
+from acl_gym.colony.solutions import Solutions
+from acl_gym.colony.tours import Tours, nearest_neighbour_tour, tour_lengths
+from acl_gym.colony.update_rule import TrialResult
+from acl_gym.envs.graph.travelling_salesman import TravellingSalesmanVectorEnv
+from acl_gym.evaluation.rollout import Outcome
+from acl_gym.partitions import Partition
+from acl_gym.utils import validation
+from acl_gym.utils.typing import BoolArray, CellArray, FloatArray, IntArray, Row
+
+_NEIGHBOURS = 20
+"""How many neighbours of a city local search looks at, as in ACOTSP."""
+
+_LEAST_DEPOSIT, _MOST_DEPOSIT = 1e-150, 1e150
+"""What ants may deposit, so that no sum or quotient of levels leaves the range of floats."""
+
+
+class AntOptimizer(AntAgent):
+    """A colony that looks for one best solution, by an update rule of chapter 2.
+
+    Args:
+        env: a vector environment with `Discrete` actions; its slots are the m ants.
+        partition: see `AntAgent`.
+        **parameters: see `AntAgent`.
+    """
+
+    def __init__(
+        self,
+        env: VectorEnv[Any, Any, Any] | None,
+        partition: Partition | None,
+        **parameters: Any,
+    ) -> None:
+        super().__init__(env, partition, **parameters)
+        self._tours: Tours | None = None
+        self._solutions: Solutions | None = None
+        self._result: TrialResult | None = None
+        self._set_tau0()
+        self._check_env()
+
+    @staticmethod
+    @abstractmethod
+    def usual_ants(n_cities: int, local_search: str | None = None) -> int:
+        """How many ants the literature takes for so many cities.
+
+        Args:
+            n_cities: n.
+            local_search: as of the constructor.
+        """
+
+    def learn(
+        self,
+        total_timesteps: int | None = None,
+        trials: int | None = None,
+        callback: Callbacks = None,
+        log_interval: int | None = None,
+        progress_bar: bool = False,
+    ) -> Self:
+        """Let the ants construct solutions, and update the pheromone after each trial.
+
+        Called again, it continues from the pheromone and the best solution as they are.
+
+        Args:
+            total_timesteps: stop after the trial that reaches this many steps of all
+                ants together; None sets no such limit. A tour has as many steps as
+                there are cities.
+            trials: how many trials to make, of one solution an ant; None sets no such
+                limit. Without either limit, 100.
+            callback: as in `ACL.learn`.
+            log_interval: print a line every `log_interval` trials; None prints nothing.
+            progress_bar: show a bar (of tqdm).
+
+        Returns:
+            The agent itself.
+
+        Raises:
+            ValueError: a solution has a cost for which ants can deposit nothing.
+        """
+        budget = (total_timesteps, trials, callback, log_interval, progress_bar)
+        with Training(self, *budget) as training:
+            while training.next_trial():
+                self._set_exponents()
+                result = self._build_tours() if self.builds_tours else self._walk()
+                self._result = result
+                self._set_tau0()
+                self._rule.global_update(
+                    self.pheromone, result, self.local_decay, self.global_decay
+                )
+                training.end_trial(result.costs)
+        return self
+
+    @property
+    def builds_tours(self) -> bool:
+        """Whether whole tours are built at once, without stepping the environment."""
+        # Subclasses and wrappers may change what a step does.
+        return type(self.env) is TravellingSalesmanVectorEnv and not self.walk
+
+    def _set_tau0(self) -> None:
+        """Set tau0 by the formula of the literature, as soon as that is possible.
+
+        On the travelling salesman problem by the length of the nearest-neighbour tour
+        from city 0. Elsewhere by the best cost of the first trial, in which all levels are
+        equal, so that it does not matter which they are.
+        """
+        if not self._tau0_is_due or self.env is None:
+            return
+        tau0, salesman = self.tau0, self._salesman
+        if tau0 is None and salesman is not None:
+            tour = nearest_neighbour_tour(salesman.distances, 0)[None]
+            length = tour_lengths(tour, salesman.distances)
+            if not length[0] > 0.0:
+                return  # the first trial tells what is wrong
+            tau0 = self._formula(float(self._fitness(length)[0]), tour.size)
+        elif tau0 is None and self._result is not None:
+            result = self._result
+            complete = np.flatnonzero(result.terminated)
+            if not complete.size:
+                return
+            ant = complete[result.costs[complete].argmin()]
+            steps = int(result.solutions.length[ant])
+            tau0 = self._formula(float(result.deposits[ant]), steps)
+        if tau0 is not None:
+            self.pheromone.set_tau0(tau0, everywhere=not self._levels_are_set)
+            self._tau0_is_due = False
+
+    def _formula(self, fitness: float, steps: int) -> float:
+        return self._rule.initial_level(
+            fitness, steps, self.num_envs, self.global_decay
+        )
+
+    def _fitness(self, costs: FloatArray) -> FloatArray:
+        """F of solutions, what ants deposit for them."""
+        found = self.deposit(costs, self.pheromone.tau0)
+        deposits = checked_deposits(found, costs.size)
+        if not _LEAST_DEPOSIT <= deposits.min() <= deposits.max() <= _MOST_DEPOSIT:
+            raise ValueError(
+                "ants must deposit between "
+                f"{_LEAST_DEPOSIT:g} and {_MOST_DEPOSIT:g}, got {deposits.min():g} to "
+                f"{deposits.max():g}; scale the costs, or take another deposit."
+            )
+        return deposits
+
+    def _build_tours(self) -> TrialResult:
+        """Let all ants build their tours at once, and improve them by local search."""
+        env = self._salesman
+        if env is None:  # pragma: no cover - builds_tours says it is there
+            raise TypeError("env is not the travelling salesman's")
+        n, m = env.instance.n_cities, self.num_envs
+        self._next_seed()  # which ants that walk would give to the environment
+        system: Any = env.system
+        start: str | int = system.start
+        starts = np.full(m, start)
+        if isinstance(start, str):
+            starts = self.rng.integers(n, size=m)
+        solutions = self._tours
+        if solutions is None or solutions.tours.shape != (m, n):
+            solutions = self._tours = Tours(m, n)
+        tours = solutions.tours
+        if self._lists is None:
+            self._lists = np.tile(np.arange(n, dtype=np.int32), (n, 1))
+        draws = self.rng.random((n, 2, m))
+        self._rule.build(self.pheromone, starts, draws, self._lists, self._decay, tours)
+        if self._search is None:
+            lengths = tour_lengths(tours, env.distances)
+        else:
+            lengths = self._search.improve(tours)
+        complete = np.ones(m, np.bool_)
+        return TrialResult(solutions, lengths, self._fitness(lengths), complete)
+
+    @property
+    def _decay(self) -> float:
+        """gamma; 0 as long as tau0, towards which levels decay, is not known."""
+        return 0.0 if self._tau0_is_due else float(self.local_decay)
+
+    def _walk(self) -> TrialResult:
+        """Let all ants walk in the environment, step by step, each to its end."""
+        rule, pheromone, rollout = self._rule, self.pheromone, self.rollout
+        solutions = self._empty_solutions()
+        observation = rollout.start(seed=self._next_seed())
+        while rollout._ants.size:
+            ants = rollout._ants
+            index, degree = self._locate(observation, ants)
+            allowed = self._allowed(solutions, index)
+            actions = rule.choose(
+                "boltzmann",
+                pheromone,
+                index,
+                degree,
+                0.0,
+                self.rng,
+                allowed,
+                self._decay,
+            )
+            solutions.append(ants, observation, index, actions)
+            observation = rollout.move(actions)
+            rule.local_update(pheromone, index, degree, actions, self._decay)
+        complete = rollout.terminated
+        deposits = np.zeros(rollout.num_envs)
+        if complete.any():  # else there is no solution
+            deposits[complete] = self._fitness(rollout.cost[complete])
+        return TrialResult(solutions, rollout.cost, deposits, complete)
+
+    def _allowed(self, solutions: Solutions, index: CellArray) -> BoolArray | None:
+        """What each walking ant may do, less what is tabu; None: everything."""
+        rollout = self.rollout
+        allowed = rollout.allowed()
+        if not self.tabu:
+            return allowed
+        if allowed is None:
+            allowed = np.ones((rollout._ants.size, self.n_actions), np.bool_)
+        return solutions.untried(rollout._ants, index, allowed)
+
+    def _empty_solutions(self) -> Solutions:
+        """Memory for a trial, reused from trial to trial."""
+        kept, shape = self._solutions, (self.num_envs, self.max_steps)
+        if kept is None or (kept.n_ants, kept.max_steps) != shape:
+            kept = Solutions(*shape, self.n_actions, self.partition)
+            self._solutions = kept
+        kept.clear()
+        return kept
+
+    def outcome(self) -> Outcome:
+        """What the solutions of the trial that has just ended came to."""
+        result = self._result
+        if result is None or not isinstance(result.solutions, Tours):
+            return super().outcome()
+        steps = result.solutions.tours.size
+        return Outcome(result.costs, result.terminated, steps)
+
+    def measures(self, policy: IntArray) -> Row:
+        """The best costs, of all trials and of this one, and the branching factor.
+
+        Where an ant of the trial has reached a terminal state, or one ever has. The
+        lambda-branching factor is the mean number of actions in a cell that ants may
+        still take, see `branching_factor`, among candidates where there are.
+        """
+        row: Row = {}
+        result = self._result
+        if result is not None and result.terminated.any():
+            row["trial_best_cost"] = float(result.costs[result.terminated].min())
+        if self._rule.best.found:
+            row["best_cost"] = self.best_cost
+        levels = self.pheromone.levels
+        row["branching_factor"] = branching_factor(levels, self._rule.candidates)
+        return row
+
+    def set_env(self, env: VectorEnv[Any, Any, Any]) -> None:
+        """See `TabularAgent.set_env`.
+
+        Raises:
+            ValueError: it is another travelling salesman problem than that whose best
+                tour is known.
+        """
+        super().set_env(env)
+        self._check_env()
+        self._set_tau0()
+
+    def _check_env(self) -> None:
+        """Check that the environment fits, and prepare the local search on it."""
+        self._search: LocalSearch | None = None
+        if self.env is None:
+            return
+        best, salesman = self._rule.best, self._salesman
+        if self._local_search is not None:
+            if salesman is None or not self.builds_tours:
+                raise ValueError(
+                    "local_search needs the travelling salesman's environment, not "
+                    f"wrapped, and walk=False, got {validation.shown(self.env)} and "
+                    f"walk={self.walk}; leave local_search out."
+                )
+            distances = salesman.distances
+            near = nearest_neighbours(distances, min(_NEIGHBOURS, len(distances) - 1))
+            self._search = LocalSearch(self._local_search, distances, near)
+        if best.found and salesman is not None:
+            length = tour_lengths(best.cells[None], salesman.distances)[0]
+            if not np.isclose(length, best.cost, rtol=1e-9):
+                raise ValueError(
+                    "env must be the instance on which the best tour has a length of "
+                    f"{best.cost:g}, got one where it has {length:g}; make a new agent "
+                    "for another instance."
+                )
+
+
+def is_symmetric(env: Any, symmetric: bool | None) -> bool:
+    """Whether deposits are symmetric: as given, or as the instance is.
+
+    Args:
+        env: the environment, or None.
+        symmetric: as given; None: True on a symmetric travelling salesman problem.
+    """
+    if symmetric is not None:
+        return symmetric
+    base = getattr(env, "unwrapped", None)
+    return isinstance(base, TravellingSalesmanVectorEnv) and base.instance.symmetric

@@ -14,6 +14,7 @@ from acl_gym.envs import register_environments
 
 if TYPE_CHECKING:
     from acl_gym.agents.acl import ACL
+    from acl_gym.agents.ant_system import AntColonySystem, AntSystem, MaxMinAntSystem
     from acl_gym.agents.q_learning import QLearning
     from acl_gym.agents.returning import ReturningACL
     from acl_gym.callbacks import (
@@ -59,6 +60,8 @@ __version__ = "0.1.0"
 # take seconds to load, which `gym.make` of another environment should not cost.
 _PUBLIC = {
     "ACL": "acl_gym.agents.acl",
+    "AntColonySystem": "acl_gym.agents.ant_system",
+    "AntSystem": "acl_gym.agents.ant_system",
     "CSVLog": "acl_gym.callbacks",
     "Callback": "acl_gym.callbacks",
     "Checkpoint": "acl_gym.callbacks",
@@ -75,6 +78,7 @@ _PUBLIC = {
     "Harmonic": "acl_gym.schedules",
     "InverseCost": "acl_gym.deposits",
     "Linear": "acl_gym.schedules",
+    "MaxMinAntSystem": "acl_gym.agents.ant_system",
     "Overshoot": "acl_gym.costs",
     "Partition": "acl_gym.partitions",
     "PolicyCost": "acl_gym.evaluation",
@@ -110,6 +114,8 @@ _PUBLIC = {
 
 __all__ = [
     "ACL",
+    "AntColonySystem",
+    "AntSystem",
     "CSVLog",
     "Callback",
     "Checkpoint",
@@ -126,6 +132,7 @@ __all__ = [
     "Harmonic",
     "InverseCost",
     "Linear",
+    "MaxMinAntSystem",
     "Overshoot",
     "Partition",
     "PolicyCost",

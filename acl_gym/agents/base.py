@@ -17,7 +17,7 @@ from acl_gym.colony.greedy import greedy_actions
 from acl_gym.envs.control.environments import ControlVectorEnv
 from acl_gym.envs.control.lookup import signals_of
 from acl_gym.envs.control.signals import Signals
-from acl_gym.evaluation.rollout import Rollout
+from acl_gym.evaluation.rollout import Outcome, Rollout
 from acl_gym.export import Source
 from acl_gym.partitions import Partition, checked_partition, locate_checked
 from acl_gym.partitions.automatic import automatic_partition
@@ -76,6 +76,10 @@ class TabularAgent(SavedAgent):
 
     slots_are: ClassVar[str] = "slots"
     """What the slots are called where the agent is described."""
+
+    measures_policy: ClassVar[bool] = True
+    """Whether the whole policy is looked at after each trial, which takes a while in a
+    large table; else rows have no `policy_variation`, and `measures` is given nothing."""
 
     def __init__(
         self,
@@ -178,6 +182,10 @@ class TabularAgent(SavedAgent):
         progress_bar: bool = False,
     ) -> Self:
         """Learn; see the agent's own docstring."""
+
+    def outcome(self) -> Outcome:
+        """What the episodes of the trial that has just ended came to."""
+        return self.rollout.outcome()
 
     def measures(self, policy: IntArray) -> Row:
         """More columns for the row of a trial, given the policy `(n_cells,)`."""

@@ -79,7 +79,9 @@ class Training:
         self._callbacks = as_callbacks(callback)
         self._log_interval = log_interval
         self._stopped = False
-        self._policy = agent.policy.best_actions()
+        self._policy: IntArray = np.empty(0, np.int64)
+        if agent.measures_policy:
+            self._policy = agent.policy.best_actions()
         self._partition = agent.partition
         in_trials = trials is not None
         self._bar: Any = tqdm(
@@ -128,23 +130,21 @@ class Training:
         Args:
             costs: J of each finished episode; None takes the sums of the stage costs.
         """
-        agent, outcome = self._agent, self._agent.rollout.outcome()
+        agent, outcome = self._agent, self._agent.outcome()
         agent.busy = False
         steps = outcome.n_steps
         agent.num_timesteps += steps
         agent.trials += 1
         agent.seconds += time.perf_counter() - self._clock
-        policy = agent.policy.best_actions()
         row: Row = {
             "trial": agent.trials,
             "env_steps": agent.num_timesteps,
             "seconds": agent.seconds,
             "ants_cost": float((outcome.costs if costs is None else costs).mean()),
             **self._outcomes(outcome),
-            "policy_variation": float(np.mean(policy != self._before())),
-            **agent.measures(policy),
+            **self._variation(),
+            **agent.measures(self._policy),
         }
-        self._policy, self._partition = policy, agent.partition
         agent.in_trial = False
         agent.history.append(row)
         for callback in self._callbacks:
@@ -153,6 +153,16 @@ class Training:
             check_row(row)
         self._report(row, 1 if self._bar_counts_trials else steps)
         self._clock = time.perf_counter()
+
+    def _variation(self) -> Row:
+        """How much of the policy has changed in the trial (§3.6.1)."""
+        agent = self._agent
+        if not agent.measures_policy:
+            return {}
+        policy = agent.policy.best_actions()
+        variation = float(np.mean(policy != self._before()))
+        self._policy, self._partition = policy, agent.partition
+        return {"policy_variation": variation}
 
     def _before(self) -> IntArray:
         """The policy of the last trial, in the cells of the present partition."""

@@ -115,8 +115,11 @@ class Pheromone(Fixed):
     def greedy_weights(self) -> FloatArray | None:
         """What tau is multiplied by to find the best action: eta^(beta / alpha).
 
-        Each row is divided by its largest, as in `weights`.
+        Each row is divided by its largest, as in `weights`, with which they share their
+        memory where alpha is 1.
         """
+        if self._alpha == 1.0:
+            return self.weights
         if self._heuristic is not None and self._greedy_weights is None:
             self._greedy_weights = self._scaled_to_the_power(self._beta / self._alpha)
         return self._greedy_weights
@@ -126,6 +129,18 @@ class Pheromone(Fixed):
         powers = (eta / eta.max(axis=1, keepdims=True)) ** exponent
         # With an exponent of 0 an action that is ruled out stays so.
         return np.where(eta > 0.0, powers, 0.0)
+
+    def set_tau0(self, tau0: float, everywhere: bool) -> None:
+        """Set the initial level, where it was not known before.
+
+        Args:
+            tau0: > 0.
+            everywhere: give all pairs that level.
+        """
+        self.__dict__["tau0"] = validation.number("tau0", tau0, above=0)
+        if everywhere:
+            self.levels.fill(self.tau0)
+            self.stale[:] = True
 
     def set_levels(self, levels: FloatArray) -> None:
         """Replace all levels.

@@ -114,7 +114,7 @@ def choose_actions(
 
 
 @njit(error_model="numpy")
-def _boltzmann_allowed(
+def boltzmann_allowed(
     levels: FloatArray,
     alpha: float,
     weights: FloatArray | None,
@@ -123,7 +123,7 @@ def _boltzmann_allowed(
     allowed: BoolArray,
     choice: float,
 ) -> int:
-    """Draw one ant's action by Boltzmann selection, eq. (4.11), among U_q.
+    """Draw one ant's action by Boltzmann selection, eq. (4.11), among U_q; for kernels.
 
     The probabilities, eq. (4.3), are computed anew, with sums over U_q only. Powers are
     not products as in `Pheromone.repair`, because those are rounded differently.
@@ -184,7 +184,7 @@ def _draw_action(
     if allowed.size > 0:
         if coin < epsilon:
             return any_action(choice, j, n_actions, allowed)
-        return _boltzmann_allowed(
+        return boltzmann_allowed(
             levels, alpha, weights, index[j], degree[j], allowed[j], choice
         )
     # Invert the distribution (4.11). Rounding may leave its sum below 1, so the last
@@ -319,4 +319,4 @@ def choose_alone(
     if greedy:
         return best_action(levels, weights, index, degree, choice, allowed, j)
     own = allowed[j] if allowed.size > 0 else np.ones(n_actions, dtype=np.bool_)
-    return _boltzmann_allowed(levels, alpha, weights, index[j], degree[j], own, choice)
+    return boltzmann_allowed(levels, alpha, weights, index[j], degree[j], own, choice)

@@ -82,6 +82,9 @@ class Solutions(Fixed):
 
     _fixed = ("n_ants", "max_steps", "partition")
 
+    may_repeat = True
+    """Whether a solution may have a pair more than once."""
+
     def __init__(
         self, n_ants: int, max_steps: int, n_actions: int, partition: Partition
     ) -> None:

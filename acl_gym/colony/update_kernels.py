@@ -20,7 +20,7 @@ def _decayed(level: float, kept: float, tau0: float) -> float:
 
 
 @njit(inline="always")
-def _decay_pair(
+def decay_pair(
     levels: FloatArray,
     cell: int | np.uint64,
     action: int | np.uint64,
@@ -28,7 +28,7 @@ def _decay_pair(
     tau0: float,
     stale: BoolArray,
 ) -> None:
-    """Local update of one pair, eq. (4.12), with `decay` = gamma * degree."""
+    """Local update of one pair, eq. (4.12), with `decay` = gamma * degree; for kernels."""
     levels[cell, action] = _decayed(levels[cell, action], 1.0 - decay, tau0)
     stale[cell] = True
 
@@ -58,7 +58,7 @@ def decay(
                 cell = np.uint64(index[j, c])
                 if cell >= n_cells or action >= n_actions:
                     return False
-                _decay_pair(
+                decay_pair(
                     levels, cell, action, local_decay * degree[j, c], tau0, stale
                 )
     return True
@@ -185,7 +185,7 @@ def choose_and_decay(
         )
         actions[j] = action
         for c in range(index.shape[1]):
-            _decay_pair(
+            decay_pair(
                 levels, index[j, c], action, local_decay * degree[j, c], tau0, stale
             )
 

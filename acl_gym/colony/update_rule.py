@@ -13,6 +13,7 @@ from acl_gym.colony.episodes import Episodes
 from acl_gym.colony.pheromone import Pheromone
 from acl_gym.colony.selection import choose_actions
 from acl_gym.colony.solutions import Solutions
+from acl_gym.colony.tours import Tours
 from acl_gym.utils import validation
 from acl_gym.utils.serialization import Missing, Savable
 from acl_gym.utils.typing import BoolArray, CellArray, FloatArray, IntArray
@@ -23,7 +24,8 @@ class TrialResult:
     """What the ants of a trial did and what it cost.
 
     Attributes:
-        solutions: S_trial, the cells, degrees and actions of every ant.
+        solutions: S_trial, the cells, degrees and actions of every ant; `Tours` from
+            colonies that build whole tours.
         costs: J of each ant, `(n_ants,)`.
         deposits: what each ant deposits, `(n_ants,)`, in the thesis 1 / J.
         terminated: whether each ant ended in a terminal state, `(n_ants,)`.
@@ -36,7 +38,7 @@ class TrialResult:
             then due again.
     """
 
-    solutions: Solutions
+    solutions: Solutions | Tours
     costs: FloatArray
     deposits: FloatArray
     terminated: BoolArray

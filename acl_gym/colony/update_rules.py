@@ -14,9 +14,11 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from acl_gym.colony.ant_rules import ANT_RULES
 from acl_gym.colony.greedy import ALL, check_choice, drawn_numbers
 from acl_gym.colony.pheromone import Pheromone
 from acl_gym.colony.solutions import Solutions
+from acl_gym.colony.tours import Tours
 from acl_gym.colony.update_kernels import (
     choose_and_decay,
     decay,
@@ -53,7 +55,7 @@ class Reinforcement:
     def __call__(
         self,
         pheromone: Pheromone,
-        solutions: Solutions,
+        solutions: Solutions | Tours,
         deposits: FloatArray,
         global_decay: float,
         begins_batch: bool | None = None,
@@ -335,7 +337,9 @@ UPDATE_RULES: dict[str, UpdateRule] = {
     "once_per_ant": OncePerAnt(),
     "once_per_trial": OncePerTrial(),
 }
-"""The update rules by name."""
+"""The update rules by name. Those of chapter 2, `ANT_RULES`, are given as objects."""
+
+_KINDS = (*map(type, UPDATE_RULES.values()), *ANT_RULES)
 
 
 def as_update(update: str | UpdateRule) -> UpdateRule:
@@ -357,9 +361,7 @@ def as_update(update: str | UpdateRule) -> UpdateRule:
 
 def watched(rule: UpdateRule, n_actions: int) -> UpdateRule:
     """The rule itself if it is one of this package, else behind a `WatchedRule`."""
-    own = type(rule) in map(type, UPDATE_RULES.values()) or isinstance(
-        rule, MissingRule
-    )
+    own = type(rule) in _KINDS or isinstance(rule, MissingRule)
     return rule if own else WatchedRule(rule, n_actions)
 
 
@@ -369,8 +371,7 @@ def update_from_settings(settings: Any) -> UpdateRule:
     Raises:
         ValueError: the settings are those of no rule.
     """
-    kinds = [type(each) for each in UPDATE_RULES.values()]
-    rule = from_settings("update", settings, kinds, MissingRule)
+    rule = from_settings("update", settings, _KINDS, MissingRule)
     if not isinstance(rule, UpdateRule):
         raise ValueError(
             f"update must be an UpdateRule, got {validation.shown(settings)}."

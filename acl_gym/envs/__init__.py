@@ -1,4 +1,4 @@
-"""The control systems that ants walk through, as Gymnasium environments.
+"""The systems and graphs that ants walk through, as Gymnasium environments.
 
 The table of all environment ids, which are registered when `acl_gym` is imported.
 
@@ -15,6 +15,11 @@ it.
 | Navigation-v0 | 150 | Table 4.1 |
 | Pendulum-v0 | 300 | Table 5.2 |
 | TwoState-v0 | 2 | every episode ends after two steps |
+| TravellingSalesman-v0 | 100,000 | the most cities that an instance may have |
+
+A tour ends after as many steps as there are cities. The native vector environment
+replaces the limit by one step more than its instance needs, so that agents which walk
+as far as the limit says know where tours end.
 
 An id has one number, whatever map or parameters are passed with it. No start of the
 maps 11x11, 21x21 and 31x31 is more than 40 steps from the goal, so 435 is ten times what
@@ -77,6 +82,11 @@ ENVIRONMENTS = {
         "acl_gym.envs.two_state:TwoStateEnv",
         "acl_gym.envs.two_state:TwoStateVectorEnv",
         2,
+    ),
+    "acl_gym/TravellingSalesman-v0": Entry(
+        "acl_gym.envs.graph.travelling_salesman:TravellingSalesmanEnv",
+        "acl_gym.envs.graph.travelling_salesman:TravellingSalesmanVectorEnv",
+        100_000,
     ),
 }
 

@@ -309,7 +309,9 @@ class Rollout:
             given = self._checked(given)
             self._read_mask(given[4])
         else:
-            self._mask = given[4].get("action_mask")
+            mask = given[4].get("action_mask")
+            # Some give the int8 that Gymnasium's spaces sample with; kernels take bool.
+            self._mask = None if mask is None else mask.view(np.bool_)
         observation, reward, terminated, truncated, infos = given
         self.steps += 1
 

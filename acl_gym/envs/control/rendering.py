@@ -53,9 +53,9 @@ class Painter(ABC, Generic[System]):
             ValueError: always, unless the painter can draw tables.
         """
         raise ValueError(
-            "only the grids (GridSearch1D, GridSearch2D) draw tables, one value for "
-            f"each state and action, not {type(self.system).__name__}; use frames "
-            "without a table."
+            "only the grids (GridSearch1D, GridSearch2D) and TravellingSalesman draw "
+            "tables, one value for each state and action, not "
+            f"{type(self.system).__name__}; use frames without a table."
         )
 
     def draw_table(self, pygame: Any, canvas: Any, table: FloatArray) -> None:

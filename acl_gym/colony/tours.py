@@ -1,0 +1,512 @@
+"""Whole tours of all ants in one call: what colonies on the travelling salesman do.
+
+An ant that walks in the environment chooses the next city in every step. Where every
+state is a city and every action leads to the city of its number, that is a loop over
+arrays, and the kernels here run it for all ants and all steps at once. They choose by
+the rules of `acl_gym.colony.selection`, among the candidates of a city as
+`acl_gym.colony.candidates` says, and take the same random numbers, so that an ant that
+walks goes the same way.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from acl_gym.colony.selection import boltzmann_allowed
+from acl_gym.colony.solutions import ROWS_PER_BLOCK, Block
+from acl_gym.colony.update_kernels import decay_pair
+from acl_gym.utils.compiling import njit
+from acl_gym.utils.typing import BoolArray, CellArray, FloatArray, IntArray
+
+_WHOLE = 8
+"""Powers up to this are products, which are cheaper than `pow`."""
+
+_TOGETHER = 8
+"""Ants whose random numbers, which lie side by side, are taken at a time."""
+
+
+class Tours:
+    """The tours of all ants as solutions: a component for each arc, the last one too.
+
+    Offers what update rules take of `Solutions`. Its memory is used again in every trial.
+
+    Args:
+        n_ants: m.
+        n_cities: n.
+
+    Attributes:
+        tours: int32 `(n_ants, n)`, permutations of the cities.
+        n_ants: m.
+        length: how many components each solution has, `(n_ants,)`.
+        may_repeat: False: no solution has a component twice.
+    """
+
+    may_repeat = False
+
+    def __init__(self, n_ants: int, n_cities: int) -> None:
+        self.n_ants = n_ants
+        self.tours: CellArray = np.empty((n_ants, n_cities), np.int32)
+        self.length = np.full(n_ants, n_cities)
+        most = min(n_ants, max(1, ROWS_PER_BLOCK // n_cities))
+        self._ends: IntArray = np.arange(1, most + 1) * n_cities
+        self._degree: FloatArray = np.ones((most * n_cities, 1))
+        self._next: CellArray = np.empty((most, n_cities), np.int32)
+
+    def blocks(self) -> Iterator[Block]:
+        """All solutions, ant by ant, in parts that fit into the processor's cache.
+
+        The arrays of a block are valid until the next block is requested.
+        """
+        most = len(self._next)
+        for first in range(0, self.n_ants, most):
+            part = self.tours[first : first + most]
+            m, following = len(part), self._next[: len(part)]
+            following[:, :-1], following[:, -1] = part[:, 1:], part[:, 0]
+            yield Block(
+                slice(first, first + m),
+                part.reshape(-1, 1),
+                self._degree[: part.size],
+                following.reshape(-1),
+                self._ends[:m],
+            )
+
+
+@njit
+def nearest_neighbour_tour(distances: FloatArray, start: int) -> CellArray:
+    """The tour that always goes to the nearest city not yet visited, `(n,)`.
+
+    Of cities that are equally near, the first.
+
+    Args:
+        distances: `(n, n)`.
+        start: the first city.
+    """
+    n = len(distances)
+    tour, free = np.empty(n, np.int32), np.ones(n, np.bool_)
+    tour[0], free[start] = start, False
+    for t in range(1, n):
+        row, nearest = distances[tour[t - 1]], -1
+        for j in range(n):
+            if free[j] and (nearest < 0 or row[j] < row[nearest]):
+                nearest = j
+        tour[t], free[nearest] = nearest, False
+    return tour
+
+
+@njit
+def tour_lengths(tours: CellArray, distances: FloatArray) -> FloatArray:
+    """The length of each tour, the closing arc included, `(m,)`.
+
+    Added up in the order of the steps, as an environment does.
+    """
+    m, n = tours.shape
+    lengths = np.zeros(m)
+    for a in range(m):
+        for t in range(n):
+            following = tours[a, t + 1] if t + 1 < n else tours[a, 0]
+            lengths[a] += distances[tours[a, t], following]
+    return lengths
+
+
+@njit(error_model="numpy")
+def weigh_candidates(
+    levels: FloatArray,
+    alpha: float,
+    weights: FloatArray | None,
+    candidates: CellArray,
+    weighed: FloatArray,
+) -> None:
+    """Write tau^alpha eta^beta of each city's candidates to `weighed`, `(n, k)`.
+
+    Once per trial, where levels do not change within it. Levels are scaled by the
+    largest of their row: no underflow of what matters.
+
+    Args:
+        levels: `(n, n)`, > 0.
+        alpha: exponent of the levels.
+        weights: `Pheromone.weights`; None: 1 everywhere.
+        candidates: `(n, k)`.
+        weighed: receives the products.
+    """
+    whole = _whole(alpha)
+    for i in range(candidates.shape[0]):
+        largest = 0.0
+        for c in range(candidates.shape[1]):
+            largest = max(largest, levels[i, candidates[i, c]])
+        for c in range(candidates.shape[1]):
+            j = candidates[i, c]
+            weight = _power(levels[i, j] / largest, alpha, whole)
+            if weights is not None:
+                weight *= weights[i, j]
+            weighed[i, c] = weight
+
+
+@njit(inline="always")
+def _whole(alpha: float) -> int:
+    """Alpha, where powers are to be products; else 0."""
+    whole = int(min(alpha, _WHOLE + 1.0))  # what no integer holds would be anything
+    return whole if whole == alpha and whole <= _WHOLE else 0
+
+
+@njit(inline="always")
+def _power(ratio: float, alpha: float, whole: int) -> float:
+    if whole == 0:
+        return float(ratio**alpha)
+    value = ratio
+    for _ in range(1, whole):
+        value *= ratio
+    return value
+
+
+@njit(error_model="numpy")
+def build_tours(
+    starts: IntArray,
+    draws: FloatArray,
+    candidates: CellArray,
+    weighed: FloatArray,
+    levels: FloatArray,
+    alpha: float,
+    weights: FloatArray | None,
+    greedy_weights: FloatArray | None,
+    tours: CellArray,
+) -> None:
+    """Let all ants build their tours by the random-proportional rule (2.2).
+
+    The pheromone stays as it is meanwhile, so one ant finishes before the next begins.
+
+    Args:
+        starts: the first city of each ant, `(m,)`.
+        draws: uniform in [0, 1), `(n, 2, m)`: for each step the coins, which this rule
+            does not use, and the choices of all ants.
+        candidates: `(n, k)`, each row ascending, see `candidate_lists`.
+        weighed: by `weigh_candidates`, `(n, k)`.
+        levels: `(n, n)`.
+        alpha: exponent of the levels.
+        weights: `Pheromone.weights`; None: 1 everywhere.
+        greedy_weights: `Pheromone.greedy_weights`; None: 1 everywhere.
+        tours: receives the tours, `(m, n)`.
+    """
+    m, n = tours.shape
+    k = np.uint64(candidates.shape[1])
+    # Numbers, not truth values: a product needs no branch, which could not be predicted.
+    free, sums, rest = np.empty(n), np.empty(candidates.shape[1]), np.empty(n, np.int32)
+    choices = np.empty((_TOGETHER, n))
+    for a in range(m):
+        if a % _TOGETHER == 0:
+            for t in range(n):
+                for other in range(a, min(a + _TOGETHER, m)):
+                    choices[other - a, t] = draws[t, 1, other]
+        free[:] = 1.0
+        n_rest = -1
+        city = np.uint64(starts[a])
+        tours[a, 0], free[city] = starts[a], 0.0
+        for t in range(1, n):
+            choice = choices[a % _TOGETHER, t - 1]
+            total = 0.0
+            for c in range(k):
+                total += weighed[city, c] * free[np.uint64(candidates[city, c])]
+                sums[c] = total
+            if total > 0.0:
+                place, target = np.uint64(0), choice * total
+                for c in range(k):
+                    place += np.uint64(sums[c] <= target)
+                if place == k:  # the product was rounded up to the total
+                    place = _last_increase(sums)
+                chosen = np.uint64(candidates[city, place])
+            else:
+                slow, n_rest = _choose_otherwise(
+                    city,
+                    free,
+                    candidates,
+                    choice,
+                    levels,
+                    alpha,
+                    weights,
+                    greedy_weights,
+                    rest,
+                    n_rest,
+                )
+                chosen = np.uint64(slow)
+            tours[a, t], free[chosen] = chosen, 0.0
+            city = chosen
+
+
+@njit
+def _last_increase(sums: FloatArray) -> np.uint64:
+    """The first place at which cumulated sums have reached their last value."""
+    place = sums.size - 1
+    while place > 0 and sums[place - 1] == sums[place]:
+        place -= 1
+    return np.uint64(place)
+
+
+@njit(error_model="numpy")
+def _choose_otherwise(
+    city: np.uint64,
+    free: FloatArray,
+    candidates: CellArray,
+    choice: float,
+    levels: FloatArray,
+    alpha: float,
+    weights: FloatArray | None,
+    greedy_weights: FloatArray | None,
+    rest: CellArray,
+    n_rest: int,
+) -> tuple[int, int]:
+    """Choose where the candidates seem to offer nothing: their weights sum to 0.
+
+    Either they are merely too small, and are scaled by the largest of those that are
+    left; or no candidate is left, and then the best of all cities that are left is
+    taken.
+
+    Returns:
+        The city, and how many cities are in `rest` now.
+    """
+    allowed: BoolArray = np.zeros(free.size, np.bool_)
+    some = False
+    for c in range(candidates.shape[1]):
+        j = candidates[city, c]
+        if free[j] > 0.0 and (weights is None or weights[city, j] > 0.0):
+            allowed[j] = some = True
+    if some:
+        cell, degree = np.array([np.int32(city)]), np.ones(1)
+        found = boltzmann_allowed(levels, alpha, weights, cell, degree, allowed, choice)
+        return found, n_rest
+    return _best_of_rest(city, free, choice, levels, greedy_weights, rest, n_rest)
+
+
+@njit(error_model="numpy")
+def _best_of_rest(
+    city: np.uint64,
+    free: FloatArray,
+    choice: float,
+    levels: FloatArray,
+    greedy_weights: FloatArray | None,
+    rest: CellArray,
+    n_rest: int,
+) -> tuple[int, int]:
+    """The city not yet visited with the largest tau^alpha eta^beta; ties by `choice`.
+
+    `rest` holds the cities that were left when an ant last looked here, in ascending
+    order, or nothing if `n_rest` < 0. It shrinks with the tour, so all cities are looked
+    at only once per tour.
+
+    Returns:
+        The city, and how many cities are in `rest` now.
+    """
+    if n_rest < 0:
+        n_rest = free.size
+        for j in range(n_rest):
+            rest[j] = j
+    count, tied, best = 0, 0, -1.0
+    counts = False  # whether any heuristic variable is positive
+    for r in range(n_rest):
+        j = rest[r]
+        if free[j] > 0.0:
+            rest[count] = j
+            count += 1
+            counts |= greedy_weights is not None and greedy_weights[city, j] > 0.0
+    for r in range(count):
+        value = _value(city, rest[r], levels, greedy_weights, counts)
+        if value > best:
+            best, tied = value, 0
+        tied += value == best
+    skip = int(choice * tied)
+    for r in range(count):
+        if _value(city, rest[r], levels, greedy_weights, counts) == best:
+            if skip == 0:
+                return int(rest[r]), count
+            skip -= 1
+    return int(rest[0]), count
+
+
+@njit(inline="always")
+def _value(
+    city: np.uint64,
+    j: int,
+    levels: FloatArray,
+    greedy_weights: FloatArray | None,
+    counts: bool,
+) -> float:
+    """What the best city has most of."""
+    if greedy_weights is None or not counts:
+        return levels[city, j]
+    return levels[city, j] * greedy_weights[city, j]
+
+
+@njit(error_model="numpy")
+def build_tours_in_turn(
+    starts: IntArray,
+    draws: FloatArray,
+    candidates: CellArray,
+    levels: FloatArray,
+    alpha: float,
+    weights: FloatArray | None,
+    greedy_weights: FloatArray | None,
+    q0: float,
+    local_decay: float,
+    tau0: float,
+    symmetric: bool,
+    stale: BoolArray,
+    tours: CellArray,
+) -> None:
+    """Let all ants build their tours as in the Ant Colony System.
+
+    In each step one ant after the other chooses by the pseudo-random-proportional rule
+    and decays its arc by (2.6) before the next ant chooses; so do the closing arcs.
+
+    Args:
+        starts: the first city of each ant, `(m,)`.
+        draws: uniform in [0, 1), `(n, 2, m)`: coins and choices.
+        candidates: `(n, k)`, each row ascending.
+        levels: `(n, n)`, changed in place.
+        alpha: exponent of the levels.
+        weights: `Pheromone.weights`; None: 1 everywhere.
+        greedy_weights: `Pheromone.greedy_weights`; None: 1 everywhere.
+        q0: the probability to take the best candidate, in [0, 1].
+        local_decay: gamma of (2.6), in [0, 1).
+        tau0: the level towards which arcs decay.
+        symmetric: an arc and its reverse have the same level.
+        stale: `Pheromone.stale`, set where levels change.
+        tours: receives the tours, `(m, n)`.
+    """
+    m, n = tours.shape
+    free, rest = np.ones((m, n)), np.empty((m, n), np.int32)
+    n_rest = np.full(m, -1)
+    values, whole = np.empty(candidates.shape[1]), _whole(alpha)
+    for a in range(m):
+        tours[a, 0] = starts[a]
+        free[a, starts[a]] = 0.0
+    for t in range(1, n + 1):
+        for a in range(m):
+            city = np.uint64(tours[a, t - 1])
+            if t == n:
+                chosen = int(tours[a, 0])
+            else:
+                coin, choice = draws[t - 1, 0, a], draws[t - 1, 1, a]
+                chosen = -1
+                if coin < q0:
+                    chosen = _best_candidate(
+                        city,
+                        free[a],
+                        candidates,
+                        choice,
+                        levels,
+                        greedy_weights,
+                        values,
+                    )
+                else:
+                    chosen = _drawn_candidate(
+                        city,
+                        free[a],
+                        candidates,
+                        choice,
+                        levels,
+                        alpha,
+                        whole,
+                        weights,
+                        values,
+                    )
+                if chosen < 0 and coin < q0:
+                    chosen, n_rest[a] = _best_of_rest(
+                        city,
+                        free[a],
+                        choice,
+                        levels,
+                        greedy_weights,
+                        rest[a],
+                        n_rest[a],
+                    )
+                elif chosen < 0:
+                    chosen, n_rest[a] = _choose_otherwise(
+                        city,
+                        free[a],
+                        candidates,
+                        choice,
+                        levels,
+                        alpha,
+                        weights,
+                        greedy_weights,
+                        rest[a],
+                        n_rest[a],
+                    )
+                tours[a, t] = chosen
+                free[a, chosen] = 0.0
+            decay_pair(levels, city, chosen, local_decay, tau0, stale)
+            if symmetric:
+                levels[chosen, city] = levels[city, chosen]
+                stale[chosen] = True
+
+
+@njit(inline="always")
+def _best_candidate(
+    city: np.uint64,
+    free: FloatArray,
+    candidates: CellArray,
+    choice: float,
+    levels: FloatArray,
+    greedy_weights: FloatArray | None,
+    values: FloatArray,
+) -> int:
+    """The candidate left with the largest tau^alpha eta^beta; -1 if all have none."""
+    k = np.uint64(candidates.shape[1])
+    best = 0.0
+    for c in range(k):
+        j = np.uint64(candidates[city, c])
+        value = levels[city, j] * free[j]
+        if greedy_weights is not None:
+            value *= greedy_weights[city, j]
+        values[c] = value
+        best = max(best, value)
+    if best == 0.0:
+        return -1
+    tied = 0
+    for c in range(k):
+        tied += values[c] == best
+    skip = int(choice * tied)
+    for c in range(k):
+        if values[c] == best:
+            if skip == 0:
+                return int(candidates[city, c])
+            skip -= 1
+    return -1
+
+
+@njit(inline="always")
+def _drawn_candidate(
+    city: np.uint64,
+    free: FloatArray,
+    candidates: CellArray,
+    choice: float,
+    levels: FloatArray,
+    alpha: float,
+    whole: int,
+    weights: FloatArray | None,
+    sums: FloatArray,
+) -> int:
+    """A candidate left, drawn by (2.2); -1 if their weights sum to 0."""
+    k = np.uint64(candidates.shape[1])
+    largest = 0.0
+    for c in range(k):
+        j = np.uint64(candidates[city, c])
+        largest = max(largest, levels[city, j] * free[j])
+    if largest == 0.0:
+        return -1
+    total = 0.0
+    for c in range(k):
+        j = np.uint64(candidates[city, c])
+        weight = _power(levels[city, j] * free[j] / largest, alpha, whole)
+        if weights is not None:
+            weight *= weights[city, j]
+        total += weight
+        sums[c] = total
+    if not total > 0.0:
+        return -1
+    place, target = np.uint64(0), choice * total
+    for c in range(k):
+        place += np.uint64(sums[c] <= target)
+    if place == k:
+        place = _last_increase(sums)
+    return int(candidates[city, place])

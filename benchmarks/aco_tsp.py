@@ -233,9 +233,7 @@ def run_acotsp(algorithm: str, task: Task, seed: int) -> Row:
         )
     # How many tours it made in a limited time, it does not say.
     tours = None if limited or task.stop_at_optimum else -(-task.tours // ants) * ants
-    return result(
-        f"acotsp {algorithm}", seed, tours, float(seconds[1]), float(best[1])
-    )
+    return result(f"acotsp {algorithm}", seed, tours, float(seconds[1]), float(best[1]))
 
 
 def _evaporation(algorithm: str, task: Task) -> float:
@@ -313,7 +311,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         with resources.as_file(_data(options.instance)) as shipped:
             task = _task(options, shipped)
             rows = _rows(options, task)
-    except ValueError as error:
+    except (ValueError, OSError) as error:
         print(f"aco_tsp.py: {error}", file=sys.stderr)
         return 2
     optimum = task.instance.optimum

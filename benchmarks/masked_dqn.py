@@ -74,7 +74,17 @@ class MaskedPolicy(DQNPolicy):
 
 
 class MaskedDQN(DQN):
-    """Explores among the actions that are allowed."""
+    """Explores among the actions that are allowed.
+
+    Args:
+        seed: the same seed gives the same run.
+        arguments: of DQN.
+        options: of DQN.
+    """
+
+    def __init__(self, *arguments: Any, seed: int, **options: Any) -> None:
+        super().__init__(*arguments, seed=seed, **options)
+        self.rng = np.random.default_rng(seed)
 
     def predict(
         self,
@@ -83,10 +93,12 @@ class MaskedDQN(DQN):
         episode_start: Any = None,
         deterministic: bool = False,
     ) -> tuple[NDArray[np.int64], Any]:
-        if deterministic or np.random.random() >= self.exploration_rate:
+        if deterministic or self.rng.random() >= self.exploration_rate:
             return self.policy.predict(observation, state, episode_start, True)
         allowed = observation[:, observation.shape[1] // 2 :]
-        return np.array([np.random.choice(np.flatnonzero(row)) for row in allowed]), state
+        return np.array(
+            [self.rng.choice(np.flatnonzero(row)) for row in allowed]
+        ), state
 
     def _sample_action(self, *arguments: Any, **options: Any) -> Any:
         # Before learning starts, too, only allowed actions are drawn.
@@ -155,7 +167,5 @@ def shortest_tour(
         seed=seed,
         device="cpu",
     )
-    model.learn(tours * n, callback=best)
-    return float(best.best)
     model.learn(tours * n, callback=best)
     return best.tours, float(best.best)

@@ -205,4 +205,3 @@ def length_of(tour: CellArray, distances: FloatArray) -> float:
         total += distances[last, city]
         last = city
     return total
-

@@ -29,8 +29,8 @@ def beside(tour: CellArray, places: CellArray, city: int, direction: int) -> int
         place = 0
     elif place < 0:
         place = tour.size - 1
-    city: int = tour[place]
-    return city
+    other: int = tour[place]
+    return other
 
 
 @njit

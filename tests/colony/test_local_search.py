@@ -130,7 +130,8 @@ def test_no_move_is_left(method: str, make: type, n: int) -> None:
         before = [length(tour, distances) for tour in tours.tolist()]
         lengths = search.improve(tours)
         assert (np.sort(tours) == np.arange(n)).all()
-        assert (lengths <= np.array(before)).all()
+        # The sum of the same arcs from another city on may round otherwise.
+        assert (lengths <= np.array(before) * (1 + 1e-15 * n)).all()
         for tour, found in zip(tours.tolist(), lengths, strict=True):
             assert found == pytest.approx(length(tour, distances), rel=1e-12)
             others = around(method, tour, distances, make is not one_way)
@@ -155,27 +156,35 @@ def test_larger_instances(method: str, make: type) -> None:
 
 
 def test_quality() -> None:
-    """Mean gaps of random uniform instances, from random tours, as the literature has.
+    """Mean gaps to the shortest tours, of random uniform instances, from random tours.
 
-    The best tours of 500 points in the unit square measure 0.7124 sqrt(n) (1 + 0.33 / n
-    + 0.65 / sqrt(n) ...): about 16.7. Ten to twelve per cent more is common for 2-opt
-    with such starts, five for 2-opt with Or-opt, three to four for 3-opt.
+    Long runs of a Max-Min Ant System with 3-opt came to tours of 16.556, 16.710 and
+    16.425. From random tours the literature has gaps of ten to fifteen per cent for
+    2-opt, about six for 2-opt with Or-opt and three to four for 3-opt.
     """
-    means = {}
+    shortest = (16.556, 16.710, 16.425)
+    gaps = {}
     for method in METHODS:
-        lengths = []
-        for seed in range(3):
+        found = []
+        for seed, best in enumerate(shortest):
             distances = plane(500, seed)
             search = LocalSearch(method, distances, nearest_neighbours(distances, 12))
-            lengths.append(search.improve(random_tours(5, 500, seed)).mean())
-        means[method] = np.mean(lengths) / 16.7
-    assert means["3-opt"] < 1.05 < means["or-opt"] < 1.08 < means["2-opt"] < 1.14
+            lengths = search.improve(random_tours(5, 500, seed))
+            # A tour shorter than those would be none.
+            assert (lengths > 0.995 * best).all()
+            found.append(lengths.mean() / best - 1)
+        gaps[method] = np.mean(found)
+    assert gaps["3-opt"] < 0.045 < gaps["or-opt"] < 0.07 < gaps["2-opt"] < 0.15
 
 
 def test_functions_are_the_methods() -> None:
     distances = plane(60, 0)
     neighbours = nearest_neighbours(distances, 8)
-    for function, method in ((two_opt, "2-opt"), (or_opt, "or-opt"), (three_opt, "3-opt")):
+    for function, method in (
+        (two_opt, "2-opt"),
+        (or_opt, "or-opt"),
+        (three_opt, "3-opt"),
+    ):
         mine, theirs = random_tours(4, 60), random_tours(4, 60)
         lengths = function(mine, distances, neighbours)
         search = LocalSearch(method, distances, neighbours)

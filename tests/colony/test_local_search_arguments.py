@@ -74,7 +74,10 @@ def changed(row: int, values: list[int]) -> Any:
         (NEAREST.astype(np.int64), r"int32 of shape \(4, k\), got an array of int64"),
         (NEAREST[:3], r"int32 of shape \(4, k\), got .* of shape \(3, 2\)"),
         (NEAREST.tolist(), r"int32 of shape \(4, k\), got \[\[1, 3\]"),
-        (changed(2, [1, 2]), r"neighbours\[2\] must be other cities, .* got .*\[1, 2\]"),
+        (
+            changed(2, [1, 2]),
+            r"neighbours\[2\] must be other cities, .* got .*\[1, 2\]",
+        ),
         (changed(2, [1, 4]), r"neighbours\[2\] must be other cities"),
         (changed(2, [-1, 1]), r"neighbours\[2\] must be other cities"),
         (changed(2, [0, 1]), r"neighbours\[2\] must be .*nearest first"),
@@ -112,7 +115,9 @@ def test_wrong_arrays_of_tours(wrong: Any) -> None:
 @pytest.mark.parametrize("wrong", [[0, 1, 1, 2], [0, 1, 2, 4], [0, 1, 2, -1]])
 def test_rows_that_are_no_tours(wrong: list[int]) -> None:
     tours = np.array([[0, 2, 1, 3], wrong], np.int32)
-    with pytest.raises(ValueError, match=r"^tours\[1\] must hold each of .* 0 to 3 once"):
+    with pytest.raises(
+        ValueError, match=r"^tours\[1\] must hold each of .* 0 to 3 once"
+    ):
         two_opt(tours, SQUARE, NEAREST)
 
 
@@ -133,7 +138,9 @@ def test_asymmetry_anywhere_is_seen() -> None:
     """Also in the last block of rows and columns that are compared at once."""
     for i, j in ((0, 1), (149, 3), (149, 148), (64, 63)):
         distances = np.ones((150, 150))
-        assert LocalSearch("3-opt", distances, nearest_neighbours(distances, 2)).symmetric
+        assert LocalSearch(
+            "3-opt", distances, nearest_neighbours(distances, 2)
+        ).symmetric
         distances[i, j] = 2.0
         neighbours = nearest_neighbours(distances, 2)
         assert not LocalSearch("3-opt", distances, neighbours).symmetric

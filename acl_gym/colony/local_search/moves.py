@@ -29,13 +29,14 @@ def beside(tour: CellArray, places: CellArray, city: int, direction: int) -> int
         place = 0
     elif place < 0:
         place = tour.size - 1
-    return tour[place]
+    other: int = tour[place]
+    return other
 
 
 @njit
 def ahead(places: CellArray, start: int, city: int, direction: int) -> int:
     """Steps from one city to another in a direction, 0 to n - 1."""
-    steps = direction * (places[city] - places[start])
+    steps: int = direction * (places[city] - places[start])
     return steps + places.size if steps < 0 else steps
 
 
@@ -205,4 +206,3 @@ def length_of(tour: CellArray, distances: FloatArray) -> float:
         total += distances[last, city]
         last = city
     return total
-

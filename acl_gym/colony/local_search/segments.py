@@ -71,7 +71,7 @@ def best_insertion(
             o3 = ahead(places, t2, t3, direction)
             if o3 < length:  # it is in the segment
                 continue
-            # t1 .. has been excluded as no nearer, so that t4 is outside, too.
+            # t3 is not t1, which is no nearer, so that t4 is outside, too.
             t4 = beside(tour, places, t3, direction)
             removed3 = distances[t4, t3]
             gain = freed + removed3 - nearby[t2, i] - distances[t4, t5]

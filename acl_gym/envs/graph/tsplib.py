@@ -1,7 +1,7 @@
 """A reader for files of TSPLIB: instances, symmetric and asymmetric, and tours.
 
-The format is described in G. Reinelt, "TSPLIB 95", Universität Heidelberg. Read are
-problems of TYPE TSP and ATSP with coordinates in the plane or on the earth (EUC_2D,
+The format is described in G. Reinelt, "TSPLIB 95", Universität Heidelberg. This reader
+takes problems of TYPE TSP and ATSP with coordinates in the plane or on the earth (EUC_2D,
 CEIL_2D, ATT, GEO) or with a matrix (EXPLICIT), full or triangular, and files of TYPE
 TOUR. A file is text that is never run; what a matrix needs is known before memory is
 reserved for it.

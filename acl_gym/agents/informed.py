@@ -17,7 +17,7 @@ from acl_gym.colony.heuristic import (
     checked_heuristic,
     checked_initial,
 )
-from acl_gym.colony.schedules import Setting, schedule_from_settings
+from acl_gym.colony.schedules import schedule_from_settings
 from acl_gym.partitions import Grid, Partition
 from acl_gym.partitions.growing import carried_over
 from acl_gym.utils.parameters import Parameter

@@ -66,6 +66,20 @@ class ReturningACL(InformedAgent, ColonyAgent):
             where the present policy fails, and ants that look elsewhere.
         optimism: in [0, 1], what pairs promise that were never tried: with 0 the value
             of a good state, with 1 the most that could be had.
+        heuristic: eta, what is known of each action beforehand: an array
+            `(n_cells, n_actions)`, finite, >= 0 and positive somewhere in each row, or a
+            function of the environment and the partition that returns one, such as a
+            `PolicyPrior`. An ant that explores, or to which several actions promise the
+            same, draws one in proportion to eta^beta (the mean over the cells of its
+            state, each scaled to sum 1, weighted with their degrees); one with eta = 0 is
+            not drawn unless nothing else is allowed. None: all are equally likely. A
+            function is asked again when the partition has grown; an array is
+            interpolated.
+        beta: exponent of the heuristic, >= 0; a number, or a schedule such as
+            `Exponential(1.0, 0.9)` that gives one for each trial.
+        initial: what pairs promise that were never tried, in place of what `optimism`
+            says: an array `(n_cells, n_actions)` of discounted returns, finite, or a
+            function, as for `heuristic`. What is laid replaces it.
         walks_back: how often the ants walk back after each walk, >= 1.
         older_steps: how many steps of older paths they walk back beside the newest paths
             each time, >= 0.
@@ -135,9 +149,7 @@ class ReturningACL(InformedAgent, ColonyAgent):
         at_least=0,
         at_most=1,
     )
-    beta = Parameter(
-        "Exponent of the heuristic", "beta", scheduled=True, at_least=0
-    )
+    beta = Parameter("Exponent of the heuristic", "beta", scheduled=True, at_least=0)
     mix = Parameter("Trust of an ant in its own continuation", at_least=0, at_most=1)
     walks_back = Parameter(
         "Walks back after each walk", whole=True, at_least=1, at_most=10_000

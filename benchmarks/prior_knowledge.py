@@ -31,6 +31,7 @@ from typing import Any
 
 import gymnasium as gym
 import numpy as np
+from matplotlib.lines import Line2D
 from tqdm.auto import tqdm
 
 from acl_gym import (
@@ -118,8 +119,8 @@ TASKS = {
         {"tau0": 1e-3, "selection": "boltzmann", "max_steps": 150},
         200,
         lambda env: thesis_partition(env, "regular"),
-        {"ACL": 600_000, "ReturningACL": 18_000},
-        {"ACL": 30_000, "ReturningACL": 1_800},
+        {"ACL": 600_000, "ReturningACL": 9_000},
+        {"ACL": 30_000, "ReturningACL": 900},
     ),
 }
 AGENTS = ("ACL", "ReturningACL")
@@ -302,8 +303,8 @@ def draw(rows: Sequence[Row], path: Path) -> None:
         line[0].set_ylabel(f"{name}\n{agent}\npolicy cost")
     for ax in grid[-1]:
         ax.set_xlabel("interactions")
-    lines = [figure.add_artist(_line(colour)) for colour in COLOURS.values()]
-    figure.legend(lines, COLOURS, ncols=len(COLOURS), loc="outside upper center")
+    handles = [Line2D([], [], color=colour) for colour in COLOURS.values()]
+    figure.legend(handles, COLOURS, ncols=len(COLOURS), loc="outside upper center")
     figure.savefig(path)
 
 

@@ -183,7 +183,7 @@ def test_a_file_predicts_without_the_functions_and_says_what_it_needs(
     np.testing.assert_array_equal(loaded.heuristic, colony.heuristic)
     assert loaded.predict([[0.0, 0.0]])[0] == colony.predict([[0.0, 0.0]])[0]
     assert loaded.predict([[0.0, 0.0]], deterministic=False)[0] in (0, 1, 2)
-    words = "heuristic was 'tests.agents.test_informed:lean', which a file cannot hold"
+    words = r"heuristic was 'tests.agents.test_informed:lean', which a file cannot hold"
     with pytest.raises(ValueError, match=words):
         loaded.learn(trials=1)
     loaded.grows = False  # then nobody asks again
@@ -194,7 +194,9 @@ def test_a_file_predicts_without_the_functions_and_says_what_it_needs(
     # What stands in for a function is saved as such again.
     half = ReturningACL.load(tmp_path / "colony", heuristic=lean)
     half.save(tmp_path / "half")
-    with pytest.raises(ValueError, match="initial was 'tests.agents.test_informed:cos"):
+    with pytest.raises(
+        ValueError, match=r"initial was 'tests\.agents\.test_informed:cos"
+    ):
         ReturningACL.load(tmp_path / "half", pendulum(), heuristic=lean).learn(trials=1)
 
 

@@ -119,8 +119,8 @@ TASKS = {
         {"tau0": 1e-3, "selection": "boltzmann", "max_steps": 150},
         200,
         lambda env: thesis_partition(env, "regular"),
-        {"ACL": 600_000, "ReturningACL": 9_000},
-        {"ACL": 30_000, "ReturningACL": 900},
+        {"ACL": 600_000, "ReturningACL": 6_000},
+        {"ACL": 30_000, "ReturningACL": 600},
     ),
 }
 AGENTS = ("ACL", "ReturningACL")

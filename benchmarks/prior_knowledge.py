@@ -32,6 +32,7 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 from matplotlib.lines import Line2D
+from matplotlib.ticker import EngFormatter
 from tqdm.auto import tqdm
 
 from acl_gym import (
@@ -298,6 +299,7 @@ def draw(rows: Sequence[Row], path: Path) -> None:
                     ax.plot(when, cost, color=COLOURS[row["knowledge"]])
             ax.axhline(task.best, color="0.2", linewidth=0.8, linestyle=":")
             ax.set(yscale="log", xlim=(0, task.steps[agent]))
+            ax.xaxis.set_major_formatter(EngFormatter(sep=""))
             if ax in grid[0]:
                 ax.set_title(TITLES[way])
         line[0].set_ylabel(f"{name}\n{agent}\npolicy cost")

@@ -11,6 +11,8 @@ action of each cell at random. What is preferred counts ten times as much as the
 - `initial`: as the levels to begin with: in `ACL` ten times tau0; in `ReturningACL` what
   is preferred promises a cost of 0, the rest half of the best policy's.
 
+Where cells become finer, useless knowledge is drawn anew for them.
+
 Prints for `ACL` with the thesis's settings and for `ReturningACL` with its defaults the
 interactions until the greedy policy is for the first time within 25% and 10% of the
 best, its cost after a tenth of the run, and at the end; medians over the seeds. With
@@ -272,6 +274,7 @@ def as_markdown(rows: Sequence[Row]) -> str:
 
 
 COLOURS = {"none": "0.35", "good": GREEN, "useless": BLUE, "wrong": ORANGE}
+BEST: Row = {"color": "0.2", "linewidth": 0.8, "linestyle": ":"}
 TITLES = {
     "heuristic": "heuristic, constant exponent",
     "decaying": "heuristic, exponent that decays",
@@ -297,7 +300,7 @@ def draw(rows: Sequence[Row], path: Path) -> None:
                 ):
                     when, cost = _median_curve(row["runs"], task.steps[agent])
                     ax.plot(when, cost, color=COLOURS[row["knowledge"]])
-            ax.axhline(task.best, color="0.2", linewidth=0.8, linestyle=":")
+            ax.axhline(task.best, **BEST)
             ax.set(yscale="log", xlim=(0, task.steps[agent]))
             ax.xaxis.set_major_formatter(EngFormatter(sep=""))
             if ax in grid[0]:
@@ -306,7 +309,9 @@ def draw(rows: Sequence[Row], path: Path) -> None:
     for ax in grid[-1]:
         ax.set_xlabel("interactions")
     handles = [Line2D([], [], color=colour) for colour in COLOURS.values()]
-    figure.legend(handles, COLOURS, ncols=len(COLOURS), loc="outside upper center")
+    handles.append(Line2D([], [], **BEST))
+    labels = [*COLOURS, "the best known policy"]
+    figure.legend(handles, labels, ncols=len(labels), loc="outside upper center")
     figure.savefig(path)
 
 

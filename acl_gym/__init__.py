@@ -25,6 +25,7 @@ if TYPE_CHECKING:
         PolicyEvaluation,
         TensorBoardLog,
     )
+    from acl_gym.colony.prior import PolicyPrior, PotentialPrior
     from acl_gym.colony.update_rule import UpdateRule
     from acl_gym.costs import (
         Constant,
@@ -83,6 +84,8 @@ _PUBLIC = {
     "Partition": "acl_gym.partitions",
     "PolicyCost": "acl_gym.evaluation",
     "PolicyEvaluation": "acl_gym.callbacks",
+    "PolicyPrior": "acl_gym.colony.prior",
+    "PotentialPrior": "acl_gym.colony.prior",
     "QLearning": "acl_gym.agents.q_learning",
     "Quadratic": "acl_gym.costs",
     "Rank": "acl_gym.deposits",
@@ -137,6 +140,8 @@ __all__ = [
     "Partition",
     "PolicyCost",
     "PolicyEvaluation",
+    "PolicyPrior",
+    "PotentialPrior",
     "QLearning",
     "Quadratic",
     "Rank",

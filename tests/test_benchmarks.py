@@ -122,3 +122,13 @@ def test_returning_figures(tmp_path: Path) -> None:
     assert costs[0] > costs[-1]
     assert 38.4 < costs[-1] < 1.25 * 38.4
     assert (tmp_path / "growing.png").stat().st_size > 100_000
+
+
+def test_prior_knowledge() -> None:
+    """One run of each kind: what is told shows before anything is learned."""
+    arguments = ["--tasks", "pendulum", "--agents", "ReturningACL", "--ways", "initial"]
+    rows = output_of("prior_knowledge.py", *arguments, "--seeds", "1")["rows"]
+    assert [row["knowledge"] for row in rows] == ["none", "good", "useless", "wrong"]
+    before = {row["knowledge"]: row["before"] for row in rows}
+    assert before["good"] < before["wrong"]
+    assert all(row["runs"][0]["interactions"][-1] >= 6_000 for row in rows)

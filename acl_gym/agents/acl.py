@@ -22,7 +22,7 @@ from acl_gym.colony.deposits import (
     deposit_from_settings,
 )
 from acl_gym.colony.episodes import Episode
-from acl_gym.colony.heuristic import Heuristic, as_heuristic
+from acl_gym.colony.heuristic import Heuristic, as_heuristic, as_initial
 from acl_gym.colony.pheromone import Pheromone, mean_sensitivity
 from acl_gym.colony.schedules import Setting, schedule_from_settings
 from acl_gym.colony.selection import RULES, choose_actions
@@ -72,6 +72,11 @@ class ACL(ColonyAgent):
             and the partition that returns one. None: 1 everywhere. The greedy policy
             (4.16), its sensitivity and `soft_policy` go by the pheromone alone.
         beta: exponent of the heuristic, >= 0; a number or a schedule.
+        initial: the levels to begin with, in place of tau0 everywhere: an array
+            `(n_cells, n_actions)`, finite and >= tau0, or a function of the environment
+            and the partition that returns one. Like all levels they decay towards tau0
+            where ants pass and are covered by deposits, so that what was wrong is
+            forgotten; a deposit is of the size of 1 / J.
         epsilon: exploration probability, in [0, 1]; a number or a schedule, see
             `selection`.
         selection: `"max_boltzmann"`, eq. (3.6); `"boltzmann"`, eq. (3.4), which has no
@@ -149,6 +154,7 @@ class ACL(ColonyAgent):
         alpha: Setting = 3.0,
         heuristic: Heuristic | None = None,
         beta: Setting = 1.0,
+        initial: Heuristic | None = None,
         epsilon: Setting = 0.1,
         selection: str = "max_boltzmann",
         cost: Cost | Callable[[Episode], float] | None = None,
@@ -195,6 +201,9 @@ class ACL(ColonyAgent):
             as_heuristic(heuristic, env, self.partition, shape),
             self._at_first("beta"),
         )
+        levels = as_initial(initial, env, self.partition, shape, self.tau0)
+        if levels is not None:
+            self.pheromone.set_levels(levels)
         self._solutions: Solutions | None = None
         self._rule = self._update  # of the trial under way; see `watched`
         # How many have come back of M ants; once they all have, others count.

@@ -10,12 +10,15 @@ from gymnasium.vector import VectorEnv
 from numpy.typing import ArrayLike, NDArray
 
 from acl_gym.agents.colony import ColonyAgent
-from acl_gym.agents.remembering import RememberingAgent
+from acl_gym.agents.informed import InformedAgent
 from acl_gym.agents.saving import with_prefix
 from acl_gym.agents.training import Training
 from acl_gym.callbacks.base import Callbacks
 from acl_gym.colony.greedy import epsilon_greedy_actions, epsilon_greedy_unchecked
+from acl_gym.colony.guided import guided_actions, guided_unchecked
+from acl_gym.colony.heuristic import Heuristic
 from acl_gym.colony.optimism import possible_levels
+from acl_gym.colony.schedules import Setting
 from acl_gym.colony.starts import Starts
 from acl_gym.colony.walk import Walk
 from acl_gym.colony.walking_back import WalkBack
@@ -26,7 +29,7 @@ from acl_gym.utils.parameters import Parameter
 from acl_gym.utils.typing import BoolArray, CellArray, FloatArray, IntArray
 
 
-class ReturningACL(RememberingAgent, ColonyAgent):
+class ReturningACL(InformedAgent, ColonyAgent):
     """A colony whose ants walk back from where they end, and which remembers.
 
     Each slot of the environment is an ant, as in `ACL`, and all share one table of
@@ -63,6 +66,20 @@ class ReturningACL(RememberingAgent, ColonyAgent):
             where the present policy fails, and ants that look elsewhere.
         optimism: in [0, 1], what pairs promise that were never tried: with 0 the value
             of a good state, with 1 the most that could be had.
+        heuristic: eta, what is known of each action beforehand: an array
+            `(n_cells, n_actions)`, finite, >= 0 and positive somewhere in each row, or a
+            function of the environment and the partition that returns one, such as a
+            `PolicyPrior`. An ant that explores, or to which several actions promise the
+            same, draws one in proportion to eta^beta (the mean over the cells of its
+            state, each scaled to sum 1, weighted with their degrees); one with eta = 0 is
+            not drawn unless nothing else is allowed. None: all are equally likely. A
+            function is asked again when the partition has grown; an array is
+            interpolated.
+        beta: exponent of the heuristic, >= 0; a number, or a schedule such as
+            `Exponential(1.0, 0.9)` that gives one for each trial.
+        initial: what pairs promise that were never tried, in place of what `optimism`
+            says: an array `(n_cells, n_actions)` of discounted returns, finite, or a
+            function, as for `heuristic`. What is laid replaces it.
         walks_back: how often the ants walk back after each walk, >= 1.
         older_steps: how many steps of older paths they walk back beside the newest paths
             each time, >= 0.
@@ -132,6 +149,7 @@ class ReturningACL(RememberingAgent, ColonyAgent):
         at_least=0,
         at_most=1,
     )
+    beta = Parameter("Exponent of the heuristic", "beta", scheduled=True, at_least=0)
     mix = Parameter("Trust of an ant in its own continuation", at_least=0, at_most=1)
     walks_back = Parameter(
         "Walks back after each walk", whole=True, at_least=1, at_most=10_000
@@ -169,6 +187,9 @@ class ReturningACL(RememberingAgent, ColonyAgent):
         trust: float = 1.0,
         epsilon: float = 0.2,
         optimism: float = 1.0,
+        heuristic: Heuristic | None = None,
+        beta: Setting = 1.0,
+        initial: Heuristic | None = None,
         walks_back: int = 30,
         older_steps: int = 10_000,
         steps_per_walk: int = 300,
@@ -191,7 +212,7 @@ class ReturningACL(RememberingAgent, ColonyAgent):
         self.learning_rate = learning_rate
         self.trust = trust
         self.epsilon = epsilon
-        self.optimism = optimism
+        self.optimism, self.beta = optimism, beta
         self.visits_to_grow = visits_to_grow
         self.walks_back, self.older_steps = walks_back, older_steps
         self.steps_per_walk = steps_per_walk
@@ -200,6 +221,8 @@ class ReturningACL(RememberingAgent, ColonyAgent):
         super().__init__(
             env,
             partition,
+            heuristic=heuristic,
+            initial=initial,
             grows=partition is None if grows is None else grows,
             grows_where=grows_where,
             memory_size=memory_size,
@@ -212,7 +235,8 @@ class ReturningACL(RememberingAgent, ColonyAgent):
             mix = 0.0 if isinstance(self.partition, Discrete) else 0.2
         self.mix = mix
         shape = self.partition.n_cells, self.n_actions
-        self._walk_back = WalkBack(np.zeros(shape))
+        first = np.zeros(shape) if self.initial is None else self.initial.copy()
+        self._walk_back = WalkBack(first)
         self._starts = Starts()
 
     def learn(
@@ -276,7 +300,7 @@ class ReturningACL(RememberingAgent, ColonyAgent):
             limit: after how many steps of the trial they stop in any case.
         """
         rollout, walk = self.rollout, Walk(self.num_envs)
-        curiosity = self._curiosity()
+        curiosity, proposals = self._curiosity(), self._proposals()
         going = rollout._ants
         while (
             rollout._ants.size
@@ -286,9 +310,11 @@ class ReturningACL(RememberingAgent, ColonyAgent):
             ants, allowed = rollout._ants, rollout.allowed()
             seen = observation[ants]
             index, degree = self._locate(observation, ants)
-            actions = epsilon_greedy_unchecked(
-                self._table, index, degree, curiosity[ants], self.rng, allowed
-            )
+            choice = self._table, index, degree, curiosity[ants], self.rng, allowed
+            if proposals is None:
+                actions = epsilon_greedy_unchecked(*choice)
+            else:
+                actions = guided_unchecked(proposals, *choice)
             step = rollout._step(actions)
             walk.append(ants, seen, actions, -step.cost, allowed)
             observation, going = step.observation, ants
@@ -364,6 +390,7 @@ class ReturningACL(RememberingAgent, ColonyAgent):
             "trust": self.trust,
             "epsilon": self.epsilon,
             "optimism": self.optimism,
+            **super().parameters(),
             "walks_back": self.walks_back,
             "older_steps": self.older_steps,
             "steps_per_walk": self.steps_per_walk,
@@ -399,6 +426,8 @@ class ReturningACL(RememberingAgent, ColonyAgent):
     def _explore(
         self, index: CellArray, degree: FloatArray, allowed: BoolArray | None
     ) -> IntArray:
-        return epsilon_greedy_actions(
-            self._table, index, degree, self.epsilon, self._predict_rng, allowed
-        )
+        proposals, rng = self._proposals(), self._predict_rng
+        choice = self._table, index, degree, self.epsilon, rng, allowed
+        if proposals is None:
+            return epsilon_greedy_actions(*choice)
+        return guided_actions(proposals, *choice)

@@ -7,7 +7,7 @@ import os
 from abc import abstractmethod
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any, BinaryIO, NamedTuple, Self, overload
+from typing import Any, BinaryIO, ClassVar, NamedTuple, Self, overload
 
 import numpy as np
 from gymnasium.vector import VectorEnv
@@ -30,7 +30,15 @@ from acl_gym.utils.serialization import (
 )
 from acl_gym.utils.typing import FloatArray, RankArray, Row
 
-_NOT_GIVEN = ("env", "executor", "heuristic", "n_actions", "seed", "workers")
+_NOT_GIVEN = (
+    "env",
+    "executor",
+    "heuristic",
+    "initial",
+    "n_actions",
+    "seed",
+    "workers",
+)
 """Arguments of constructors that a file holds otherwise, that `load` has itself, or that
 say where the environment is."""
 
@@ -76,6 +84,9 @@ class SavedAgent(PartitionPolicy):
     rng: np.random.Generator
     _predict_rng: np.random.Generator
     _ranks: RankArray
+
+    _given_again: ClassVar[tuple[str, ...]] = ()
+    """Of `_NOT_GIVEN` what `load` takes nevertheless, because it may be a function."""
 
     @property
     @abstractmethod
@@ -261,11 +272,13 @@ class SavedAgent(PartitionPolicy):
                 f"{header.get('agent')!r:.80}; "
                 "load it with that class."
             )
-        if unknown := given.keys() - _keywords(cls) - {"partition"}:
+        takes = _keywords(cls) | set(cls._given_again)
+        if unknown := given.keys() - takes - {"partition"}:
             raise TypeError(
                 f"{cls.__name__}.load takes the arguments of {cls.__name__} except "
-                f"{', '.join(_NOT_GIVEN)}, got {', '.join(sorted(unknown))}; one of "
-                f"{', '.join(sorted(_keywords(cls)))} may be given."
+                f"{', '.join(sorted(set(_NOT_GIVEN) - takes))}, got "
+                f"{', '.join(sorted(unknown))}; one of {', '.join(sorted(takes))} may be "
+                "given."
             )
         try:
             partition = partition_from_settings(header["partition"])
@@ -395,9 +408,10 @@ def _parameter(value: Any) -> Any:
         return to_settings(Missing("", own_name(value)))
 
 
-def _lacking(saved: Any, unsaved: Any, kind: type) -> set[str]:
+def _lacking(saved: Any, unsaved: Any, kind: type[SavedAgent]) -> set[str]:
     """The arguments of the constructor that the file does not hold."""
     known = {"cost", "deposit", "update", "alpha", "beta", "epsilon"}
+    known |= set(kind._given_again)
     by_name = {
         name
         for name, value in saved.items()

@@ -13,8 +13,8 @@ from acl_gym.cli.sources import class_node
 from acl_gym.utils.validation import Range
 
 OWN_OPTIONS = (
-    *("env", "partition", "max_steps", "seed", "n_actions", "heuristic"),
-    *("workers", "executor"),
+    *("env", "partition", "max_steps", "seed", "n_actions"),
+    *("heuristic", "initial", "workers", "executor"),
 )
 """Keywords of the constructors that have an option of their own, or none at all."""
 

@@ -1,4 +1,4 @@
-"""Prior knowledge of actions: the heuristic eta."""
+"""Prior knowledge of actions: the heuristic eta, and the levels to begin with (§7.3)."""
 
 from __future__ import annotations
 
@@ -60,3 +60,65 @@ def checked_heuristic(found: Any, shape: tuple[int, ...]) -> FloatArray:
         )
     eta.flags.writeable = False
     return eta
+
+
+def to_the_power(heuristic: FloatArray, exponent: float) -> FloatArray:
+    """eta^exponent, each row divided by its largest, `(n_cells, n_actions)`.
+
+    The scale of a row has no effect, because actions are compared within a cell. An
+    action that is ruled out, eta = 0, stays so with an exponent of 0.
+    """
+    powers = (heuristic / heuristic.max(axis=1, keepdims=True)) ** exponent
+    return np.where(heuristic > 0.0, powers, 0.0)
+
+
+def as_initial(
+    initial: Heuristic | None,
+    env: Any,
+    partition: Partition,
+    shape: tuple[int, int],
+    tau0: float,
+) -> FloatArray | None:
+    """The levels to begin with as an array, of which none is below tau0.
+
+    tau0 is the level to which visited pairs decay, eq. (4.12). A level below it would
+    rise with every visit, so that trying a pair in vain would recommend it.
+
+    Args:
+        initial: an array, a function that returns one, or None.
+        env: first argument of the function.
+        partition: second argument of the function.
+        shape: `(n_cells, n_actions)`.
+        tau0: the lowest level.
+
+    Raises:
+        ValueError: it is not an array of that shape, finite and >= tau0.
+    """
+    if initial is None:
+        return None
+    found = initial(env, partition) if callable(initial) else initial
+    levels = checked_initial(found, shape)
+    if (levels < tau0).any():
+        cell, action = np.argwhere(levels < tau0)[0]
+        raise ValueError(
+            f"initial must be at least tau0 = {tau0:g}, to which visited pairs decay, got "
+            f"{levels[cell, action]:g} for action {action} in cell {cell}; raise it, or "
+            "lower tau0."
+        )
+    return levels
+
+
+def checked_initial(found: Any, shape: tuple[int, ...]) -> FloatArray:
+    """A new array of levels, which cannot be written to.
+
+    Raises:
+        ValueError: they do not have that shape, or are not finite.
+    """
+    levels = validation.real_array("initial", found)
+    if levels.shape != shape:
+        raise ValueError(
+            f"initial must have shape {shape}, a row per cell and a column per action, "
+            f"got {levels.shape}."
+        )
+    levels.flags.writeable = False
+    return levels

@@ -232,6 +232,10 @@ class Memory:
         )
         if not good:
             raise ValueError("the paths of its memory do not fit together")
+        if (
+            size == 0
+        ):  # of an agent that has learned nothing: how states look is unknown
+            return
         rows = {"action": action.astype(self.action.dtype), "reward": reward}
         if "allowed" in arrays:
             allowed = arrays["allowed"]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from acl_gym.colony.greedy import cells_out_of_range
-from acl_gym.colony.heuristic import checked_heuristic
+from acl_gym.colony.heuristic import checked_heuristic, to_the_power
 from acl_gym.partitions.kernels import written_out
 from acl_gym.utils import validation
 from acl_gym.utils.compiling import njit
@@ -108,7 +108,7 @@ class Pheromone(Fixed):
         The scale of a row has no effect, because actions are compared within a cell.
         """
         if self._heuristic is not None and self._weights is None:
-            self._weights = self._scaled_to_the_power(self._beta)
+            self._weights = to_the_power(self._heuristic, self._beta)
         return self._weights
 
     @property
@@ -121,14 +121,9 @@ class Pheromone(Fixed):
         if self._alpha == 1.0:
             return self.weights
         if self._heuristic is not None and self._greedy_weights is None:
-            self._greedy_weights = self._scaled_to_the_power(self._beta / self._alpha)
+            exponent = self._beta / self._alpha
+            self._greedy_weights = to_the_power(self._heuristic, exponent)
         return self._greedy_weights
-
-    def _scaled_to_the_power(self, exponent: float) -> FloatArray:
-        eta = np.asarray(self._heuristic)
-        powers = (eta / eta.max(axis=1, keepdims=True)) ** exponent
-        # With an exponent of 0 an action that is ruled out stays so.
-        return np.where(eta > 0.0, powers, 0.0)
 
     def set_tau0(self, tau0: float, everywhere: bool) -> None:
         """Set the initial level, where it was not known before.

@@ -84,6 +84,15 @@ def test_two_parts_are_one_run_also_through_a_file(name: str, tmp_path: Path) ->
 
 
 @EACH
+def test_what_has_learned_nothing_goes_through_a_file(
+    name: str, tmp_path: Path
+) -> None:
+    make(name).save(tmp_path / "new")
+    loaded = ReturningACL.load(tmp_path / "new", SETTINGS[name][0]())
+    assert_same(loaded.learn(trials=1), make(name).learn(trials=1))
+
+
+@EACH
 def test_a_trial_can_be_taken_back(name: str) -> None:
     colony = make(name).learn(trials=2)
     kept = colony.snapshot()

@@ -174,3 +174,13 @@ def test_help_lists_what_exists() -> None:
     ):
         assert each in text
     assert max(map(len, text.splitlines())) <= 80
+
+
+@pytest.mark.parametrize("name", ["heuristic", "initial"])
+@pytest.mark.parametrize("agent", ["acl", "returning"])
+def test_what_only_arrays_and_functions_can_say_is_refused(
+    agent: str, name: str
+) -> None:
+    with pytest.raises(BadArgumentError, match=f"has no '{name}'; choose from"):
+        parse_parameters("--param", [f"{name}=1"], parameters(agent))
+    assert parameters(agent)["beta"].scheduled

@@ -112,6 +112,7 @@ CONSTRUCTORS: dict[str, Callable[[], tuple[Callable[..., Any], dict[str, Any]]]]
             "alpha": 3.0,
             "heuristic": np.ones((12, 3)),
             "beta": 1.0,
+            "initial": np.ones((12, 3)),
             "epsilon": 0.1,
             "selection": "boltzmann",
             "cost": None,
@@ -158,6 +159,9 @@ CONSTRUCTORS: dict[str, Callable[[], tuple[Callable[..., Any], dict[str, Any]]]]
             "trust": 1.0,
             "epsilon": 0.1,
             "optimism": 1.0,
+            "heuristic": np.ones((12, 3)),
+            "beta": 1.0,
+            "initial": np.zeros((12, 3)),
             "walks_back": 2,
             "older_steps": 3,
             "steps_per_walk": 5,
@@ -627,7 +631,7 @@ def _own_rule(rng: Rng) -> Call:
 
 
 def _own_function(rng: Rng) -> Call:
-    name = choice(rng, ("deposit", "cost", "epsilon", "alpha", "heuristic"))
+    name = choice(rng, ("deposit", "cost", "epsilon", "alpha", "heuristic", "initial"))
     value = hostile(rng)
     function: Any = lambda *arguments: value  # noqa: E731
     if name == "deposit" and rng.random() < 0.5:

@@ -165,6 +165,21 @@ def _value(
     return float(levels[city, j] * greedy_weights[city, j])
 
 
+@njit
+def of_candidates(weights: FloatArray | None, candidates: CellArray) -> FloatArray:
+    """The weights of each city's candidates, side by side, `(n, k)`; None: 1.
+
+    In a large table each entry that an ant looks at lies in a part of the memory of its
+    own.
+    """
+    near = np.ones(candidates.shape)
+    if weights is not None:
+        for i in range(candidates.shape[0]):
+            for c in range(candidates.shape[1]):
+                near[i, c] = weights[i, candidates[i, c]]
+    return near
+
+
 @njit(inline="always")
 def best_candidate(
     city: np.uint64,
@@ -172,17 +187,18 @@ def best_candidate(
     candidates: CellArray,
     choice: float,
     levels: FloatArray,
-    greedy_weights: FloatArray | None,
+    near: FloatArray,
     values: FloatArray,
 ) -> int:
-    """The candidate left with the largest tau^alpha eta^beta; -1 if all have none."""
+    """The candidate left with the largest tau^alpha eta^beta; -1 if all have none.
+
+    `near` are the greedy weights `of_candidates`.
+    """
     k = np.uint64(candidates.shape[1])
     best = 0.0
     for c in range(k):
         j = np.uint64(candidates[city, c])
-        value = levels[city, j] * free[j]
-        if greedy_weights is not None:
-            value *= greedy_weights[city, j]
+        value = levels[city, j] * free[j] * near[city, c]
         values[c] = value
         best = max(best, value)
     if best == 0.0:
@@ -208,10 +224,13 @@ def drawn_candidate(
     levels: FloatArray,
     alpha: float,
     whole: int,
-    weights: FloatArray | None,
+    near: FloatArray,
     sums: FloatArray,
 ) -> int:
-    """A candidate left, drawn by (2.2); -1 if their weights sum to 0."""
+    """A candidate left, drawn by (2.2); -1 if their weights sum to 0.
+
+    `near` are the weights `of_candidates`.
+    """
     k = np.uint64(candidates.shape[1])
     largest = 0.0
     for c in range(k):
@@ -223,9 +242,7 @@ def drawn_candidate(
     for c in range(k):
         j = np.uint64(candidates[city, c])
         weight = _power(levels[city, j] * free[j] / largest, alpha, whole)
-        if weights is not None:
-            weight *= weights[city, j]
-        total += weight
+        total += weight * near[city, c]
         sums[c] = total
     if not total > 0.0:
         return -1

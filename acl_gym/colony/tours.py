@@ -20,6 +20,7 @@ from acl_gym.colony.city_choice import (
     choose_otherwise,
     drawn_candidate,
     last_increase,
+    of_candidates,
     whole_exponent,
 )
 from acl_gym.colony.solutions import ROWS_PER_BLOCK, Block
@@ -236,6 +237,8 @@ def build_tours_in_turn(
     m, n = tours.shape
     free, rest = np.ones((m, n)), np.empty((m, n), np.int32)
     n_rest = np.full(m, -1)
+    near = of_candidates(weights, candidates)
+    near_greedy = near if alpha == 1.0 else of_candidates(greedy_weights, candidates)
     values, whole = np.empty(candidates.shape[1]), whole_exponent(alpha)
     for a in range(m):
         tours[a, 0] = starts[a]
@@ -255,7 +258,7 @@ def build_tours_in_turn(
                         candidates,
                         choice,
                         levels,
-                        greedy_weights,
+                        near_greedy,
                         values,
                     )
                 else:
@@ -267,7 +270,7 @@ def build_tours_in_turn(
                         levels,
                         alpha,
                         whole,
-                        weights,
+                        near,
                         values,
                     )
                 if chosen < 0 and coin < q0:

@@ -398,7 +398,9 @@ SCRIPT = textwrap.dedent(
             return 0, {"pid": os.getpid()}
 
         def step(self, action):
-            time.sleep(600 if action else 0)
+            if action:
+                os.write(1, b"asleep\\n")
+                time.sleep(600)
             return 0, 0.0, False, False, {}
 
         def close(self):
@@ -437,7 +439,8 @@ def test_no_worker_outlives_its_parent(
     assert len(pids) == 2
     if ending is not None:
         assert all(map(alive, pids))
-        time.sleep(0.5)  # the step is under way
+        assert parent.stdout.readline() == "asleep\n"
+        time.sleep(0.2)  # now it is
         # As a terminal does, which interrupts all processes.
         os.kill(-parent.pid if ending is signal.SIGINT else parent.pid, ending)
     said, complaints = parent.communicate(timeout=60)

@@ -13,7 +13,7 @@ from acl_gym.agents.base import TabularAgent
 from acl_gym.agents.saving import with_prefix
 from acl_gym.colony.ant_rule import AntRule
 from acl_gym.colony.candidates import NONE, candidate_lists, inverse_distances
-from acl_gym.colony.deposits import Deposit, as_deposit, deposit_from_settings
+from acl_gym.colony.deposits import Deposit, Rank, as_deposit, deposit_from_settings
 from acl_gym.colony.greedy import greedy_actions
 from acl_gym.colony.heuristic import Heuristic, as_heuristic
 from acl_gym.colony.local_search import METHODS
@@ -31,6 +31,9 @@ from acl_gym.utils.typing import BoolArray, CellArray, FloatArray, IntArray
 UNKNOWN_TAU0 = 1.0
 """The level until the first trial tells tau0: ants choose alike at any level that all
 pairs have."""
+
+USUAL_CANDIDATES = 20
+"""How many cities ants look at first on the travelling salesman problem, as in ACOTSP."""
 
 
 class AntAgent(TabularAgent):
@@ -83,7 +86,7 @@ class AntAgent(TabularAgent):
         alpha: Setting,
         beta: Setting,
         heuristic: Heuristic | str | None,
-        candidates: int | None,
+        candidates: int | str | None,
         local_search: str | None,
         deposit: str | Deposit | Callable[[FloatArray], FloatArray],
         tabu: bool,
@@ -96,7 +99,9 @@ class AntAgent(TabularAgent):
         self.alpha, self.beta = alpha, beta
         if tau0 is not None:
             tau0 = validation.number("tau0", tau0, above=0)
-        if candidates is not None:
+        if isinstance(candidates, str):
+            validation.one_of("candidates", candidates, ("usual",))
+        elif candidates is not None:
             candidates = validation.integer("candidates", candidates, at_least=1)
         if local_search is not None:
             validation.one_of("local_search", local_search, METHODS)
@@ -106,11 +111,21 @@ class AntAgent(TabularAgent):
                     f"{name} must be True or False, got {validation.shown(value)}."
                 )
         self.tau0, self.deposit = tau0, as_deposit(deposit)
+        if isinstance(self.deposit, Rank):
+            raise ValueError(
+                "deposit must say of each solution alone how good it is, so that the best "
+                "so far can be told, got 'rank'; take 'inverse' for costs, 'return' for "
+                "rewards, or a function of the costs."
+            )
         self.tabu, self.walk = tabu, walk
-        self._candidates, self._local_search = candidates, local_search
+        self._local_search = local_search
         super().__init__(
             env, partition, max_steps=max_steps, seed=seed, n_actions=n_actions
         )
+        if isinstance(candidates, str):
+            # Elsewhere a list is never used up, and would rule other actions out.
+            candidates = None if self._salesman is None else USUAL_CANDIDATES
+        self._candidates = candidates
         if self.partition.cells_per_state > 1:
             raise ValueError(
                 "partition must have one cell per state, such as Discrete or Crisp, got "
@@ -317,7 +332,8 @@ class AntAgent(TabularAgent):
 
     def _arrays(self) -> dict[str, NDArray[Any]]:
         arrays = {f"update_{name}": a for name, a in self._rule.memory().items()}
-        arrays["tau0"] = np.array([self.pheromone.tau0, float(self._tau0_is_due)])
+        flags = float(self._tau0_is_due), float(self._levels_are_set)
+        arrays["tau0"] = np.array([self.pheromone.tau0, *flags])
         if self.heuristic is not None:
             arrays["heuristic"] = self.heuristic
         return arrays
@@ -329,9 +345,9 @@ class AntAgent(TabularAgent):
 
     def _set_arrays(self, arrays: Mapping[str, NDArray[Any]]) -> None:
         self._rule.restore(with_prefix("update_", arrays))
-        tau0, due = validation.real_array("tau0", arrays["tau0"], ndim=1)
+        tau0, due, are_set = validation.real_array("tau0", arrays["tau0"], ndim=1)
         self.pheromone.set_tau0(float(tau0), everywhere=False)
-        self._tau0_is_due = bool(due)
+        self._tau0_is_due, self._levels_are_set = bool(due), bool(are_set)
 
     def _restore(
         self, header: dict[str, Any], arrays: Mapping[str, NDArray[Any]]

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from abc import abstractmethod
+from collections.abc import Mapping
 from typing import Any, Self
 
 import numpy as np
 from gymnasium.vector import VectorEnv
+from numpy.typing import NDArray
 
-from acl_gym.agents.ant_agent import AntAgent
+from acl_gym.agents.ant_agent import UNKNOWN_TAU0, AntAgent
 from acl_gym.agents.training import Training
 from acl_gym.callbacks.base import Callbacks
 from acl_gym.colony.ant_kernels import branching_factor
@@ -17,6 +19,7 @@ from acl_gym.colony.local_search import LocalSearch, nearest_neighbours
 from acl_gym.colony.solutions import Solutions
 from acl_gym.colony.tours import Tours, nearest_neighbour_tour, tour_lengths
 from acl_gym.colony.update_rule import TrialResult
+from acl_gym.envs.graph.instances import TravellingSalesmanInstance
 from acl_gym.envs.graph.travelling_salesman import TravellingSalesmanVectorEnv
 from acl_gym.evaluation.rollout import Outcome
 from acl_gym.partitions import Partition
@@ -46,6 +49,7 @@ class AntOptimizer(AntAgent):
         **parameters: Any,
     ) -> None:
         super().__init__(env, partition, **parameters)
+        self._instance: TravellingSalesmanInstance | None = None
         self._tours: Tours | None = None
         self._solutions: Solutions | None = None
         self._result: TrialResult | None = None
@@ -144,7 +148,9 @@ class AntOptimizer(AntAgent):
 
     def _fitness(self, costs: FloatArray) -> FloatArray:
         """F of solutions, what ants deposit for them."""
-        found = self.deposit(costs, self.pheromone.tau0)
+        # The offset of some deposits must not change when tau0 becomes known: F of
+        # solutions of different trials are compared.
+        found = self.deposit(costs, UNKNOWN_TAU0)
         deposits = checked_deposits(found, costs.size)
         if not _LEAST_DEPOSIT <= deposits.min() <= deposits.max() <= _MOST_DEPOSIT:
             raise ValueError(
@@ -245,17 +251,19 @@ class AntOptimizer(AntAgent):
         """The best costs, of all trials and of this one, and the branching factor.
 
         Where an ant of the trial has reached a terminal state, or one ever has. The
-        lambda-branching factor is the mean number of actions in a cell that ants may
-        still take, see `branching_factor`, among candidates where there are.
+        lambda-branching factor is the mean number of actions that ants may still take in
+        a cell of the best solution, see `branching_factor`, among candidates where there
+        are.
         """
         row: Row = {}
         result = self._result
         if result is not None and result.terminated.any():
             row["trial_best_cost"] = float(result.costs[result.terminated].min())
-        if self._rule.best.found:
+        best = self._rule.best
+        if best.found:
             row["best_cost"] = self.best_cost
-        levels = self.pheromone.levels
-        row["branching_factor"] = branching_factor(levels, self._rule.candidates)
+            levels, lists = self.pheromone.levels, self._rule.candidates
+            row["branching_factor"] = branching_factor(levels, lists, best.cells)
         return row
 
     def set_env(self, env: VectorEnv[Any, Any, Any]) -> None:
@@ -265,9 +273,23 @@ class AntOptimizer(AntAgent):
             ValueError: it is another travelling salesman problem than that whose best
                 tour is known.
         """
+        before = self.env
         super().set_env(env)
-        self._check_env()
+        try:
+            self._check_env()
+        except ValueError:
+            if before is not None:  # which the agent goes on with
+                super().set_env(before)
+                self._check_env()
+            raise
         self._set_tau0()
+
+    def _restore(
+        self, header: dict[str, Any], arrays: Mapping[str, NDArray[Any]]
+    ) -> None:
+        super()._restore(header, arrays)
+        self._rule.check_fits(self.pheromone)
+        self._check_env()
 
     def _check_env(self) -> None:
         """Check that the environment fits, and prepare the local search on it."""
@@ -275,6 +297,20 @@ class AntOptimizer(AntAgent):
         if self.env is None:
             return
         best, salesman = self._rule.best, self._salesman
+        if salesman is not None:
+            known, instance = self._instance, salesman.instance
+            if known is not None and instance != known:
+                raise ValueError(
+                    f"env must have the instance {known.name!r}, by whose distances this "
+                    f"agent chooses, got {instance.name!r}; make a new agent for another "
+                    "instance."
+                )
+            self._instance = instance
+            if self.max_steps < instance.n_cities:
+                raise ValueError(
+                    "max_steps must be at least the number of cities, "
+                    f"{instance.n_cities}, got {self.max_steps}; leave it out."
+                )
         if self._local_search is not None:
             if salesman is None or not self.builds_tours:
                 raise ValueError(

@@ -74,7 +74,9 @@ class AntSystem(AntOptimizer):
             "distance" on the travelling salesman problem, else 1 everywhere.
         candidates: how many actions of each cell ants look at first, >= 1, those of the
             largest eta: the nearest neighbours. Where none of them is left, an ant takes
-            the best of all that are. None: all actions; so it is without a heuristic.
+            the best of all that are; where nothing is used up, ants take no others. None:
+            all actions; so it is without a heuristic. "usual": 20 on the travelling
+            salesman problem, else None.
         tau0: the initial level, > 0. None takes that of the literature, m / L_nn, or
             (e + m) / (rho L_nn) with elitists and w (w - 1) / (2 rho L_nn) with ranks,
             L_nn being the length of the nearest-neighbour tour. On other environments
@@ -129,7 +131,7 @@ class AntSystem(AntOptimizer):
         alpha: Setting = 1.0,
         beta: Setting = 2.0,
         heuristic: Heuristic | str | None = None,
-        candidates: int | None = 20,
+        candidates: int | str | None = "usual",
         tau0: float | None = None,
         local_search: str | None = None,
         deposit: str | Deposit | Callable[[FloatArray], FloatArray] = "inverse_cost",
@@ -252,7 +254,7 @@ class AntColonySystem(AntOptimizer):
         alpha: Setting = 1.0,
         beta: Setting = 2.0,
         heuristic: Heuristic | str | None = None,
-        candidates: int | None = 20,
+        candidates: int | str | None = "usual",
         tau0: float | None = None,
         local_search: str | None = None,
         deposit: str | Deposit | Callable[[FloatArray], FloatArray] = "inverse_cost",
@@ -317,17 +319,18 @@ class MaxMinAntSystem(AntOptimizer):
     Args:
         env: see `AntSystem`. As many ants as cities are usual, with local search 25.
         partition: see `AntSystem`.
-        update_set: which solution deposits: `"trial-best"`, `"best-so-far"` or
-            `"mixed"`, ever more often the best since the last restart in place of the
-            trial's, see `MaxMinUpdate`. None: "trial-best", with local search "mixed",
-            which is what ACOTSP does.
+        update_set: which solution deposits: `"trial-best"`, `"best-so-far"`,
+            `"mostly-trial-best"`, in every 25th trial the best since the last restart, or
+            `"mixed"`, that ever more often, see `MaxMinUpdate`. None:
+            "mostly-trial-best", with local search "mixed", which is what ACOTSP does.
         p_best: in (0, 1), the probability with which ants that have converged construct
-            the best solution; it gives tau_min. None: tau_min = tau_max / (2 n). "usual":
-            0.05, with local search None.
+            the best tour; it gives tau_min. None, and where solutions are no tours:
+            tau_min = tau_max / (2 n). "usual": 0.05, with local search None.
         smoothing: delta, in [0, 1]: where the lambda-branching factor tells that ants
             have converged, each level moves by this share of its distance to tau_max.
             1 is a restart, 0 does nothing.
-        patience: how many trials lie between restarts at least, >= 0.
+        patience: how many trials without a better solution since the last restart there
+            must be before the next, >= 0.
         global_decay: rho, in (0, 1], the evaporation rate. None: 0.02, with local search
             0.2.
         alpha: exponent of the levels, > 0; a number or a schedule.
@@ -371,7 +374,7 @@ class MaxMinAntSystem(AntOptimizer):
         alpha: Setting = 1.0,
         beta: Setting = 2.0,
         heuristic: Heuristic | str | None = None,
-        candidates: int | None = 20,
+        candidates: int | str | None = "usual",
         tau0: float | None = None,
         local_search: str | None = None,
         deposit: str | Deposit | Callable[[FloatArray], FloatArray] = "inverse_cost",
@@ -384,7 +387,7 @@ class MaxMinAntSystem(AntOptimizer):
     ) -> None:
         alone = local_search is None
         if update_set is None:
-            update_set = "trial-best" if alone else "mixed"
+            update_set = "mostly-trial-best" if alone else "mixed"
         if global_decay is None:
             global_decay = 0.02 if alone else 0.2
         if p_best == "usual":

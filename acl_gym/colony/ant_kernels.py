@@ -191,9 +191,9 @@ def limit(levels: FloatArray, least: float, most: float) -> None:
 
 @njit
 def branching_factor(
-    levels: FloatArray, candidates: CellArray, share: float = 0.05
+    levels: FloatArray, candidates: CellArray, cells: CellArray, share: float = 0.05
 ) -> float:
-    """The lambda-branching factor (Gambardella and Dorigo, 1995), mean over the cells.
+    """The lambda-branching factor (Gambardella and Dorigo, 1995), mean over cells.
 
     How many actions of a cell have a level of at least the smallest plus `share` of the
     way to the largest. It approaches 1, or 2 in a symmetric problem, where the ants
@@ -203,12 +203,13 @@ def branching_factor(
         levels: `(n_cells, n_actions)`.
         candidates: the actions that count in each cell, `(n_cells, k)`; an empty array
             where all do.
+        cells: those that count, `(n,)`, such as the ones of the best solution; in others
+            nothing may ever have been deposited.
         share: lambda, in [0, 1].
     """
-    n_cells, n_actions = levels.shape
-    k = candidates.shape[1] if candidates.size > 0 else n_actions
+    k = candidates.shape[1] if candidates.size > 0 else levels.shape[1]
     count = 0
-    for i in range(n_cells):
+    for i in cells:
         low, high = np.inf, 0.0
         for c in range(k):
             level = levels[i, candidates[i, c] if candidates.size > 0 else c]
@@ -217,4 +218,4 @@ def branching_factor(
         for c in range(k):
             level = levels[i, candidates[i, c] if candidates.size > 0 else c]
             count += level >= cutoff
-    return float(count / n_cells)
+    return float(count / cells.size)

@@ -74,6 +74,7 @@ class AntRule(UpdateRule):
         algorithms have no exploration of their own, so `selection` and `epsilon` are not
         used.
         """
+        self.check_fits(pheromone)
         check_choice(index, degree, pheromone.levels, allowed)
         actions = np.empty(len(index), dtype=np.int64)
         choose_in_turn(
@@ -125,6 +126,7 @@ class AntRule(UpdateRule):
             local_decay: gamma of (2.6), in [0, 1).
             tours: receives the tours, int32 `(m, n)`.
         """
+        self.check_fits(pheromone)
         weighed = np.empty(lists.shape)
         alpha, weights = pheromone.alpha, pheromone.weights
         weigh_candidates(pheromone.levels, alpha, weights, lists, weighed)
@@ -148,7 +150,7 @@ class AntRule(UpdateRule):
         global_decay: float,
     ) -> None:
         """Note the best solution, evaporate and deposit."""
-        self._check_fits(pheromone)
+        self.check_fits(pheromone)
         self.best.note(result)
         self._update(pheromone, result, global_decay)
 
@@ -169,7 +171,7 @@ class AntRule(UpdateRule):
             rho: the evaporation rate.
         """
 
-    def _check_fits(self, pheromone: Pheromone) -> None:
+    def check_fits(self, pheromone: Pheromone) -> None:
         """Refuse what kernels, which do not check indices, must not see."""
         n_cells, n_actions = pheromone.levels.shape
         if self.symmetric and n_cells != n_actions:
@@ -177,6 +179,21 @@ class AntRule(UpdateRule):
                 "symmetric needs an action for each cell, which leads there, got "
                 f"{n_cells} cells and {n_actions} actions; set symmetric=False."
             )
+        lists = self.candidates
+        if lists is not self.__dict__.get("_checked_candidates"):
+            fit = lists.size == 0 or (
+                lists.ndim == 2
+                and len(lists) == n_cells
+                and lists.dtype == np.int32
+                and 0 <= lists.min() <= lists.max() < n_actions
+            )
+            if not fit:
+                raise ValueError(
+                    "candidates must be int32 numbers of actions, a row for each of "
+                    f"{n_cells} cells, all below {n_actions}, got "
+                    f"{validation.shown(lists)}."
+                )
+            self._checked_candidates = lists
         while self._restored:
             self._restored.pop().check_fits(n_cells, n_actions)
 

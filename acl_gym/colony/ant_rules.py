@@ -194,22 +194,26 @@ class MaxMinUpdate(AntRule):
     F / rho of the best solution so far, the limit of Proposition 2.2, and tau_min such
     that ants that have converged construct the best solution with probability p_best:
     tau_min = tau_max (1 - p) / ((choices / 2 - 1) p) with p = p_best^(1 / n), where
-    choices is how many actions a cell has, or candidates.
+    choices is how many actions a cell has, or candidates, of which half are left on the
+    average of a tour. Where solutions are no tours through all cells, that average is not
+    known, and tau_min = tau_max / (2 n).
 
     Where the ants all follow one solution, by the lambda-branching factor, levels are
     moved towards tau_max.
 
     Attributes:
-        update_set: "trial-best"; "best-so-far"; or "mixed": the best solution since the
-            last restart in every u-th trial, else the best of the trial. u falls with
-            the trials since the restart, see `_MIXED`; where u is 1 and the solution is
-            older than 50 trials, the best solution of all is taken.
-        p_best: in (0, 1); None: tau_min = tau_max / (2 n), which is usual with local
-            search.
+        update_set: "trial-best"; "best-so-far"; or the best solution since the last
+            restart in every u-th trial, else the best of the trial. With
+            "mostly-trial-best" u is 25. With "mixed" u falls with the trials since the
+            restart, see `_MIXED`; where u is 1 and the solution is older than 50 trials,
+            the best solution of all is taken.
+        p_best: in (0, 1), for tours; None: tau_min = tau_max / (2 n), which is usual with
+            local search.
         smoothing: delta, in [0, 1]: where the ants have converged, each level moves by
             this share of its distance to tau_max. 1 is a restart, which also forgets the
             best solution since the last one; 0 does nothing.
-        patience: how many trials after a restart the next one may come, >= 0.
+        patience: how many trials without a better solution since the last restart there
+            must be before the next, >= 0.
         symmetric: a component and its reverse have the same level.
 
     Attributes that are no parameters:
@@ -217,14 +221,14 @@ class MaxMinUpdate(AntRule):
         restarts: how often levels were moved.
     """
 
-    update_set: str = "trial-best"
+    update_set: str = "mostly-trial-best"
     p_best: float | None = 0.05
     smoothing: float = 1.0
     patience: int = 250
     symmetric: bool = False
 
     def __post_init__(self) -> None:
-        sets = (*UPDATE_SETS[1:], "mixed")
+        sets = (*UPDATE_SETS[1:], *_SCHEDULES)
         validation.one_of("update_set", self.update_set, sets)
         if self.p_best is not None:
             self.p_best = validation.number("p_best", self.p_best, above=0, below=1)
@@ -245,15 +249,17 @@ class MaxMinUpdate(AntRule):
         """tau_max = 1 / (rho L_nn)."""
         return fitness / max(rho, LEAST_LEVEL)
 
-    def limits(self, n_actions: int, rho: float) -> tuple[float, float]:
+    def limits(self, n_cells: int, n_actions: int, rho: float) -> tuple[float, float]:
         """tau_min and tau_max by the best solution so far.
 
         Args:
-            n_actions: columns of the table.
+            n_cells: rows of the table.
+            n_actions: its columns.
             rho: the evaporation rate, > 0.
         """
         most, n = self.best.fitness / rho, self.best.cells.size
-        if self.p_best is None:
+        is_tour = n == n_cells == n_actions
+        if self.p_best is None or not is_tour:
             return most / (2.0 * n), most
         choices = self.candidates.shape[1] if self.candidates.size else n_actions
         p = self.p_best ** (1.0 / n)
@@ -271,12 +277,14 @@ class MaxMinUpdate(AntRule):
             pheromone.stale[:] = True
             return
         levels = pheromone.levels
-        least, most = self.limits(pheromone.n_actions, max(global_decay, LEAST_LEVEL))
+        rho = max(global_decay, LEAST_LEVEL)
+        n_cells, n_actions = levels.shape
+        least, most = self.limits(n_cells, n_actions, rho)
         evaporate(levels, global_decay, least)
         solution = self._depositor(result)
         self._deposit_of(pheromone, solution, solution.fitness)
         limit(levels, least, most)
-        if self._trials > self.patience and self._converged(levels):
+        if self._age > self.patience and self._converged(levels):
             levels += self.smoothing * (most - levels)
             self.restarts += 1
             self._trials = self._age = 0
@@ -288,8 +296,9 @@ class MaxMinUpdate(AntRule):
         """The solution that deposits in this trial."""
         if self.update_set == "best-so-far":
             return self.best
-        if self.update_set == "mixed":
-            every = next(u for trials, u in _MIXED if self._trials <= trials)
+        if self.update_set in _SCHEDULES:
+            steps = _SCHEDULES[self.update_set]
+            every = next(u for trials, u in steps if self._trials <= trials)
             if every == 1 and self._age > _OLD:
                 return self.best
             if self._trials % every == 0 and self.since_restart.found:
@@ -303,7 +312,8 @@ class MaxMinUpdate(AntRule):
         fewest = 2.0 if self.symmetric else 1.0
         if self.smoothing == 0.0:
             return False
-        return branching_factor(levels, self.candidates) <= fewest * _CONVERGED
+        found = branching_factor(levels, self.candidates, self.best.cells)
+        return found <= fewest * _CONVERGED
 
     def memory(self) -> dict[str, NDArray[Any]]:
         """The best solutions, and how many trials ago what happened."""
@@ -325,6 +335,9 @@ class MaxMinUpdate(AntRule):
 _MIXED = ((25, 25), (75, 5), (125, 3), (250, 2), (np.inf, 1))
 """Up to how many trials since the restart the best since then deposits every how often
 (Stützle and Hoos, 2000, who choose it for colonies with local search)."""
+
+_SCHEDULES = {"mixed": _MIXED, "mostly-trial-best": ((np.inf, 25),)}
+"""Of both update sets that mix; without local search ACOTSP takes the second."""
 
 _OLD = 50
 """Trials after which, with u = 1, the best solution of all deposits."""

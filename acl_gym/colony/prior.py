@@ -135,7 +135,7 @@ class PotentialPrior(Prior):
         potential: a function of states, `(n, d)`, that returns a number for each,
             `(n,)`, of which less is better: a distance to the goal, an error of energy.
         preferred: what the best action of a cell receives, 10.
-        others: what the worst one receives, 1. Between the two it is in proportion; all
+        others: what the worst one receives, 1, and what is forbidden. Between the two it is in proportion; all
             receive `preferred` where the action makes no difference.
 
     Raises:
@@ -170,17 +170,29 @@ class PotentialPrior(Prior):
         n, columns = len(states), []
         copy = env.with_slots(n)
         for action in range(int(actions.n)):
-            copy.reset(options={"state": states})
-            following = copy.step(np.full(n, action + int(actions.start)))[0]
+            allowed = copy.reset(options={"state": states})[1].get("action_mask")
+            taken = np.full(n, action)
+            forbidden = np.zeros(n, np.bool_)
+            if allowed is not None:
+                forbidden = np.asarray(allowed)[:, action] == 0
+                taken[forbidden] = np.asarray(allowed)[forbidden].argmax(axis=1)
+            following, *_, infos = copy.step(taken + int(actions.start))
+            if "final_obs" in infos:  # where episodes begin anew in the same step
+                ended = infos["_final_obs"]
+                following = following.copy()
+                following[ended] = np.stack(infos["final_obs"][ended])
             values = validation.real_array("potential", self.potential(following))
             if values.shape != (n,):
                 raise ValueError(
                     f"potential must return a number for each of {n} states, got shape "
                     f"{values.shape}."
                 )
-            columns.append(values)
+            columns.append(np.where(forbidden, np.inf, values))
         excess = np.stack(columns, axis=1)
         excess -= excess.min(axis=1, keepdims=True)
+        largest = excess.max(axis=1, keepdims=True, where=excess < np.inf, initial=0.0)
+        # What is forbidden counts as the worst.
+        excess = np.minimum(excess, np.maximum(largest, 1.0))
         largest = excess.max(axis=1, keepdims=True)
         share = np.divide(excess, largest, out=np.zeros_like(excess), where=largest > 0)
         return np.asarray(1.0 - share)

@@ -85,10 +85,12 @@ def one_trial(
             length = 0.0
             for step in range(n):
                 # The cities from `step` on are those that have not been visited.
-                total = 0.0
+                total, largest = 0.0, 0.0
+                for j in range(step, n):  # relative to it no power underflows
+                    largest = max(largest, levels[colony, tour[step - 1], tour[j]])
                 for j in range(step, n):
                     level = levels[colony, tour[step - 1], tour[j]]
-                    total += 1.0 if step == 0 else level**alpha
+                    total += 1.0 if step == 0 else (level / largest) ** alpha
                     weight[j] = total
                 drawn = uniforms[colony, ant, step] * total
                 chosen = step

@@ -9,10 +9,11 @@ from typing import Any, NamedTuple
 import gymnasium as gym
 import numpy as np
 import pytest
+from gymnasium import spaces
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from acl_gym import ACL, Crisp
+from acl_gym import ACL, Crisp, WaitingVectorEnv
 from acl_gym.colony.ant_kernels import LEAST_LEVEL, branching_factor
 from acl_gym.colony.ant_rule import AntRule
 from acl_gym.colony.ant_rules import (
@@ -228,7 +229,7 @@ def test_max_min_is_one_deposit_within_limits(trial: Trial, p_best: float) -> No
     )
     expected = np.clip(np.maximum(expected, floor), least, most)
     np.testing.assert_allclose(updated(rule, trial), expected, rtol=1e-10)
-    assert rule.limits(n, trial.rho) == pytest.approx((least, most), rel=1e-12)
+    assert rule.limits(n, n, trial.rho) == pytest.approx((least, most), rel=1e-12)
 
 
 def test_limits_by_hand() -> None:
@@ -238,9 +239,11 @@ def test_limits_by_hand() -> None:
     updated(rule, trial)
     p = 0.05**0.1
     most = 1.0 / trial.costs.min() / 0.02
-    assert rule.limits(10, 0.02) == pytest.approx((most * (1 - p) / (4 * p), most))
+    assert rule.limits(10, 10, 0.02) == pytest.approx((most * (1 - p) / (4 * p), most))
     rule.p_best = None
-    assert rule.limits(10, 0.02) == pytest.approx((most / 20, most))
+    assert rule.limits(10, 10, 0.02) == pytest.approx((most / 20, most))
+    rule.p_best = 0.05  # of a solution that is no tour it is not known what was left
+    assert rule.limits(10, 4, 0.02) == pytest.approx((most / 20, most))
 
 
 @pytest.mark.parametrize("n", [2, 3])
@@ -248,7 +251,7 @@ def test_limits_of_the_smallest_tours_are_in_order(n: int) -> None:
     """With three choices or fewer the formula for tau_min has no meaning."""
     rule = MaxMinUpdate()
     levels = updated(rule, trial_of(0, n=n))
-    least, most = rule.limits(n, 0.3)
+    least, most = rule.limits(n, n, 0.3)
     assert 0.0 < least <= most
     assert (levels >= least).all()
     assert (levels <= most).all()
@@ -274,9 +277,10 @@ def test_levels_are_moved_towards_tau_max_where_ants_have_converged(
     rule = MaxMinUpdate(smoothing=smoothing, patience=0, symmetric=True)
     still, plain = MaxMinUpdate(smoothing=0.0, symmetric=True), trial.pheromone()
     plain.set_levels(pheromone.levels)
-    rule.global_update(pheromone, trial.result(), 0.0, 0.3)
-    still.global_update(plain, trial.result(), 0.0, 0.3)
-    _, most = rule.limits(6, 0.3)
+    for _ in range(2):  # in the second trial there is no better solution
+        rule.global_update(pheromone, trial.result(), 0.0, 0.3)
+        still.global_update(plain, trial.result(), 0.0, 0.3)
+    _, most = rule.limits(6, 6, 0.3)
     expected = plain.levels + smoothing * (most - plain.levels)
     np.testing.assert_allclose(pheromone.levels, expected, rtol=1e-12)
     assert rule.restarts == (smoothing > 0.0)
@@ -290,9 +294,8 @@ def test_restarts_wait_for_patience() -> None:
     for _ in range(9):
         rule.global_update(pheromone, trial.result(), 0.0, 0.9)
         found.append(rule.restarts)
-    # In trial 4, and after three more trials again, in which ants have converged anew.
-    assert found[:4] == [0, 0, 0, 1]
-    assert found[4:7] == [1, 1, 1]
+    # In trial 5, the fourth without a better solution, and not before trial 10 again.
+    assert found == [0, 0, 0, 0, 1, 1, 1, 1, 1]
 
 
 def test_mixed_schedule_takes_the_best_since_the_restart_ever_more_often() -> None:
@@ -378,17 +381,21 @@ def test_branching_factor_counts_levels_above_the_cutoff(
 ) -> None:
     n = len(trial.tau)
     everywhere = [range(n)] * n
-    found = branching_factor(trial.tau, NONE, share)
+    found = branching_factor(trial.tau, NONE, np.arange(n), share)
     assert found == pytest.approx(reference.branching(trial.tau, everywhere, share))
     lists = np.sort(
         np.random.default_rng(n).permuted(np.tile(np.arange(n), (n, 1)), axis=1)[:, :2]
     )
-    found = branching_factor(trial.tau, lists.astype(np.int32), share)
+    found = branching_factor(trial.tau, lists.astype(np.int32), np.arange(n), share)
     assert found == pytest.approx(reference.branching(trial.tau, lists.tolist(), share))
 
 
 def test_branching_factor_of_converged_ants_is_two() -> None:
-    assert branching_factor(converged()[1].levels, NONE) == 2.0
+    levels = converged()[1].levels
+    assert branching_factor(levels, NONE, np.arange(6)) == 2.0
+    levels[0] = 1.0  # all of it counts, but only where the cell does
+    assert branching_factor(levels, NONE, np.arange(1, 6)) == 2.0
+    assert branching_factor(levels, NONE, np.arange(1)) == 6.0
 
 
 @pytest.mark.parametrize("rule", RULES)
@@ -473,6 +480,34 @@ def test_symmetric_needs_a_square_table() -> None:
         max_steps=40,
     )
     with pytest.raises(ValueError, match="symmetric needs an action for each cell"):
+        colony.learn(trials=1)
+
+
+class Wide(gym.Env[Any, Any]):
+    """Two states and far more actions, each of which ends the episode."""
+
+    observation_space = spaces.Discrete(2)
+    action_space = spaces.Discrete(50_000)
+
+    def reset(self, **kwargs: Any) -> tuple[int, dict[str, Any]]:
+        super().reset(**kwargs)
+        return 0, {}
+
+    def step(self, action: int) -> tuple[int, float, bool, bool, dict[str, Any]]:
+        return 1, -1.0, True, False, {}
+
+
+@pytest.mark.parametrize("rule", [AntSystemUpdate, AntColonySystemUpdate, MaxMinUpdate])
+def test_no_kernel_sees_a_table_that_does_not_fit(rule: type[Any]) -> None:
+    """A local update would write beyond it before the trial has ended."""
+    env = WaitingVectorEnv([Wide] * 3)
+    colony = ACL(env, update=rule(symmetric=True), tau0=0.1, max_steps=5)
+    with pytest.raises(ValueError, match="symmetric needs an action for each cell"):
+        colony.learn(trials=1)
+    wrong = rule()
+    wrong.candidates = np.full((2, 3), 50_000, np.int32)
+    colony = ACL(env, update=wrong, tau0=0.1, max_steps=5)
+    with pytest.raises(ValueError, match="candidates must be int32 numbers of actions"):
         colony.learn(trials=1)
 
 

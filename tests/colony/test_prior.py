@@ -7,8 +7,11 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 import pytest
+from gymnasium.vector import AutoresetMode
 
 from acl_gym import (
+    ACL,
+    AntSystem,
     Crisp,
     Discrete,
     PolicyPrior,
@@ -132,3 +135,31 @@ def test_bad_arguments_are_refused(kind: Any) -> None:
         kind(np.sum, others="x")
     with pytest.raises(TypeError, match="needs a vector environment with Discrete"):
         kind(np.sum)(None, CELLS)
+
+
+@pytest.mark.parametrize("env_id", ["acl_gym/Navigation-v0", "acl_gym/GridSearch2D-v0"])
+def test_the_way_of_resetting_makes_no_difference(env_id: str) -> None:
+    """An action that ends an episode is judged by where it ended, not by a new start."""
+
+    def potential(states: Any) -> Any:
+        return np.abs(states.reshape(len(states), -1)).sum(axis=1)
+
+    found = [
+        ACL(
+            gym.make_vec(env_id, num_envs=3, autoreset_mode=mode),
+            heuristic=PotentialPrior(potential),
+        ).heuristic
+        for mode in AutoresetMode
+    ]
+    assert all(np.array_equal(each, found[0]) for each in found)
+
+
+def test_what_is_forbidden_is_the_worst() -> None:
+    """A salesman cannot stay where he is."""
+    distances = np.ones((4, 4))
+    env = gym.make_vec("acl_gym/TravellingSalesman-v0", num_envs=2, distances=distances)
+    prior = PotentialPrior(lambda cities: cities.reshape(-1) * 1.0)
+    eta = AntSystem(env, heuristic=prior).heuristic
+    assert eta is not None
+    assert np.diag(eta).tolist() == [1.0] * 4
+    assert eta[0].tolist() == [1.0, 10.0, 5.5, 1.0]

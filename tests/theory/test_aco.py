@@ -385,3 +385,16 @@ def test_same_seed_same_bits() -> None:
     ]
     assert runs[0].highest.tobytes() == runs[1].highest.tobytes()
     assert runs[0].highest.tobytes() != runs[2].highest.tobytes()
+
+
+def test_small_levels_do_not_lose_their_weight() -> None:
+    """Only relations count: with levels of 1e-200 squared, as with those of 1e-2."""
+    distances = np.array([[0, 1, 2, 1], [1, 0, 1, 2], [2, 1, 0, 1], [1, 2, 1, 0.0]])
+    found = [
+        simulate_limited_ants(
+            distances, 2_000, 1, tau_min=level, alpha=2.0, seed=0
+        ).first_optimum
+        for level in (1e-200, 1e-2)
+    ]
+    assert 0 < found[1].sum() < 2_000
+    np.testing.assert_array_equal(*found)

@@ -385,10 +385,13 @@ def alive(pid: int) -> bool:
 
 SCRIPT = textwrap.dedent(
     """
-    import os, sys, time
+    import os, signal, sys, time
     import gymnasium as gym
     import numpy as np
     from acl_gym import WorkersVectorEnv
+
+    # What a shell starts in the background inherits that interrupts are ignored.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
     class Slow(gym.Env):
         observation_space = gym.spaces.Discrete(2)

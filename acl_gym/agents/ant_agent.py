@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from acl_gym.agents.base import TabularAgent
 from acl_gym.agents.saving import with_prefix
-from acl_gym.colony.ant_rule import AntRule
+from acl_gym.colony.ant_rule import AntRule, check_flag
 from acl_gym.colony.candidates import NONE, candidate_lists, inverse_distances
 from acl_gym.colony.deposits import Deposit, Rank, as_deposit, deposit_from_settings
 from acl_gym.colony.greedy import greedy_actions
@@ -105,11 +105,8 @@ class AntAgent(TabularAgent):
             candidates = validation.integer("candidates", candidates, at_least=1)
         if local_search is not None:
             validation.one_of("local_search", local_search, METHODS)
-        for name, value in (("tabu", tabu), ("walk", walk)):
-            if not isinstance(value, bool):
-                raise TypeError(
-                    f"{name} must be True or False, got {validation.shown(value)}."
-                )
+        check_flag("tabu", tabu)
+        check_flag("walk", walk)
         self.tau0, self.deposit = tau0, as_deposit(deposit)
         if isinstance(self.deposit, Rank):
             raise ValueError(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from abc import abstractmethod
 from collections.abc import Mapping
 from typing import Any, Self
 
@@ -57,14 +56,14 @@ class AntOptimizer(AntAgent):
         self._check_env()
 
     @staticmethod
-    @abstractmethod
     def usual_ants(n_cities: int, local_search: str | None = None) -> int:
-        """How many ants the literature takes for so many cities.
+        """As many as there are cities; with local search 25, as in ACOTSP.
 
         Args:
             n_cities: n.
             local_search: as of the constructor.
         """
+        return n_cities if local_search is None else 25
 
     def learn(
         self,

@@ -164,16 +164,6 @@ class AntSystem(AntOptimizer):
             n_actions=n_actions,
         )
 
-    @staticmethod
-    def usual_ants(n_cities: int, local_search: str | None = None) -> int:
-        """As many as there are cities; with local search 25, as in ACOTSP.
-
-        Args:
-            n_cities: n.
-            local_search: as of the constructor.
-        """
-        return n_cities if local_search is None else 25
-
     def parameters(self) -> dict[str, Any]:
         """The keyword arguments of the constructor, except `heuristic`, an array."""
         rule: Any = self.update
@@ -417,16 +407,6 @@ class MaxMinAntSystem(AntOptimizer):
             seed=seed,
             n_actions=n_actions,
         )
-
-    @staticmethod
-    def usual_ants(n_cities: int, local_search: str | None = None) -> int:
-        """As many as there are cities; with local search 25, as in ACOTSP.
-
-        Args:
-            n_cities: n.
-            local_search: as of the constructor.
-        """
-        return n_cities if local_search is None else 25
 
     def parameters(self) -> dict[str, Any]:
         """The keyword arguments of the constructor, except `heuristic`, an array."""

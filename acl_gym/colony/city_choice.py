@@ -4,19 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from acl_gym.colony.pheromone import whole_exponent
 from acl_gym.colony.selection import boltzmann_allowed
 from acl_gym.utils.compiling import njit
 from acl_gym.utils.typing import BoolArray, CellArray, FloatArray
-
-_WHOLE = 8
-"""Powers up to this are products, which are cheaper than `pow`."""
-
-
-@njit(inline="always")
-def whole_exponent(alpha: float) -> int:
-    """Alpha, where powers are to be products; else 0."""
-    whole = int(min(alpha, _WHOLE + 1.0))  # what no integer holds would be anything
-    return whole if whole == alpha and whole <= _WHOLE else 0
 
 
 @njit(inline="always")

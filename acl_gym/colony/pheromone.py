@@ -188,6 +188,17 @@ class Pheromone(Fixed):
             raise cells_out_of_range(index, len(self.levels))
 
 
+_WHOLE = 8
+"""Powers up to this are products, which are cheaper than `pow`."""
+
+
+@njit(inline="always")
+def whole_exponent(alpha: float) -> int:
+    """Alpha, where powers are to be products; else 0."""
+    whole = int(min(alpha, _WHOLE + 1.0))  # what no integer holds would be anything
+    return whole if whole == alpha and whole <= _WHOLE else 0
+
+
 @njit(error_model="numpy")
 def repair(
     levels: FloatArray,
@@ -205,8 +216,7 @@ def repair(
     cell is not one of the table.
     """
     n_actions = len(columns) or levels.shape[1]
-    whole = int(min(alpha, 9.0))  # what no integer holds would be anything
-    multiply = whole == alpha and whole <= 8  # cheaper than pow
+    whole = whole_exponent(alpha)
     for j in range(index.shape[0]):
         for c in range(len(corners) or index.shape[1]):
             cell = np.uint64(index[j, c])  # unsigned: negative ones become huge
@@ -229,7 +239,7 @@ def repair(
                 ratio = levels[cell, u] / largest
                 if weights is not None and weights[cell, u] == 0.0:
                     ratio = 0.0  # above 1 it could overflow below
-                if multiply:
+                if whole > 0:
                     weight = ratio
                     for _ in range(1, whole):
                         weight *= ratio

@@ -21,8 +21,8 @@ from acl_gym.colony.city_choice import (
     drawn_candidate,
     last_increase,
     of_candidates,
-    whole_exponent,
 )
+from acl_gym.colony.pheromone import whole_exponent
 from acl_gym.colony.solutions import ROWS_PER_BLOCK, Block
 from acl_gym.colony.update_kernels import decay_pair
 from acl_gym.utils.compiling import njit

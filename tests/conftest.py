@@ -54,8 +54,9 @@ if worker := os.environ.get("PYTEST_XDIST_WORKER"):
         kernel_cache.copy_from_others()
 
 
-# The first example of a test may wait for a kernel to compile: no deadline.
-settings.register_profile("local", deadline=None)
+# The first example of a test may wait for a kernel to compile: no deadline. Each run
+# draws other examples, so that few are enough, but for the same ones each time.
+settings.register_profile("local", deadline=None, max_examples=50)
 settings.register_profile("ci", deadline=None, derandomize=True, print_blob=True)
 settings.load_profile("ci" if os.environ.get("CI") else "local")
 

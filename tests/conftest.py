@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import hashlib
 import os
 from collections.abc import Iterator
@@ -59,6 +60,14 @@ if worker := os.environ.get("PYTEST_XDIST_WORKER"):
 settings.register_profile("local", deadline=None, max_examples=50)
 settings.register_profile("ci", deadline=None, derandomize=True, print_blob=True)
 settings.load_profile("ci" if os.environ.get("CI") else "local")
+
+
+def pytest_collection_finish() -> None:
+    """What was imported and collected stays: garbage is looked for among the rest."""
+    gc.collect()
+    gc.freeze()
+    gc.set_threshold(10_000)
+
 
 MOST_TRIALS, MOST_STEPS = 5, 2_000
 """Of a run that a test needs only to have rows and a table, see `short_runs`."""

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import json
-import runpy
 import shutil
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
+
+from tests.scripts import run_script
 
 FOLDER = Path(__file__).resolve().parent.parent / "benchmarks"
 
@@ -20,36 +20,17 @@ ONCE = ("--repetitions", "1")
 pytestmark = pytest.mark.slow
 
 
-@pytest.fixture
-def printed(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> Callable[..., str]:
-    """Runs a script in this process, which has imported what takes it seconds."""
-
-    def printed(script: str, *arguments: str) -> str:
-        monkeypatch.setattr(sys, "argv", [script, *arguments])
-        monkeypatch.syspath_prepend(FOLDER)
-        code: Any = None
-        try:
-            runpy.run_path(str(FOLDER / script), run_name="__main__")
-        except SystemExit as end:
-            code = end.code
-        shown = capsys.readouterr()
-        assert not code, shown.err
-        return shown.out
-
-    return printed
+def printed(script: str, *arguments: str) -> str:
+    done = run_script(FOLDER / script, *arguments)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
 
 
-@pytest.fixture
-def output_of(printed: Callable[..., str]) -> Callable[..., Any]:
-    def output_of(script: str, *arguments: str) -> Any:
-        return json.loads(printed(script, "--json", *arguments))
-
-    return output_of
+def output_of(script: str, *arguments: str) -> Any:
+    return json.loads(printed(script, "--json", *arguments))
 
 
-def test_asynchronous(output_of: Callable[..., Any]) -> None:
+def test_asynchronous() -> None:
     arguments = ["--seeds", "1", "--cases", "grid", "--colonies", "returning"]
     found = output_of("asynchronous.py", *arguments)
     assert found["best"]["grid"] == pytest.approx(10.0, abs=0.3)  # mean shortest path
@@ -61,7 +42,7 @@ def test_asynchronous(output_of: Callable[..., Any]) -> None:
     assert walking["synchronous"] < walking["asynchronous"] == 1.0
 
 
-def test_double_bridge(output_of: Callable[..., Any]) -> None:
+def test_double_bridge() -> None:
     found = output_of("double_bridge.py", "--colonies", "1000")
     for row in found["equal"]:
         # Four and a half standard errors: wrong once in 7,000 seeds for 20 rows.
@@ -76,7 +57,7 @@ def test_double_bridge(output_of: Callable[..., Any]) -> None:
     }
 
 
-def test_aco_theory(output_of: Callable[..., Any]) -> None:
+def test_aco_theory() -> None:
     for row in output_of("aco_theory.py", "--colonies", "50")["rows"]:
         assert row["highest_level"] <= 1 + 1e-12
         never = row["trials_most"] is None
@@ -85,14 +66,14 @@ def test_aco_theory(output_of: Callable[..., Any]) -> None:
             assert row["later_than_k0"] == 0.0
 
 
-def test_plant(output_of: Callable[..., Any]) -> None:
+def test_plant() -> None:
     cases = output_of("plant.py", "--slots", "3", *ONCE)["cases"]
     assert [case["slots"] for case in cases] == [1, 3, 3, 3]
     assert cases[0]["ratio_to_reference"] == 1.0
     assert all(case["steps_per_second"] > 0 for case in cases)
 
 
-def test_throughput_of_walking_back(output_of: Callable[..., Any]) -> None:
+def test_throughput_of_walking_back() -> None:
     found = output_of("throughput.py", "--only", "walking back", "--no-peers", *ONCE)
     names = [case["name"] for case in found["cases"]]
     for ants in ("250", "2,500"):
@@ -119,14 +100,14 @@ def test_workers() -> None:
 
 
 @pytest.mark.skipif(shutil.which("gcc") is None, reason="needs gcc")
-def test_policy_export(output_of: Callable[..., Any]) -> None:
+def test_policy_export() -> None:
     rows = output_of("policy_export.py", *ONCE)["rows"]
     assert len(rows) == 4 * 4
     # A call of C takes a hundredth of `predict`, which enters NumPy and Numba.
     assert all(row["ratio_to_predict"] < 0.5 for row in rows if "table_bytes" in row)
 
 
-def test_ablation(output_of: Callable[..., Any]) -> None:
+def test_ablation() -> None:
     """Where a state is a cell nothing grows, so that three variants are left out."""
     arguments = ["--tasks", "grid,pendulum", "--steps", "1500"]
     rows = output_of("ablation.py", *arguments, "--seeds", "1")["rows"]
@@ -140,7 +121,7 @@ def test_ablation(output_of: Callable[..., Any]) -> None:
         assert row["reached_25"] == (row["steps_25"] is not None)
 
 
-def test_returning_figures(printed: Callable[..., str], tmp_path: Path) -> None:
+def test_returning_figures(tmp_path: Path) -> None:
     """The better the later; the last is within 25% of the best there is."""
     shown = printed("returning_figures.py", "--only", "growing", "--out", str(tmp_path))
     costs = [float(line.rpartition(" ")[2]) for line in shown.splitlines()]
@@ -150,7 +131,7 @@ def test_returning_figures(printed: Callable[..., str], tmp_path: Path) -> None:
     assert (tmp_path / "growing.png").stat().st_size > 100_000
 
 
-def test_prior_knowledge(output_of: Callable[..., Any]) -> None:
+def test_prior_knowledge() -> None:
     """One run of each kind: what is told shows before anything is learned."""
     arguments = ["--tasks", "pendulum", "--agents", "ReturningACL", "--ways", "initial"]
     rows = output_of("prior_knowledge.py", *arguments, "--seeds", "1")["rows"]

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
+from contextlib import nullcontext
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import gymnasium as gym
@@ -24,7 +27,7 @@ def run(*arguments: str) -> subprocess.CompletedProcess[str]:
 
 
 @pytest.fixture
-def brief(monkeypatch: pytest.MonkeyPatch) -> Any:
+def brief(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
     """The benchmark as a module, its cases cut short."""
     monkeypatch.syspath_prepend(str(FOLDER))
     import speed_cases
@@ -34,9 +37,12 @@ def brief(monkeypatch: pytest.MonkeyPatch) -> Any:
     monkeypatch.setattr(speed_cases, "steps_for", lambda n_ants: 5)
     train_dqn = speed_cases.train_dqn
     monkeypatch.setattr(speed_cases, "train_dqn", lambda steps: train_dqn(200))
-    # It compiles fewer kernels.
+    # It needs fewer kernels, and those of the tests are compiled once for all.
     first = throughput.FIRST_TRIAL.replace("Pendulum", "GridSearch1D")
     monkeypatch.setattr(throughput, "FIRST_TRIAL", first)
+    cache = os.environ.get("NUMBA_CACHE_DIR", str(tmp_path))
+    folder = SimpleNamespace(TemporaryDirectory=lambda: nullcontext(cache))
+    monkeypatch.setattr(throughput, "tempfile", folder)
     return throughput
 
 

@@ -44,7 +44,7 @@ def expected(trial: Trial, parts: list[Array], tau: Array) -> Array:
 
 
 @given(trials(), st.integers(0, 2**32 - 1))
-@settings(max_examples=100)
+@settings(max_examples=50)
 def test_levels_are_those_of_the_equation(trial: Trial, seed: int) -> None:
     parts, tau = parts_of(seed, len(trial.length)), trial.tau.copy()
     pheromone, solutions = trial.pheromone, trial.packed()

@@ -83,7 +83,7 @@ def built(rule: AntRule, problem: Problem, local_decay: float = 0.0) -> Array:
 
 
 @given(problems())
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=60, deadline=None)
 def test_tours_are_those_of_the_random_proportional_rule(problem: Problem) -> None:
     pheromone = problem.pheromone
     tau = pheromone.levels.copy()
@@ -101,7 +101,7 @@ def test_tours_are_those_of_the_random_proportional_rule(problem: Problem) -> No
 
 
 @given(problems(), st.sampled_from([0.0, 0.5, 1.0]))
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=60, deadline=None)
 def test_tours_in_turn_are_those_of_the_ant_colony_system(
     problem: Problem, q0: float
 ) -> None:
@@ -126,7 +126,7 @@ def test_tours_in_turn_are_those_of_the_ant_colony_system(
 
 
 @given(problems(), st.sampled_from([0.0, 0.5, 1.0]))
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=60, deadline=None)
 def test_ants_that_choose_step_by_step_build_the_same_tours(
     problem: Problem, q0: float
 ) -> None:

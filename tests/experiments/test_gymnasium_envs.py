@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import subprocess
-import sys
 from pathlib import Path
 
 import gymnasium as gym
@@ -19,6 +18,7 @@ from acl_gym import (
     evaluate_policy_cost,
 )
 from acl_gym.colony.deposits import Rank
+from tests.scripts import run_script
 
 ROOT = Path(__file__).resolve().parents[2]
 SCRIPT = ROOT / "benchmarks" / "gymnasium_envs.py"
@@ -27,13 +27,7 @@ ENVIRONMENTS = ("FrozenLake-v1", "CliffWalking-v1")
 
 
 def run(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, str(SCRIPT), "--out", str(folder), *arguments],
-        capture_output=True,
-        text=True,
-        check=False,
-        cwd=ROOT,
-    )
+    return run_script(SCRIPT, "--out", str(folder), *arguments)
 
 
 @pytest.fixture(scope="module")

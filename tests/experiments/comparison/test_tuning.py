@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import json
 import runpy
-import subprocess
-import sys
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -14,6 +12,7 @@ import pandas as pd
 import pytest
 
 from acl_gym.experiments.comparison.tasks import SETTINGS_FILE, TASKS, tuned
+from tests.scripts import run_script
 
 pytest.importorskip("optuna")
 SCRIPT = Path(__file__).resolve().parents[3] / "benchmarks" / "tune.py"
@@ -139,24 +138,16 @@ def test_the_mean_cost_over_a_run() -> None:
     assert tuning.mean_cost(rows) == (10 * 8 + 10 * 8 + 20 * 4) / 40
 
 
-def tune(*arguments: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, str(SCRIPT), *arguments],
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=300,
-    )
-
-
 def test_the_command(tmp_path: Path) -> None:
-    done = tune("--only", "row-q", "--evaluations", "1", "--out", str(tmp_path))
+    done = run_script(
+        SCRIPT, "--only", "row-q", "--evaluations", "1", "--out", str(tmp_path)
+    )
     assert done.returncode == 0, done.stderr
     assert "| 1-D grid | Q-learning | 5 | 5 | " in done.stdout
     assert [path.name for path in tmp_path.iterdir()] == ["row-q.json"]
-    wrong = tune("--only", "moon")
+    wrong = run_script(SCRIPT, "--only", "moon")
     assert wrong.returncode == 2
     assert "--only must be tasks, methods or task-method, got 'moon'" in wrong.stderr
-    partly = tune("--write", "--out", str(tmp_path))
+    partly = run_script(SCRIPT, "--write", "--out", str(tmp_path))
     assert partly.returncode == 1
     assert "search of row-acl must have an evaluation, got none" in partly.stderr

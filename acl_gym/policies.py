@@ -189,7 +189,8 @@ class PartitionPolicy(Fixed, ABC):
         ```
 
         The arrays are described in `acl_gym.export.numpy_file.numpy_arrays`; where
-        they are known, `inputs` and `input_values` say what each action sets.
+        they are known, `inputs` and `input_values` say what each action sets. Action
+        masks are not known, as in `to_c`.
 
         Args:
             path: the file; `.npz` is added where it is missing.
@@ -232,7 +233,9 @@ class PartitionPolicy(Fixed, ABC):
         With "float", half the memory, they differ only where rounding to a float, one
         part in 10^7, moves an observation across such a border. An observation that
         `predict` refuses (NaN, infinite, out of the range of a discrete variable) gives
-        `name_INVALID`.
+        `name_INVALID`. The program knows no action masks: where an environment does not
+        allow every action, it may choose one that is not allowed, which `predict` with
+        `action_masks` never does.
 
         Args:
             path: the file; `.h` is added to a name without an ending.

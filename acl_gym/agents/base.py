@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from abc import abstractmethod
 from typing import Any, ClassVar, Self
 
@@ -35,6 +36,8 @@ from acl_gym.utils.typing import (
     Row,
 )
 from acl_gym.utils.vector_envs import require_vector_env
+
+logger = logging.getLogger("acl_gym")
 
 BYTES_PER_PAIR = 20
 """Memory of an entry of a table at least: value, probability and rank."""
@@ -335,6 +338,12 @@ class TabularAgent(SavedAgent):
         )
 
     def _source(self, inputs: ArrayLike | None = None) -> Source:
+        if self._rollout is not None and self._rollout.action_mask is not None:
+            logger.warning(
+                "The environment does not allow every action in every state. What is "
+                "exported knows nothing of that and may choose an action that is not "
+                "allowed; check what it returns before you apply it."
+            )
         return self.policy._source(inputs)
 
     def _act(

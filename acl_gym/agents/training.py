@@ -186,7 +186,7 @@ class Training:
     def _report(self, row: Row, progress: int) -> None:
         self._bar.update(progress)
         every = self._log_interval
-        is_due = bool(every) and row["trial"] % every == 0
+        is_due = bool(every and row["trial"] % every == 0)
         if self._bar.disable and not is_due:
             return  # a trial of a small colony takes less time than these words
         what = self._reported

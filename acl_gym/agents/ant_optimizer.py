@@ -20,7 +20,7 @@ from acl_gym.colony.tours import Tours, nearest_neighbour_tour, tour_lengths
 from acl_gym.colony.update_rule import TrialResult
 from acl_gym.envs.graph.instances import TravellingSalesmanInstance
 from acl_gym.envs.graph.travelling_salesman import TravellingSalesmanVectorEnv
-from acl_gym.evaluation.rollout import Outcome
+from acl_gym.evaluation.steps import Outcome
 from acl_gym.partitions import Partition
 from acl_gym.utils import validation
 from acl_gym.utils.typing import BoolArray, CellArray, FloatArray, IntArray, Row

@@ -18,7 +18,8 @@ from acl_gym.colony.greedy import greedy_actions
 from acl_gym.envs.control.environments import ControlVectorEnv
 from acl_gym.envs.control.lookup import signals_of
 from acl_gym.envs.control.signals import Signals
-from acl_gym.evaluation.rollout import Outcome, Rollout
+from acl_gym.evaluation.rollout import Rollout
+from acl_gym.evaluation.steps import Outcome
 from acl_gym.export import Source
 from acl_gym.partitions import Partition, checked_partition, locate_checked
 from acl_gym.partitions.automatic import automatic_partition

@@ -13,7 +13,7 @@ from tqdm.auto import tqdm
 from acl_gym.agents.base import TabularAgent
 from acl_gym.callbacks.base import Callbacks, as_callbacks, is_stop
 from acl_gym.evaluation import reports_returns
-from acl_gym.evaluation.rollout import Outcome
+from acl_gym.evaluation.steps import Outcome
 from acl_gym.partitions import locate_all
 from acl_gym.utils import validation
 from acl_gym.utils.serialization import check_row

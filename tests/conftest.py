@@ -39,14 +39,24 @@ def _kernels() -> str:
     return digest.hexdigest()[:16]
 
 
-# Numba's cache is not safe against two processes that compile one function for
-# different types at the same time, so each worker keeps a cache of its own.
+# Each worker keeps a cache of its own, see `tests.kernel_cache`.
 if worker := os.environ.get("PYTEST_XDIST_WORKER"):
     cache = Path(os.environ.get("NUMBA_CACHE_DIR", ROOT / ".numba_cache"))
     os.environ["NUMBA_CACHE_DIR"] = str(cache / _kernels() / worker)
 
-# The first example of a test may wait for a kernel to compile: no deadline.
-settings.register_profile("local", deadline=None)
+    from tests.kernel_cache import KernelCache
+
+    kernel_cache = KernelCache(Path(os.environ["NUMBA_CACHE_DIR"]))
+
+    @pytest.hookimpl(tryfirst=True)
+    def pytest_runtest_setup() -> None:
+        """Compile nothing that another worker has compiled."""
+        kernel_cache.copy_from_others()
+
+
+# The first example of a test may wait for a kernel to compile: no deadline. Each run
+# draws other examples, so that few are enough, but for the same ones each time.
+settings.register_profile("local", deadline=None, max_examples=50)
 settings.register_profile("ci", deadline=None, derandomize=True, print_blob=True)
 settings.load_profile("ci" if os.environ.get("CI") else "local")
 

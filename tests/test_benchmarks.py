@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import json
+import runpy
 import shutil
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -18,15 +20,36 @@ ONCE = ("--repetitions", "1")
 pytestmark = pytest.mark.slow
 
 
-def output_of(script: str, *arguments: str) -> Any:
-    command = [sys.executable, str(FOLDER / script), "--json"]
-    done = subprocess.run(
-        [*command, *arguments], capture_output=True, text=True, check=True
-    )
-    return json.loads(done.stdout)
+@pytest.fixture
+def printed(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> Callable[..., str]:
+    """Runs a script in this process, which has imported what takes it seconds."""
+
+    def printed(script: str, *arguments: str) -> str:
+        monkeypatch.setattr(sys, "argv", [script, *arguments])
+        monkeypatch.syspath_prepend(FOLDER)
+        code: Any = None
+        try:
+            runpy.run_path(str(FOLDER / script), run_name="__main__")
+        except SystemExit as end:
+            code = end.code
+        shown = capsys.readouterr()
+        assert not code, shown.err
+        return shown.out
+
+    return printed
 
 
-def test_asynchronous() -> None:
+@pytest.fixture
+def output_of(printed: Callable[..., str]) -> Callable[..., Any]:
+    def output_of(script: str, *arguments: str) -> Any:
+        return json.loads(printed(script, "--json", *arguments))
+
+    return output_of
+
+
+def test_asynchronous(output_of: Callable[..., Any]) -> None:
     arguments = ["--seeds", "1", "--cases", "grid", "--colonies", "returning"]
     found = output_of("asynchronous.py", *arguments)
     assert found["best"]["grid"] == pytest.approx(10.0, abs=0.3)  # mean shortest path
@@ -38,7 +61,7 @@ def test_asynchronous() -> None:
     assert walking["synchronous"] < walking["asynchronous"] == 1.0
 
 
-def test_double_bridge() -> None:
+def test_double_bridge(output_of: Callable[..., Any]) -> None:
     found = output_of("double_bridge.py", "--colonies", "1000")
     for row in found["equal"]:
         # Four and a half standard errors: wrong once in 7,000 seeds for 20 rows.
@@ -53,7 +76,7 @@ def test_double_bridge() -> None:
     }
 
 
-def test_aco_theory() -> None:
+def test_aco_theory(output_of: Callable[..., Any]) -> None:
     for row in output_of("aco_theory.py", "--colonies", "50")["rows"]:
         assert row["highest_level"] <= 1 + 1e-12
         never = row["trials_most"] is None
@@ -62,14 +85,14 @@ def test_aco_theory() -> None:
             assert row["later_than_k0"] == 0.0
 
 
-def test_plant() -> None:
+def test_plant(output_of: Callable[..., Any]) -> None:
     cases = output_of("plant.py", "--slots", "3", *ONCE)["cases"]
     assert [case["slots"] for case in cases] == [1, 3, 3, 3]
     assert cases[0]["ratio_to_reference"] == 1.0
     assert all(case["steps_per_second"] > 0 for case in cases)
 
 
-def test_throughput_of_walking_back() -> None:
+def test_throughput_of_walking_back(output_of: Callable[..., Any]) -> None:
     found = output_of("throughput.py", "--only", "walking back", "--no-peers", *ONCE)
     names = [case["name"] for case in found["cases"]]
     for ants in ("250", "2,500"):
@@ -81,7 +104,12 @@ def test_throughput_of_walking_back() -> None:
 
 def test_workers() -> None:
     small = ("--slots", "2", "--steps", "2", "--milliseconds", "0.1", "--without-ray")
-    cases = output_of("workers.py", *small, *ONCE)["cases"]
+    # Its processes import the script anew, as the main program.
+    command = [sys.executable, str(FOLDER / "workers.py"), "--json"]
+    done = subprocess.run(
+        [*command, *small, *ONCE], capture_output=True, text=True, check=True
+    )
+    cases = json.loads(done.stdout)["cases"]
     assert [case["name"] for case in cases[-2:]] == [
         "WorkersVectorEnv, processes, 1",
         "WorkersVectorEnv, processes, 2",
@@ -91,14 +119,14 @@ def test_workers() -> None:
 
 
 @pytest.mark.skipif(shutil.which("gcc") is None, reason="needs gcc")
-def test_policy_export() -> None:
+def test_policy_export(output_of: Callable[..., Any]) -> None:
     rows = output_of("policy_export.py", *ONCE)["rows"]
     assert len(rows) == 4 * 4
     # A call of C takes a hundredth of `predict`, which enters NumPy and Numba.
     assert all(row["ratio_to_predict"] < 0.5 for row in rows if "table_bytes" in row)
 
 
-def test_ablation() -> None:
+def test_ablation(output_of: Callable[..., Any]) -> None:
     """Where a state is a cell nothing grows, so that three variants are left out."""
     arguments = ["--tasks", "grid,pendulum", "--steps", "1500"]
     rows = output_of("ablation.py", *arguments, "--seeds", "1")["rows"]
@@ -112,19 +140,17 @@ def test_ablation() -> None:
         assert row["reached_25"] == (row["steps_25"] is not None)
 
 
-def test_returning_figures(tmp_path: Path) -> None:
+def test_returning_figures(printed: Callable[..., str], tmp_path: Path) -> None:
     """The better the later; the last is within 25% of the best there is."""
-    script = str(FOLDER / "returning_figures.py")
-    command = [sys.executable, script, "--only", "growing", "--out", str(tmp_path)]
-    done = subprocess.run(command, capture_output=True, text=True, check=True)
-    costs = [float(line.rpartition(" ")[2]) for line in done.stdout.splitlines()]
+    shown = printed("returning_figures.py", "--only", "growing", "--out", str(tmp_path))
+    costs = [float(line.rpartition(" ")[2]) for line in shown.splitlines()]
     assert len(costs) == 4
     assert costs[0] > costs[-1]
     assert 38.4 < costs[-1] < 1.25 * 38.4
     assert (tmp_path / "growing.png").stat().st_size > 100_000
 
 
-def test_prior_knowledge() -> None:
+def test_prior_knowledge(output_of: Callable[..., Any]) -> None:
     """One run of each kind: what is told shows before anything is learned."""
     arguments = ["--tasks", "pendulum", "--agents", "ReturningACL", "--ways", "initial"]
     rows = output_of("prior_knowledge.py", *arguments, "--seeds", "1")["rows"]

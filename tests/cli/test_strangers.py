@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -13,16 +15,34 @@ from tests.cli.runner import MODULE, SMALL, figures, invoke, refused, run
 PAYLOAD = "from pathlib import Path\nPath('ran').touch()\n" + MODULE
 
 
-def file_with(**metadata: Any) -> str:
-    figures(*SMALL, "--trials", "1", "--out", "x")
-    agent = ACL.load("x.npz")
-    agent.metadata |= metadata
-    return str(agent.save("stranger.npz"))
+@pytest.fixture(scope="module")
+def trained(tmp_path_factory: pytest.TempPathFactory) -> str:
+    out = tmp_path_factory.mktemp("trained") / "x.npz"
+    return str(figures(*SMALL, "--trials", "1", "--out", str(out))["file"])
 
 
-@pytest.mark.parametrize(
-    "command", [["evaluate"], ["train", "--trials", "1", "--resume"]]
-)
+@pytest.fixture
+def file_with(trained: str) -> Callable[..., str]:
+    def file_with(**metadata: Any) -> str:
+        agent = ACL.load(trained)
+        agent.metadata |= metadata
+        return str(agent.save("stranger.npz"))
+
+    return file_with
+
+
+@pytest.fixture(autouse=True)
+def payload(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A module that can be imported, and that says so when it is."""
+    (tmp_path / "payload.py").write_text(PAYLOAD)
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.delitem(sys.modules, "payload", raising=False)
+
+
+COMMANDS = [["evaluate"], ["train", "--trials", "1", "--resume"]]
+
+
+@pytest.mark.parametrize("command", COMMANDS)
 @pytest.mark.parametrize(
     "metadata",
     [
@@ -38,15 +58,23 @@ def file_with(**metadata: Any) -> str:
     ],
 )
 def test_no_module_is_imported_because_a_file_says_so(
-    command: list[str], metadata: dict[str, Any], tmp_path: Path
+    command: list[str],
+    metadata: dict[str, Any],
+    file_with: Callable[..., str],
+    tmp_path: Path,
 ) -> None:
-    (tmp_path / "payload.py").write_text(PAYLOAD)
     if "object" in str(metadata):
         metadata = {"env_args": {"torques": [[[[[0.0]]]]]}}
-    file = file_with(**metadata)
-    refused(2, *command, file)
+    refused(2, *command, file_with(**metadata))
     assert not (tmp_path / "ran").exists()
-    done = run(*command, file, cwd=tmp_path)
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_a_new_interpreter_imports_none_either(
+    command: list[str], file_with: Callable[..., str], tmp_path: Path
+) -> None:
+    """There the present folder comes first among those of modules."""
+    done = run(*command, file_with(env_id="payload:Corridor-v0"), cwd=tmp_path)
     assert done.returncode == 2
     assert len(done.stderr.splitlines()) == 1, done.stderr
     assert not (tmp_path / "ran").exists()
@@ -56,21 +84,21 @@ def test_no_module_is_imported_because_a_file_says_so(
     "how",
     [{"episodes": 10**9}, {"max_steps": 10**12}, {"seed": -1}, {"episodes": "5"}, [1]],
 )
-def test_how_it_was_evaluated_is_checked(how: Any) -> None:
+def test_how_it_was_evaluated_is_checked(
+    how: Any, file_with: Callable[..., str]
+) -> None:
     assert "must hold evaluation" in refused(2, "evaluate", file_with(evaluation=how))
 
 
 def test_a_registered_id_with_a_module_before_it_needs_no_import(
-    tmp_path: Path,
+    file_with: Callable[..., str], tmp_path: Path
 ) -> None:
-    (tmp_path / "payload.py").write_text(PAYLOAD)
     file = file_with(env_id="payload:acl_gym/Pendulum-v0")
     assert invoke("evaluate", file).exit_code == 0
     assert not (tmp_path / "ran").exists()
 
 
 def test_what_the_user_types_is_imported(tmp_path: Path) -> None:
-    (tmp_path / "payload.py").write_text(PAYLOAD)
     arguments = ["train", "payload:Corridor-v0", "--ants", "3", "--cells", "5"]
     done = run(
         *(*arguments, "--trials", "2", "--param", "tau0=0.001", "--out", "c"),

@@ -58,16 +58,14 @@ def copied(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return copy
 
 
-def changes(root: Path, file: str, addition: str) -> bool:
-    """Whether the hash is another one when something was added to a file."""
-    path = root / file
-    before, content = code_of_runs(root), path.read_text()
-    path.write_text(content + addition)
+@pytest.fixture(scope="module")
+def unchanged(copied: Path) -> str:
+    return hash_of(copied)
+
+
+def hash_of(root: Path) -> str:
     code_of_runs.cache_clear()
-    after = code_of_runs(root)
-    path.write_text(content)
-    code_of_runs.cache_clear()
-    return before != after
+    return code_of_runs(root)
 
 
 @pytest.mark.parametrize(
@@ -95,8 +93,16 @@ def changes(root: Path, file: str, addition: str) -> bool:
         ),
     ],
 )
-def test_a_change(copied: Path, file: str, addition: str, expected: bool) -> None:
-    assert changes(copied, file, addition) is expected
+def test_a_change(
+    copied: Path, unchanged: str, file: str, addition: str, expected: bool
+) -> None:
+    path = copied / file
+    content = path.read_text()
+    path.write_text(content + addition)
+    try:
+        assert (hash_of(copied) != unchanged) is expected
+    finally:
+        path.write_text(content)
 
 
 def test_imports_for_the_type_checker_are_not_followed(copied: Path) -> None:

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from typing import Any, ClassVar
 
 import numpy as np
+from gymnasium import spaces
 from gymnasium.vector import VectorEnv
 from numpy.typing import ArrayLike, NDArray
 
@@ -121,6 +122,8 @@ class AntAgent(TabularAgent):
             )
         self.tabu, self.walk = tabu, walk
         self._local_search = local_search
+        if partition is None:
+            self._check_states(env)
         self._salesman = salesman_of(env)
         if max_steps is None and self._salesman is not None:
             # One step more than a tour, so that its end is never a truncation as well.
@@ -132,7 +135,8 @@ class AntAgent(TabularAgent):
         if self.partition.cells_per_state > 1:
             raise ValueError(
                 "partition must have one cell per state, such as Discrete or Crisp, got "
-                f"{validation.shown(self.partition)}."
+                f"{validation.shown(self.partition)}; take one of these, or an agent for "
+                "states that share cells, ReturningACL or ACL."
             )
         self._rule = rule
         if symmetric is not None:
@@ -232,6 +236,21 @@ class AntAgent(TabularAgent):
     @heuristic.setter
     def heuristic(self, value: Heuristic | None) -> None:
         raise fixed("heuristic", value)
+
+    def _check_states(self, env: Any) -> None:
+        """Refuse observations of which no partition of single cells follows.
+
+        Raises:
+            ValueError: they are numbers on a scale.
+        """
+        space = getattr(env, "single_observation_space", None)
+        if isinstance(space, spaces.Box):
+            raise ValueError(
+                f"{type(self).__name__} needs states that are cells, such as the "
+                f"observations Discrete(48), got {space}; take ReturningACL or ACL, which "
+                "are made for states on a scale, or pass a partition of single cells, "
+                "such as Crisp.from_box(space, 10)."
+            )
 
     def _chosen_for(self, name: str, value: Any) -> Any:
         """What a parameter of the rule becomes, where the value leaves it open."""

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from gymnasium.vector import VectorEnv
@@ -15,7 +16,7 @@ from acl_gym.agents.training import Training
 from acl_gym.callbacks.base import Callbacks
 from acl_gym.colony.ant_kernels import branching_factor
 from acl_gym.colony.deposits import checked_deposits
-from acl_gym.colony.local_search import LocalSearch, nearest_neighbours
+from acl_gym.colony.local_search import METHODS, LocalSearch, nearest_neighbours
 from acl_gym.colony.solutions import Solutions
 from acl_gym.colony.tours import Tours, nearest_neighbour_tour, tour_lengths
 from acl_gym.colony.update_rule import TrialResult
@@ -32,6 +33,10 @@ _NEIGHBOURS = 20
 
 _LEAST_DEPOSIT, _MOST_DEPOSIT = 1e-150, 1e150
 """What ants may deposit, so that no sum or quotient of levels leaves the range of floats."""
+
+
+class NoSolutionWarning(UserWarning):
+    """No ant has completed a solution in a whole call of `learn`."""
 
 
 class AntOptimizer(AntAgent):
@@ -57,14 +62,26 @@ class AntOptimizer(AntAgent):
         self._set_tau0()
         self._check_env()
 
-    @staticmethod
-    def usual_ants(n_cities: int, local_search: str | None = None) -> int:
-        """As many as there are cities; with local search 25, as in ACOTSP.
+    _usual_ants: ClassVar[int | None] = None
+    """How many ants are usual, whatever the problem; None: it depends on the cities."""
+
+    @classmethod
+    def usual_ants(cls, n_cities: int, local_search: str | None = None) -> int:
+        """As many as there are cities; with local search 25; of ACS 10; as in ACOTSP.
 
         Args:
-            n_cities: n.
+            n_cities: n, >= 2.
             local_search: as of the constructor.
+
+        Raises:
+            TypeError: `n_cities` is not an integer.
+            ValueError: it is less than 2, or there is no such local search.
         """
+        n_cities = validation.integer("n_cities", n_cities, at_least=2)
+        if local_search is not None:
+            validation.one_of("local_search", local_search, METHODS)
+        if cls._usual_ants is not None:
+            return cls._usual_ants
         return n_cities if local_search is None else 25
 
     def learn(
@@ -94,7 +111,11 @@ class AntOptimizer(AntAgent):
 
         Raises:
             ValueError: a solution has a cost for which ants can deposit nothing.
+
+        Warns:
+            NoSolutionWarning: in no trial has an ant come to a terminal state.
         """
+        has_solved, first = False, self.trials
         budget = (total_timesteps, trials, callback, log_interval, progress_bar)
         with Training(self, *budget) as training:
             while training.next_trial():
@@ -105,7 +126,17 @@ class AntOptimizer(AntAgent):
                 self._rule.global_update(
                     self.pheromone, result, self.local_decay, self.global_decay
                 )
+                has_solved |= bool(result.terminated.any())
                 training.end_trial(result.costs)
+        if not has_solved and self.trials > first:
+            warnings.warn(
+                f"in {self.trials - first} trials none of {self.num_envs} ants has come to "
+                f"a terminal state within {self.max_steps} steps, so nothing was "
+                "deposited or learned; give them more steps (max_steps), take more ants, "
+                "or set tabu=True so that they do not walk in circles.",
+                NoSolutionWarning,
+                stacklevel=2,
+            )
         return self
 
     @property

@@ -7,7 +7,7 @@ from typing import Any
 
 from gymnasium.vector import VectorEnv
 
-from acl_gym.agents.ant_optimizer import AntOptimizer
+from acl_gym.agents.ant_optimizer import AntOptimizer, NoSolutionWarning
 from acl_gym.agents.of_rule import OfRule
 from acl_gym.colony.ant_rules import (
     AntColonySystemUpdate,
@@ -21,7 +21,7 @@ from acl_gym.partitions import Partition
 from acl_gym.utils.parameters import Parameter
 from acl_gym.utils.typing import FloatArray
 
-__all__ = ["AntColonySystem", "AntSystem", "MaxMinAntSystem"]
+__all__ = ["AntColonySystem", "AntSystem", "MaxMinAntSystem", "NoSolutionWarning"]
 
 
 def _evaporation() -> Parameter:
@@ -33,8 +33,9 @@ def _exponent_of_levels() -> Parameter:
 
 
 def _exponent_of_heuristic() -> Parameter:
-    meaning = "Exponent of the heuristic variables (2.2)"
-    return Parameter(meaning, "beta", scheduled=True, at_least=0)
+    return Parameter(
+        "Exponent of the heuristic variables (2.2)", "beta", scheduled=True, at_least=0
+    )
 
 
 class AntSystem(AntOptimizer):
@@ -212,6 +213,8 @@ class AntColonySystem(AntOptimizer):
         ValueError: a parameter is out of range.
     """
 
+    _usual_ants = 10
+
     q0 = OfRule("Probability to exploit, 1 minus that to explore")
     update_set = OfRule("Which solution deposits")
     local_decay = Parameter(
@@ -266,16 +269,6 @@ class AntColonySystem(AntOptimizer):
             seed=seed,
             n_actions=n_actions,
         )
-
-    @staticmethod
-    def usual_ants(n_cities: int, local_search: str | None = None) -> int:
-        """10, however many cities there are.
-
-        Args:
-            n_cities: n.
-            local_search: as of the constructor.
-        """
-        return 10
 
     def parameters(self) -> dict[str, Any]:
         """The keyword arguments of the constructor, except `heuristic`, an array."""

@@ -93,6 +93,8 @@ class TravellingSalesman(ControlSystem):
                 "metric is for coordinates alone, got "
                 f"{validation.shown(self.metric)} with {' and '.join(given) or 'none'}."
             )
+        for name in given:
+            _refuse_others(name, getattr(self, name))
         if self.tsplib is not None:
             return read_tsplib(self.tsplib)
         if self.distances is not None:
@@ -271,6 +273,30 @@ class TravellingSalesman(ControlSystem):
             count = min(self.n_cities, _MOST_EVALUATED)
             cities = np.arange(count) * self.n_cities // count
         return self.starting_in(cities).T.copy()
+
+
+def _refuse_others(name: str, value: Any) -> None:
+    """Say what to make of a graph, or of what is no instance.
+
+    Raises:
+        TypeError: the value can be neither an instance nor a name of one, or is a graph.
+    """
+    is_graph = hasattr(value, "nodes") and hasattr(value, "edges")
+    known = isinstance(value, (TravellingSalesmanInstance, str))
+    if not is_graph and (known or name != "instance"):
+        return
+    remedy = "pass a matrix as distances, points as coordinates, a file as tsplib"
+    if is_graph:
+        remedy = (
+            "of a networkx graph make instance=TravellingSalesmanInstance."
+            "from_networkx(graph)"
+        )
+    wanted = "the name of an instance, or a TravellingSalesmanInstance"
+    if name != "instance":
+        wanted = "an array or a path"
+    raise TypeError(
+        f"{name} must be {wanted}, got {validation.shown(value)}; {remedy}."
+    )
 
 
 def instance_of(system: ControlSystem) -> TravellingSalesmanInstance:

@@ -10,7 +10,11 @@ import numpy as np
 from gymnasium import spaces
 
 from acl_gym.envs.control.system import ControlSystem, SlotError
-from acl_gym.envs.graph.instances import TravellingSalesmanInstance, load_instance
+from acl_gym.envs.graph.instances import (
+    OPTIMA,
+    TravellingSalesmanInstance,
+    load_instance,
+)
 from acl_gym.envs.graph.travelling_salesman import kernels
 from acl_gym.envs.graph.travelling_salesman.kernels import (
     ARCS,
@@ -279,24 +283,20 @@ def _refuse_others(name: str, value: Any) -> None:
     """Say what to make of a graph, or of what is no instance.
 
     Raises:
-        TypeError: the value can be neither an instance nor a name of one, or is a graph.
+        TypeError: the value is a graph of networkx.
+        ValueError: it is to be an instance, and is neither that nor the name of one.
     """
-    is_graph = hasattr(value, "nodes") and hasattr(value, "edges")
-    known = isinstance(value, (TravellingSalesmanInstance, str))
-    if not is_graph and (known or name != "instance"):
-        return
-    remedy = "pass a matrix as distances, points as coordinates, a file as tsplib"
-    if is_graph:
-        remedy = (
-            "of a networkx graph make instance=TravellingSalesmanInstance."
-            "from_networkx(graph)"
+    if hasattr(value, "nodes") and hasattr(value, "edges"):
+        raise TypeError(
+            f"{name} must not be a graph, got {validation.shown(value)}; pass "
+            "instance=TravellingSalesmanInstance.from_networkx(graph)."
         )
-    wanted = "the name of an instance, or a TravellingSalesmanInstance"
-    if name != "instance":
-        wanted = "an array or a path"
-    raise TypeError(
-        f"{name} must be {wanted}, got {validation.shown(value)}; {remedy}."
-    )
+    if name == "instance" and not isinstance(value, (TravellingSalesmanInstance, str)):
+        raise ValueError(
+            f"instance must be one of {', '.join(map(repr, OPTIMA))} or a "
+            f"TravellingSalesmanInstance, got {validation.shown(value)}; pass a matrix as "
+            "distances, points as coordinates, a file as tsplib."
+        )
 
 
 def instance_of(system: ControlSystem) -> TravellingSalesmanInstance:

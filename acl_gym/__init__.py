@@ -41,6 +41,7 @@ if TYPE_CHECKING:
         Weighted,
     )
     from acl_gym.deposits import Deposit, FunctionDeposit, InverseCost, Rank, Return
+    from acl_gym.envs.graph.cities import TravellingSalesmanInstance
     from acl_gym.envs.plant import plant
     from acl_gym.envs.wrappers.scaling import ScaledObservation, ScaledVectorObservation
     from acl_gym.envs.wrappers.waiting import WaitingVectorEnv
@@ -101,6 +102,7 @@ _PUBLIC = {
     "Steps": "acl_gym.costs",
     "Sum": "acl_gym.costs",
     "TensorBoardLog": "acl_gym.callbacks",
+    "TravellingSalesmanInstance": "acl_gym.envs.graph.cities",
     "UpdateRule": "acl_gym.colony.update_rule",
     "VectorEnvAdapter": "acl_gym.sb3.adapter",
     "WaitingVectorEnv": "acl_gym.envs.wrappers.waiting",
@@ -157,6 +159,7 @@ __all__ = [
     "Steps",
     "Sum",
     "TensorBoardLog",
+    "TravellingSalesmanInstance",
     "UpdateRule",
     "VectorEnvAdapter",
     "WaitingVectorEnv",

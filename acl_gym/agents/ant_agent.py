@@ -6,10 +6,11 @@ from collections.abc import Callable, Mapping
 from typing import Any, ClassVar
 
 import numpy as np
+from gymnasium import spaces
 from gymnasium.vector import VectorEnv
 from numpy.typing import ArrayLike, NDArray
 
-from acl_gym.agents.base import TabularAgent
+from acl_gym.agents.base import TabularAgent, time_limit
 from acl_gym.agents.saving import with_prefix
 from acl_gym.colony.ant_rule import AntRule, check_flag
 from acl_gym.colony.candidates import NONE, candidate_lists, inverse_distances
@@ -20,7 +21,8 @@ from acl_gym.colony.local_search import METHODS
 from acl_gym.colony.pheromone import Pheromone
 from acl_gym.colony.schedules import Setting, schedule_from_settings
 from acl_gym.colony.selection import choose_actions
-from acl_gym.envs.graph.travelling_salesman import TravellingSalesmanVectorEnv
+from acl_gym.envs.graph.cities import TravellingSalesmanInstance
+from acl_gym.envs.graph.travelling_salesman.lookup import salesman_of
 from acl_gym.partitions import Partition
 from acl_gym.policies import TablePolicy
 from acl_gym.utils import validation
@@ -51,6 +53,7 @@ class AntAgent(TabularAgent):
         candidates: see `AntSystem`.
         local_search: see `AntSystem`.
         deposit: see `AntSystem`.
+        symmetric: see `AntSystem`.
         tabu: see `AntSystem`.
         walk: see `AntSystem`.
         max_steps: see `TabularAgent`.
@@ -89,6 +92,7 @@ class AntAgent(TabularAgent):
         candidates: int | str | None,
         local_search: str | None,
         deposit: str | Deposit | Callable[[FloatArray], FloatArray],
+        symmetric: bool | None,
         tabu: bool,
         walk: bool,
         max_steps: int | None,
@@ -105,6 +109,8 @@ class AntAgent(TabularAgent):
             candidates = validation.integer("candidates", candidates, at_least=1)
         if local_search is not None:
             validation.one_of("local_search", local_search, METHODS)
+        if symmetric is not None:
+            check_flag("symmetric", symmetric)
         check_flag("tabu", tabu)
         check_flag("walk", walk)
         self.tau0, self.deposit = tau0, as_deposit(deposit)
@@ -116,19 +122,33 @@ class AntAgent(TabularAgent):
             )
         self.tabu, self.walk = tabu, walk
         self._local_search = local_search
+        if partition is None:
+            self._check_states(env)
+        self._salesman = salesman_of(env)
+        if max_steps is None and self._salesman is not None:
+            # One step more than a tour, so that its end is never a truncation as well.
+            steps = self._salesman.instance.n_cities + 1
+            max_steps = min(time_limit(env) or steps, steps)
         super().__init__(
             env, partition, max_steps=max_steps, seed=seed, n_actions=n_actions
         )
-        if isinstance(candidates, str):
-            # Elsewhere a list is never used up, and would rule other actions out.
-            candidates = None if self._salesman is None else USUAL_CANDIDATES
-        self._candidates = candidates
         if self.partition.cells_per_state > 1:
             raise ValueError(
                 "partition must have one cell per state, such as Discrete or Crisp, got "
-                f"{validation.shown(self.partition)}."
+                f"{validation.shown(self.partition)}; take one of these, or an agent for "
+                "states that share cells, ReturningACL or ACL."
             )
         self._rule = rule
+        if symmetric is not None:
+            rule.change("symmetric", symmetric)
+        # What is to be chosen for the environment, as soon as there is one.
+        open_ones = {
+            "heuristic": heuristic is None and env is None,
+            "candidates": isinstance(candidates, str),
+            "symmetric": symmetric is None,
+        }
+        self._open = {name for name, is_open in open_ones.items() if is_open}
+        self._candidates = None if isinstance(candidates, str) else candidates
         self.pheromone = Pheromone(
             self.partition.n_cells,
             self.n_actions,
@@ -138,12 +158,22 @@ class AntAgent(TabularAgent):
             self._at_first("beta"),
         )
         self._tau0_is_due, self._levels_are_set = True, False
+        self._settle()
         self._set_candidates()
 
     @property
     def update(self) -> AntRule:
         """The update rule, with what it remembers; fixed once the agent is made."""
         return self._rule
+
+    @update.setter
+    def update(self, value: AntRule) -> None:
+        raise fixed("update", value)
+
+    @property
+    def instance(self) -> TravellingSalesmanInstance | None:
+        """The cities, on the travelling salesman problem; else None."""
+        return None if self._salesman is None else self._salesman.instance
 
     @property
     def best_cost(self) -> float:
@@ -190,6 +220,15 @@ class AntAgent(TabularAgent):
         raise fixed("local_search", value)
 
     @property
+    def symmetric(self) -> bool:
+        """Whether deposits are symmetric; fixed once the agent is made."""
+        return self._rule.symmetric
+
+    @symmetric.setter
+    def symmetric(self, value: bool | None) -> None:
+        raise fixed("symmetric", value)
+
+    @property
     def heuristic(self) -> FloatArray | None:
         """The heuristic variables eta, `(n_cells, n_actions)`, read-only; None: 1."""
         return self.pheromone.heuristic
@@ -198,11 +237,39 @@ class AntAgent(TabularAgent):
     def heuristic(self, value: Heuristic | None) -> None:
         raise fixed("heuristic", value)
 
-    @property
-    def _salesman(self) -> TravellingSalesmanVectorEnv | None:
-        """The travelling salesman's environment below all wrappers, if it is that."""
-        base = None if self.env is None else self.env.unwrapped
-        return base if isinstance(base, TravellingSalesmanVectorEnv) else None
+    def _check_states(self, env: Any) -> None:
+        """Refuse observations of which no partition of single cells follows.
+
+        Raises:
+            ValueError: they are numbers on a scale.
+        """
+        space = getattr(env, "single_observation_space", None)
+        if isinstance(space, spaces.Box):
+            raise ValueError(
+                f"{type(self).__name__} needs states that are cells, such as the "
+                f"observations Discrete(48), got {space}; take ReturningACL or ACL, which "
+                "are made for states on a scale, or pass a partition of single cells, "
+                "such as Crisp.from_box(space, 10)."
+            )
+
+    def _chosen_for(self, name: str, value: Any) -> Any:
+        """What a parameter of the rule becomes, where the value leaves it open."""
+        return value
+
+    def _settle(self) -> None:
+        """Choose for the environment what was left open."""
+        if self.env is None:
+            return
+        # Elsewhere a list is never used up, and would rule other actions out.
+        if self._salesman is not None:
+            if "heuristic" in self._open:
+                eta = inverse_distances(self._salesman.instance.distances)
+                self.pheromone.heuristic = eta
+            if "candidates" in self._open:
+                self._candidates = USUAL_CANDIDATES
+            if "symmetric" in self._open:
+                self._rule.change("symmetric", self._salesman.instance.symmetric)
+        self._open.clear()
 
     def _chosen_heuristic(self, heuristic: Heuristic | str | None) -> FloatArray | None:
         """The heuristic variables as an array; see `AntSystem`."""
@@ -216,7 +283,7 @@ class AntAgent(TabularAgent):
                     "the environment and the partition."
                 )
         if salesman is not None and (heuristic is None or isinstance(heuristic, str)):
-            heuristic = inverse_distances(salesman.distances)
+            heuristic = inverse_distances(salesman.instance.distances)
         shape = self.partition.n_cells, self.n_actions
         return as_heuristic(heuristic, self.env, self.partition, shape)
 
@@ -311,11 +378,11 @@ class AntAgent(TabularAgent):
             "candidates": self.candidates,
             "local_search": self.local_search,
             "deposit": to_settings(self.deposit),
-            "symmetric": self._rule.symmetric,
             "tabu": self.tabu,
             "walk": self.walk,
             "max_steps": self.max_steps,
             "seed": self.seed,
+            **self._rule.parameters(),
         }
 
     @classmethod
@@ -351,6 +418,10 @@ class AntAgent(TabularAgent):
     ) -> None:
         super()._restore(header, arrays)
         self._set_arrays(arrays)
+        self._open.discard("heuristic")
+        if self.tau0 != header["parameters"]["tau0"]:  # which `load` was given
+            self._levels_are_set |= self.trials > 0
+            self._tau0_is_due = True
         self.pheromone.heuristic = as_heuristic(
             arrays.get("heuristic"), None, self.partition, self._table.shape
         )

@@ -2,27 +2,30 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from gymnasium.vector import VectorEnv
 from numpy.typing import NDArray
 
 from acl_gym.agents.ant_agent import UNKNOWN_TAU0, AntAgent
+from acl_gym.agents.same_task import is_same_task
 from acl_gym.agents.training import Training
 from acl_gym.callbacks.base import Callbacks
 from acl_gym.colony.ant_kernels import branching_factor
 from acl_gym.colony.deposits import checked_deposits
-from acl_gym.colony.local_search import LocalSearch, nearest_neighbours
+from acl_gym.colony.local_search import METHODS, LocalSearch, nearest_neighbours
 from acl_gym.colony.solutions import Solutions
 from acl_gym.colony.tours import Tours, nearest_neighbour_tour, tour_lengths
 from acl_gym.colony.update_rule import TrialResult
 from acl_gym.envs.graph.instances import TravellingSalesmanInstance
-from acl_gym.envs.graph.travelling_salesman import TravellingSalesmanVectorEnv
-from acl_gym.evaluation.rollout import Outcome
+from acl_gym.envs.graph.travelling_salesman.lookup import Salesman, salesman_of
+from acl_gym.evaluation.steps import Outcome
 from acl_gym.partitions import Partition
 from acl_gym.utils import validation
+from acl_gym.utils.serialization import from_json, to_settings
 from acl_gym.utils.typing import BoolArray, CellArray, FloatArray, IntArray, Row
 
 _NEIGHBOURS = 20
@@ -30,6 +33,10 @@ _NEIGHBOURS = 20
 
 _LEAST_DEPOSIT, _MOST_DEPOSIT = 1e-150, 1e150
 """What ants may deposit, so that no sum or quotient of levels leaves the range of floats."""
+
+
+class NoSolutionWarning(UserWarning):
+    """No ant has completed a solution in a whole call of `learn`."""
 
 
 class AntOptimizer(AntAgent):
@@ -55,14 +62,26 @@ class AntOptimizer(AntAgent):
         self._set_tau0()
         self._check_env()
 
-    @staticmethod
-    def usual_ants(n_cities: int, local_search: str | None = None) -> int:
-        """As many as there are cities; with local search 25, as in ACOTSP.
+    _usual_ants: ClassVar[int | None] = None
+    """How many ants are usual, whatever the problem; None: it depends on the cities."""
+
+    @classmethod
+    def usual_ants(cls, n_cities: int, local_search: str | None = None) -> int:
+        """As many as there are cities; with local search 25; of ACS 10; as in ACOTSP.
 
         Args:
-            n_cities: n.
+            n_cities: n, >= 2.
             local_search: as of the constructor.
+
+        Raises:
+            TypeError: `n_cities` is not an integer.
+            ValueError: it is less than 2, or there is no such local search.
         """
+        n_cities = validation.integer("n_cities", n_cities, at_least=2)
+        if local_search is not None:
+            validation.one_of("local_search", local_search, METHODS)
+        if cls._usual_ants is not None:
+            return cls._usual_ants
         return n_cities if local_search is None else 25
 
     def learn(
@@ -92,7 +111,11 @@ class AntOptimizer(AntAgent):
 
         Raises:
             ValueError: a solution has a cost for which ants can deposit nothing.
+
+        Warns:
+            NoSolutionWarning: in no trial has an ant come to a terminal state.
         """
+        has_solved, first = False, self.trials
         budget = (total_timesteps, trials, callback, log_interval, progress_bar)
         with Training(self, *budget) as training:
             while training.next_trial():
@@ -103,14 +126,23 @@ class AntOptimizer(AntAgent):
                 self._rule.global_update(
                     self.pheromone, result, self.local_decay, self.global_decay
                 )
+                has_solved |= bool(result.terminated.any())
                 training.end_trial(result.costs)
+        if not has_solved and self.trials > first:
+            warnings.warn(
+                f"in {self.trials - first} trials none of {self.num_envs} ants has come to "
+                f"a terminal state within {self.max_steps} steps, so nothing was "
+                "deposited or learned; give them more steps (max_steps), take more ants, "
+                "or set tabu=True so that they do not walk in circles.",
+                NoSolutionWarning,
+                stacklevel=2,
+            )
         return self
 
     @property
     def builds_tours(self) -> bool:
         """Whether whole tours are built at once, without stepping the environment."""
-        # Subclasses and wrappers may change what a step does.
-        return type(self.env) is TravellingSalesmanVectorEnv and not self.walk
+        return self._salesman is not None and self._salesman.is_plain and not self.walk
 
     def _set_tau0(self) -> None:
         """Set tau0 by the formula of the literature, as soon as that is possible.
@@ -123,8 +155,9 @@ class AntOptimizer(AntAgent):
             return
         tau0, salesman = self.tau0, self._salesman
         if tau0 is None and salesman is not None:
-            tour = nearest_neighbour_tour(salesman.distances, 0)[None]
-            length = tour_lengths(tour, salesman.distances)
+            distances = salesman.instance.distances
+            tour = nearest_neighbour_tour(distances, 0)[None]
+            length = tour_lengths(tour, distances)
             if not length[0] > 0.0:
                 return  # the first trial tells what is wrong
             tau0 = self._formula(float(self._fitness(length)[0]), tour.size)
@@ -161,13 +194,12 @@ class AntOptimizer(AntAgent):
 
     def _build_tours(self) -> TrialResult:
         """Let all ants build their tours at once, and improve them by local search."""
-        env = self._salesman
-        if env is None:  # pragma: no cover - builds_tours says it is there
+        salesman = self._salesman
+        if salesman is None:  # pragma: no cover - builds_tours says it is there
             raise TypeError("env is not the travelling salesman's")
-        n, m = env.instance.n_cities, self.num_envs
+        distances, start = salesman.instance.distances, salesman.start
+        n, m = len(distances), self.num_envs
         self._next_seed()  # which ants that walk would give to the environment
-        system: Any = env.system
-        start: str | int = system.start
         starts = np.full(m, start)
         if isinstance(start, str):
             starts = self.rng.integers(n, size=m)
@@ -180,7 +212,7 @@ class AntOptimizer(AntAgent):
         draws = self.rng.random((n, 2, m))
         self._rule.build(self.pheromone, starts, draws, self._lists, self._decay, tours)
         if self._search is None:
-            lengths = tour_lengths(tours, env.distances)
+            lengths = tour_lengths(tours, distances)
         else:
             lengths = self._search.improve(tours)
         complete = np.ones(m, np.bool_)
@@ -266,28 +298,63 @@ class AntOptimizer(AntAgent):
         return row
 
     def set_env(self, env: VectorEnv[Any, Any, Any]) -> None:
-        """See `TabularAgent.set_env`.
+        """Learn on another environment from now on; its number of slots may differ.
+
+        The pheromone stays. The best solution stays only where the task is known to be
+        the same: the same instance of the travelling salesman problem, the same object
+        below the wrappers, equal systems of this package, or slots that Gymnasium made
+        by the same id with the same arguments. Of any other task its cost would say
+        nothing, so the colony begins without one. An agent that had no environment, such
+        as one read from a file, keeps it.
 
         Raises:
-            ValueError: it is another travelling salesman problem than that whose best
-                tour is known.
+            TypeError: `env` is not a vector environment.
+            ValueError: it does not fit the table or the parameters, or is another
+                travelling salesman problem than that by whose distances ants choose.
+            RuntimeError: a trial is under way.
         """
-        before = self.env
+        before, known = self.env, self._salesman
         super().set_env(env)
         try:
+            self._salesman = salesman_of(env)
             self._check_env()
+            same = before is None or self._is_same_task(before, known)
+            if same:
+                self._check_best()
         except ValueError:
-            if before is not None:  # which the agent goes on with
+            self._salesman = known
+            if before is None:
+                self.env = self._rollout = None
+            else:  # which the agent goes on with
                 super().set_env(before)
-                self._check_env()
+            self._check_env()
             raise
+        if not same:
+            self._rule.forget()
+            self._result = None
+        if self._open:
+            self._settle()
+            self._set_candidates()
         self._set_tau0()
+
+    def _is_same_task(self, before: Any, known: Salesman | None) -> bool:
+        """Whether the environment poses the task of that which was there before."""
+        if known is not None or self._salesman is not None:
+            # Another instance is refused.
+            return known is not None and self._salesman is not None
+        return is_same_task(before, self.env)
 
     def _restore(
         self, header: dict[str, Any], arrays: Mapping[str, NDArray[Any]]
     ) -> None:
         super()._restore(header, arrays)
         self._rule.check_fits(self.pheromone)
+        saved = from_json(header["parameters"])["deposit"]
+        if to_settings(self.deposit) != saved:  # `load` was given another
+            for solution in self._rule.solutions:
+                if solution.found:
+                    fitness = self._fitness(np.array([solution.cost]))
+                    solution.fitness = float(fitness[0])
         self._check_env()
 
     def _check_env(self) -> None:
@@ -295,7 +362,7 @@ class AntOptimizer(AntAgent):
         self._search: LocalSearch | None = None
         if self.env is None:
             return
-        best, salesman = self._rule.best, self._salesman
+        salesman = self._salesman
         if salesman is not None:
             known, instance = self._instance, salesman.instance
             if known is not None and instance != known:
@@ -313,31 +380,22 @@ class AntOptimizer(AntAgent):
         if self._local_search is not None:
             if salesman is None or not self.builds_tours:
                 raise ValueError(
-                    "local_search needs the travelling salesman's environment, not "
-                    f"wrapped, and walk=False, got {validation.shown(self.env)} and "
-                    f"walk={self.walk}; leave local_search out."
+                    "local_search needs the travelling salesman's environment, without "
+                    f"wrappers of your own, and walk=False, got {validation.shown(self.env)} "
+                    f"and walk={self.walk}; leave local_search out."
                 )
-            distances = salesman.distances
+            distances = salesman.instance.distances
             near = nearest_neighbours(distances, min(_NEIGHBOURS, len(distances) - 1))
             self._search = LocalSearch(self._local_search, distances, near)
-        if best.found and salesman is not None:
-            length = tour_lengths(best.cells[None], salesman.distances)[0]
+
+    def _check_best(self) -> None:
+        """Check that the best tour is one through the cities of the environment."""
+        best, instance = self._rule.best, self.instance
+        if best.found and instance is not None:
+            length = tour_lengths(best.cells[None], instance.distances)[0]
             if not np.isclose(length, best.cost, rtol=1e-9):
                 raise ValueError(
                     "env must be the instance on which the best tour has a length of "
                     f"{best.cost:g}, got one where it has {length:g}; make a new agent "
                     "for another instance."
                 )
-
-
-def is_symmetric(env: Any, symmetric: bool | None) -> bool:
-    """Whether deposits are symmetric: as given, or as the instance is.
-
-    Args:
-        env: the environment, or None.
-        symmetric: as given; None: True on a symmetric travelling salesman problem.
-    """
-    if symmetric is not None:
-        return symmetric
-    base = getattr(env, "unwrapped", None)
-    return isinstance(base, TravellingSalesmanVectorEnv) and base.instance.symmetric

@@ -7,7 +7,8 @@ from typing import Any
 
 from gymnasium.vector import VectorEnv
 
-from acl_gym.agents.ant_optimizer import AntOptimizer, is_symmetric
+from acl_gym.agents.ant_optimizer import AntOptimizer, NoSolutionWarning
+from acl_gym.agents.of_rule import OfRule
 from acl_gym.colony.ant_rules import (
     AntColonySystemUpdate,
     AntSystemUpdate,
@@ -20,7 +21,7 @@ from acl_gym.partitions import Partition
 from acl_gym.utils.parameters import Parameter
 from acl_gym.utils.typing import FloatArray
 
-__all__ = ["AntColonySystem", "AntSystem", "MaxMinAntSystem"]
+__all__ = ["AntColonySystem", "AntSystem", "MaxMinAntSystem", "NoSolutionWarning"]
 
 
 def _evaporation() -> Parameter:
@@ -32,8 +33,9 @@ def _exponent_of_levels() -> Parameter:
 
 
 def _exponent_of_heuristic() -> Parameter:
-    meaning = "Exponent of the heuristic variables (2.2)"
-    return Parameter(meaning, "beta", scheduled=True, at_least=0)
+    return Parameter(
+        "Exponent of the heuristic variables (2.2)", "beta", scheduled=True, at_least=0
+    )
 
 
 class AntSystem(AntOptimizer):
@@ -115,6 +117,11 @@ class AntSystem(AntOptimizer):
         (48, True)
     """
 
+    update_set = OfRule("Which solutions deposit")
+    elitists = OfRule("How many times the best solution so far deposits in addition")
+    ranks = OfRule(
+        "One more than how many solutions of a trial deposit, by their ranks"
+    )
     global_decay = _evaporation()
     alpha = _exponent_of_levels()
     beta = _exponent_of_heuristic()
@@ -142,13 +149,10 @@ class AntSystem(AntOptimizer):
         seed: int | None = None,
         n_actions: int | None = None,
     ) -> None:
-        rule = AntSystemUpdate(
-            update_set, elitists, ranks, is_symmetric(env, symmetric)
-        )
         super().__init__(
             env,
             partition,
-            rule=rule,
+            rule=AntSystemUpdate(update_set, elitists, ranks),
             tau0=tau0,
             global_decay=global_decay,
             alpha=alpha,
@@ -157,20 +161,13 @@ class AntSystem(AntOptimizer):
             candidates=candidates,
             local_search=local_search,
             deposit=deposit,
+            symmetric=symmetric,
             tabu=tabu,
             walk=walk,
             max_steps=max_steps,
             seed=seed,
             n_actions=n_actions,
         )
-
-    def parameters(self) -> dict[str, Any]:
-        """The keyword arguments of the constructor, except `heuristic`, an array."""
-        rule: Any = self.update
-        own = {
-            name: getattr(rule, name) for name in ("update_set", "elitists", "ranks")
-        }
-        return {**super().parameters(), **own}
 
 
 class AntColonySystem(AntOptimizer):
@@ -216,13 +213,10 @@ class AntColonySystem(AntOptimizer):
         ValueError: a parameter is out of range.
     """
 
-    q0 = Parameter(
-        "Probability to exploit, 1 minus that to explore",
-        "q_0",
-        fixed=True,
-        at_least=0,
-        at_most=1,
-    )
+    _usual_ants = 10
+
+    q0 = OfRule("Probability to exploit, 1 minus that to explore")
+    update_set = OfRule("Which solution deposits")
     local_decay = Parameter(
         "Decay of each component on the way (2.6)", "gamma", at_least=0, below=1
     )
@@ -255,12 +249,11 @@ class AntColonySystem(AntOptimizer):
         seed: int | None = None,
         n_actions: int | None = None,
     ) -> None:
-        self.q0, self.local_decay = q0, local_decay
-        rule = AntColonySystemUpdate(self.q0, update_set, is_symmetric(env, symmetric))
+        self.local_decay = local_decay
         super().__init__(
             env,
             partition,
-            rule=rule,
+            rule=AntColonySystemUpdate(q0, update_set),
             tau0=tau0,
             global_decay=global_decay,
             alpha=alpha,
@@ -269,6 +262,7 @@ class AntColonySystem(AntOptimizer):
             candidates=candidates,
             local_search=local_search,
             deposit=deposit,
+            symmetric=symmetric,
             tabu=tabu,
             walk=walk,
             max_steps=max_steps,
@@ -276,25 +270,9 @@ class AntColonySystem(AntOptimizer):
             n_actions=n_actions,
         )
 
-    @staticmethod
-    def usual_ants(n_cities: int, local_search: str | None = None) -> int:
-        """10, however many cities there are.
-
-        Args:
-            n_cities: n.
-            local_search: as of the constructor.
-        """
-        return 10
-
     def parameters(self) -> dict[str, Any]:
         """The keyword arguments of the constructor, except `heuristic`, an array."""
-        rule: Any = self.update
-        return {
-            **super().parameters(),
-            "q0": self.q0,
-            "local_decay": self.local_decay,
-            "update_set": rule.update_set,
-        }
+        return {**super().parameters(), "local_decay": self.local_decay}
 
 
 class MaxMinAntSystem(AntOptimizer):
@@ -347,6 +325,10 @@ class MaxMinAntSystem(AntOptimizer):
         ValueError: a parameter is out of range.
     """
 
+    update_set = OfRule("Which solution deposits")
+    p_best = OfRule("Probability of the best tour where ants have converged, or None")
+    smoothing = OfRule("How far levels move to tau_max where ants have converged")
+    patience = OfRule("Trials without a better solution before levels move")
     global_decay = _evaporation()
     alpha = _exponent_of_levels()
     beta = _exponent_of_heuristic()
@@ -375,19 +357,14 @@ class MaxMinAntSystem(AntOptimizer):
         seed: int | None = None,
         n_actions: int | None = None,
     ) -> None:
-        alone = local_search is None
-        if update_set is None:
-            update_set = "mostly-trial-best" if alone else "mixed"
+        self._local_search = local_search
         if global_decay is None:
-            global_decay = 0.02 if alone else 0.2
-        if p_best == "usual":
-            p_best = 0.05 if alone else None
+            global_decay = 0.02 if local_search is None else 0.2
         rule = MaxMinUpdate(
-            update_set,
-            p_best,  # type: ignore[arg-type]  # the rule checks it
+            self._chosen_for("update_set", update_set),
+            self._chosen_for("p_best", p_best),
             smoothing,
             patience,
-            is_symmetric(env, symmetric),
         )
         super().__init__(
             env,
@@ -401,6 +378,7 @@ class MaxMinAntSystem(AntOptimizer):
             candidates=candidates,
             local_search=local_search,
             deposit=deposit,
+            symmetric=symmetric,
             tabu=tabu,
             walk=walk,
             max_steps=max_steps,
@@ -408,9 +386,10 @@ class MaxMinAntSystem(AntOptimizer):
             n_actions=n_actions,
         )
 
-    def parameters(self) -> dict[str, Any]:
-        """The keyword arguments of the constructor, except `heuristic`, an array."""
-        rule: Any = self.update
-        names = ("update_set", "p_best", "smoothing", "patience")
-        own = {name: getattr(rule, name) for name in names}
-        return {**super().parameters(), **own}
+    def _chosen_for(self, name: str, value: Any) -> Any:
+        alone = self._local_search is None
+        if name == "update_set" and value is None:
+            return "mostly-trial-best" if alone else "mixed"
+        if name == "p_best" and isinstance(value, str) and value == "usual":
+            return 0.05 if alone else None
+        return value

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from abc import abstractmethod
 from typing import Any, ClassVar, Self
 
@@ -17,7 +18,8 @@ from acl_gym.colony.greedy import greedy_actions
 from acl_gym.envs.control.environments import ControlVectorEnv
 from acl_gym.envs.control.lookup import signals_of
 from acl_gym.envs.control.signals import Signals
-from acl_gym.evaluation.rollout import Outcome, Rollout
+from acl_gym.evaluation.rollout import Rollout
+from acl_gym.evaluation.steps import Outcome
 from acl_gym.export import Source
 from acl_gym.partitions import Partition, checked_partition, locate_checked
 from acl_gym.partitions.automatic import automatic_partition
@@ -35,6 +37,8 @@ from acl_gym.utils.typing import (
     Row,
 )
 from acl_gym.utils.vector_envs import require_vector_env
+
+logger = logging.getLogger("acl_gym")
 
 BYTES_PER_PAIR = 20
 """Memory of an entry of a table at least: value, probability and rank."""
@@ -223,6 +227,22 @@ class TabularAgent(SavedAgent):
             raise ValueError("the agent has no environment; call set_env(env) first.")
         return self._n_actions
 
+    @n_actions.setter
+    def n_actions(self, value: int) -> None:
+        raise fixed("n_actions", value)
+
+    @property
+    def seed(self) -> int | None:
+        """What the random numbers began with; `set_random_seed` begins anew."""
+        return self._seed
+
+    @seed.setter
+    def seed(self, value: int | None) -> None:
+        raise AttributeError(
+            f"seed is what the random numbers began with, got {validation.shown(value)}; "
+            f"call set_random_seed({validation.shown(value)}) to begin anew."
+        )
+
     @property
     def rollout(self) -> Rollout:
         """The rollout over the environment's slots."""
@@ -315,7 +335,7 @@ class TabularAgent(SavedAgent):
             TypeError: `seed` is not an integer.
             ValueError: it is negative.
         """
-        self.seed = seed = validation.seed(seed)
+        self._seed = seed = validation.seed(seed)
         learning, predicting, ties = np.random.SeedSequence(seed).spawn(3)
         self.rng = np.random.default_rng(learning)
         self._predict_rng = np.random.default_rng(predicting)
@@ -335,6 +355,12 @@ class TabularAgent(SavedAgent):
         )
 
     def _source(self, inputs: ArrayLike | None = None) -> Source:
+        if self._rollout is not None and self._rollout.action_mask is not None:
+            logger.warning(
+                "The environment does not allow every action in every state. What is "
+                "exported knows nothing of that and may choose an action that is not "
+                "allowed; check what it returns before you apply it."
+            )
         return self.policy._source(inputs)
 
     def _act(
@@ -396,7 +422,11 @@ def time_limit(env: Any) -> int | None:
     limit = getattr(base, "max_episode_steps", None)
     if limit is None and isinstance(base, ControlVectorEnv):
         return None  # it was made without the limit that its id has
-    # A vector of single environments may know its limit by those only.
-    for each in (env, *getattr(base, "envs", ())[:1]):
-        limit = limit or getattr(getattr(each, "spec", None), "max_episode_steps", None)
+    # A vector of single environments may know its limit by those only; its own spec has
+    # the limit of the id, and what the caller said beside it.
+    for each in (*getattr(base, "envs", ())[:1], env):
+        spec = getattr(each, "spec", None)
+        if spec is not None:
+            given = spec.kwargs.get("max_episode_steps", spec.max_episode_steps)
+            limit = limit or given
     return int(limit) if limit and limit > 0 else None

@@ -114,7 +114,8 @@ class ReturningACL(InformedAgent, ColonyAgent):
             slow to step: the single environments of `env` are made anew in a
             `WorkersVectorEnv`, the agent's `env`. The bits are the same for any number.
             None leaves `env` as it is.
-        executor: where workers are, "processes" or "ray", see `WorkersVectorEnv`.
+        executor: where workers are, "processes" or "ray", see `WorkersVectorEnv`; only
+            with `workers`.
 
     Raises:
         TypeError: `env` or `partition` is of the wrong kind.
@@ -208,6 +209,11 @@ class ReturningACL(InformedAgent, ColonyAgent):
     ) -> None:
         if workers is not None:
             env = spread_over_workers(env, workers, executor)
+        elif executor != "processes":
+            raise ValueError(
+                f"executor says where workers are, got {executor!r} without workers; "
+                'pass a number of them as well, such as workers=2, or executor="processes".'
+            )
         self.discount = discount
         self.learning_rate = learning_rate
         self.trust = trust

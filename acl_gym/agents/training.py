@@ -13,7 +13,7 @@ from tqdm.auto import tqdm
 from acl_gym.agents.base import TabularAgent
 from acl_gym.callbacks.base import Callbacks, as_callbacks, is_stop
 from acl_gym.evaluation import reports_returns
-from acl_gym.evaluation.rollout import Outcome
+from acl_gym.evaluation.steps import Outcome
 from acl_gym.partitions import locate_all
 from acl_gym.utils import validation
 from acl_gym.utils.serialization import check_row
@@ -185,6 +185,10 @@ class Training:
 
     def _report(self, row: Row, progress: int) -> None:
         self._bar.update(progress)
+        every = self._log_interval
+        is_due = bool(every and row["trial"] % every == 0)
+        if self._bar.disable and not is_due:
+            return  # a trial of a small colony takes less time than these words
         what = self._reported
         shown = {f"ants' {what}": f"{row[f'ants_{what}']:.1f}"}
         for each in (what, "cost"):  # the cost too if a user's callback added only that
@@ -192,7 +196,7 @@ class Training:
                 shown[f"policy {each}"] = f"{row[f'policy_{each}']:.1f}"
                 break
         self._bar.set_postfix(shown, refresh=False)
-        if self._log_interval and row["trial"] % self._log_interval == 0:
+        if is_due:
             words = "  ".join(f"{name} {value}" for name, value in shown.items())
             self._bar.write(
                 f"trial {row['trial']:>4}  steps {row['env_steps']:>9,}  "

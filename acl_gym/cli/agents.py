@@ -9,7 +9,7 @@ from importlib import import_module
 from typing import Any, NamedTuple
 
 from acl_gym.cli.errors import BadArgumentError, bad_arguments
-from acl_gym.cli.sources import class_node
+from acl_gym.cli.sources import class_node, module_tree
 from acl_gym.utils.validation import Range
 
 OWN_OPTIONS = (
@@ -25,16 +25,19 @@ class AgentKind(NamedTuple):
     Attributes:
         module: where its class is.
         name: of its class.
-        deposits: whether its ants deposit by the costs of solutions: it then needs a
+        deposits: whether its ants deposit by the costs of a trial: it then needs a
             deposit that suits the environment, and learns nothing from equal costs.
         grows: whether it chooses a partition for itself and lets it grow; it then
             learns from few ants.
+        seeks_best: whether it looks for one best solution, through states that are
+            cells; its ants deposit for each solution alone.
     """
 
     module: str
     name: str
     deposits: bool
     grows: bool = False
+    seeks_best: bool = False
 
     def load(self) -> Any:
         """Import the class."""
@@ -47,6 +50,15 @@ AGENTS = {
     ),
     "acl": AgentKind("acl_gym.agents.acl", "ACL", deposits=True),
     "q-learning": AgentKind("acl_gym.agents.q_learning", "QLearning", deposits=False),
+    "ant-system": AgentKind(
+        "acl_gym.agents.ant_system", "AntSystem", deposits=False, seeks_best=True
+    ),
+    "ant-colony-system": AgentKind(
+        "acl_gym.agents.ant_system", "AntColonySystem", deposits=False, seeks_best=True
+    ),
+    "max-min": AgentKind(
+        "acl_gym.agents.ant_system", "MaxMinAntSystem", deposits=False, seeks_best=True
+    ),
 }
 """Value of `--agent` -> the agent; the first is the default, see `settings.agent_with`.
 To add one, add an entry."""
@@ -85,8 +97,9 @@ def parameters(name: str) -> dict[str, Declared]:
     Args:
         name: a key of `AGENTS`.
     """
-    node = class_node(AGENTS[name].module, AGENTS[name].name)
-    numbers = dict(_numbers(node))
+    module = AGENTS[name].module
+    node = class_node(module, AGENTS[name].name)
+    numbers = dict(_numbers(node, module))
     constructor = next(
         each
         for each in node.body
@@ -106,25 +119,32 @@ def parameters(name: str) -> dict[str, Declared]:
     return found
 
 
-def _numbers(node: ast.ClassDef) -> Any:
-    """The attributes that are a `Parameter`, each with what it says of itself."""
+def _numbers(node: ast.ClassDef, module: str) -> Any:
+    """The attributes that declare a parameter, each with what it says of itself."""
+    # A declaration that classes share is what a function of their module returns.
+    shared = {
+        each.name: each.body[-1].value
+        for each in module_tree(module).body
+        if isinstance(each, ast.FunctionDef) and isinstance(each.body[-1], ast.Return)
+    }
     for each in node.body:
         if not (isinstance(each, ast.Assign) and isinstance(each.value, ast.Call)):
             continue
-        call = each.value
-        if isinstance(call.func, ast.Name) and call.func.id == "Parameter":
-            given = {k.arg: ast.literal_eval(k.value) for k in call.keywords}
-            bounds = {
-                bound: given[bound]
-                for bound in Range.__dataclass_fields__
-                if bound in given
-            }
-            meaning = ast.literal_eval(call.args[0])
+        call: Any = each.value
+        call = shared.get(getattr(call.func, "id", ""), call)
+        kind = getattr(getattr(call, "func", None), "id", "")
+        if kind not in ("Parameter", "OfRule"):
+            continue
+        given = {k.arg: ast.literal_eval(k.value) for k in call.keywords}
+        meaning, within = ast.literal_eval(call.args[0]), ""
+        if kind == "Parameter":
+            bounds = {n: given[n] for n in Range.__dataclass_fields__ if n in given}
             within = Range(**bounds).in_words()
-            scheduled = bool(given.get("scheduled", False))
-            for target in each.targets:
-                if isinstance(target, ast.Name):
-                    yield target.id, (scheduled, f"{meaning}, {within}", within)
+        scheduled = bool(given.get("scheduled", False))
+        words = f"{meaning}, {within}" if within else meaning
+        for target in each.targets:
+            if isinstance(target, ast.Name):
+                yield target.id, (scheduled, words, within)
 
 
 def load_agent(path: str) -> Any:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from gymnasium import spaces
 
 from acl_gym import Crisp, CSVLog, Fuzzy, PolicyEvaluation, TensorBoardLog
 from acl_gym.agents.suitable import BY_RANK, PROBES, suitable_deposit
@@ -16,6 +17,7 @@ from acl_gym.cli.agents import AGENTS, name_of
 from acl_gym.cli.common import console, print_json
 from acl_gym.cli.environments import Environment, default_steps
 from acl_gym.cli.errors import (
+    BadArgumentError,
     InterruptedRunError,
     bad_arguments,
     in_words,
@@ -25,6 +27,7 @@ from acl_gym.cli.interrupts import Interruption
 from acl_gym.cli.keeping import EqualCosts, Keeper, PlainProgress
 from acl_gym.colony.deposits import InverseCost
 from acl_gym.envs.control.environments import ControlVectorEnv
+from acl_gym.envs.graph.travelling_salesman.lookup import salesman_of
 from acl_gym.evaluation import reports_returns
 from acl_gym.partitions.automatic import automatic_partition
 
@@ -101,8 +104,10 @@ def begin(
     grows = settings.get("grows")
     if grows is None:
         grows = AGENTS[kind].grows
-    ants = ants or _default_ants(environment, grows)
+    ants = ants or _default_ants(environment, kind, grows, settings)
     env = environment.vector(ants)
+    if AGENTS[kind].seeks_best:
+        _check_states(environment, env, kind, partition)
     steps = max_steps or default_steps(env)
     with bad_arguments():
         grid = None  # the agent chooses, coarse cells to begin with
@@ -157,8 +162,10 @@ def go_on(
         BadArgumentError: a parameter is fixed, or the environment does not fit.
     """
     known = learner.metadata
-    few = AGENTS[name_of(learner)].grows or getattr(learner, "grows", False)
-    ants = ants or _count(known.get("ants"), _default_ants(environment, few))
+    kind = name_of(learner)
+    few = AGENTS[kind].grows or getattr(learner, "grows", False)
+    usual = _default_ants(environment, kind, few, learner.parameters())
+    ants = ants or _count(known.get("ants"), usual)
     how = known.get("evaluation", {})
     how = how if isinstance(how, dict) else {}
     every = evaluate_every or _count(how.get("every"), EVALUATE_EVERY)
@@ -203,15 +210,42 @@ def _as_if_uninterrupted(learner: Any, evaluation: PolicyEvaluation) -> None:
         evaluation.on_training_end(learner)
 
 
-def _default_ants(environment: Environment, few: bool) -> int:
+def _check_states(
+    environment: Environment, env: Any, kind: str, partition: str
+) -> None:
+    """Refuse states on a scale where an agent needs cells.
+
+    Raises:
+        BadArgumentError: the environment has such states, and no cells were asked for.
+    """
+    space = env.single_observation_space
+    if isinstance(space, spaces.Box) and partition != "crisp":
+        raise BadArgumentError(
+            f"--agent {kind} needs states that are cells, such as Discrete(48), but "
+            f"{environment.name} has {space}; take --agent returning or --agent acl, or "
+            "make cells with --partition crisp."
+        )
+
+
+def _default_ants(
+    environment: Environment, kind: str, few: bool, settings: dict[str, Any]
+) -> int:
     """How many slots there are where the user does not say.
 
     Args:
         environment: where.
+        kind: a key of `AGENTS`.
         few: whether the agent learns from few.
+        settings: parameters of the agent.
     """
     if few:
         return FEW_ANTS
+    if AGENTS[kind].seeks_best:
+        salesman = salesman_of(environment.vector(1))
+        if salesman is not None:
+            n_cities, search = salesman.instance.n_cities, settings.get("local_search")
+            with bad_arguments():
+                return int(AGENTS[kind].load().usual_ants(n_cities, search))
     return ANTS if environment.is_own else FOREIGN_ANTS
 
 
@@ -338,10 +372,13 @@ def _failed(error: Exception, learner: Any, begun: int, target: Path) -> Excepti
         back = getattr(rollout, "returned", None)
         costs = np.ones(1) if back is None else rollout.cost[back] + deposit.offset
         if (costs <= 0.0).any():
+            remedy = "deposit=rank:5, or deposit=return if rewards are never negative"
+            if AGENTS[name_of(learner)].seeks_best:
+                remedy = "deposit=return if rewards are never negative"
             words = (
                 "ants deposit 1 / cost, and costs must be > 0, but an ant has cost "
                 f"{costs.min():g}: the rewards are not negative costs. Add --param "
-                "deposit=rank:5, or deposit=return if rewards are never negative."
+                f"{remedy}."
             )
     if learner.trials > begun:
         words += (
@@ -374,11 +411,16 @@ def _summary(plan: Plan, target: Path, best: Path | None) -> dict[str, Any]:
         "trials": learner.trials,
         "env_steps": learner.num_timesteps,
         "seconds": learner.seconds,
+        **({"best_cost": last.get("best_cost")} if _seeks_best(learner) else {}),
         **_measures(last),
         "file": str(target),
         "best": found,
         "rows": learner.history,
     }
+
+
+def _seeks_best(learner: Any) -> bool:
+    return AGENTS[name_of(learner)].seeks_best
 
 
 def _print_rows(plan: Plan, target: Path, best: Path | None) -> None:
@@ -410,6 +452,14 @@ def _print_rows(plan: Plan, target: Path, best: Path | None) -> None:
         lines.append(
             f"The best policy, after trial {cheapest['trial']} with a {what} of "
             f"{cheapest[f'policy_{what}']:.4f}: {best}"
+        )
+    if _seeks_best(learner):
+        found = learner.best_solution
+        lines.append(
+            "No ant has completed a solution."
+            if found is None
+            else f"The best solution of all ants: {len(found)} steps, a cost of "
+            f"{learner.best_cost:.6g}."
         )
     for line in lines:
         screen.print(line, markup=False, highlight=False, soft_wrap=True)

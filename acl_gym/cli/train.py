@@ -23,7 +23,8 @@ HELP = """Learn in an environment, print the progress, and save the agent.
 
 The agent is the returning colony: its ants walk back and remember, and its partition is
 chosen and grows. --agent acl is the colony of the thesis, --agent q-learning is
-Q-learning and Q(lambda). Without --agent, a parameter may choose: --param deposit=rank:5
+Q-learning and Q(lambda); --agent ant-system, ant-colony-system and max-min look for one
+best solution, such as a shortest tour, where states are numbered. Without --agent, a parameter may choose: --param deposit=rank:5
 takes the colony of the thesis, the first that has deposits.
 
 ENV_ID is the id of any Gymnasium environment; "module:id" imports a module first, which
@@ -46,6 +47,7 @@ Examples:
   acl-gym train acl_gym/Pendulum-v0 --param epsilon=linear:0.3:0.01:50
   acl-gym train acl_gym/Pendulum-v0 --env-arg torques=[-1,0,1] --cells 64,65
   acl-gym train CartPole-v1 --param deposit=rank:5
+  acl-gym train acl_gym/TravellingSalesman-v0 --agent max-min --env-arg instance=eil51
   acl-gym train Pendulum-v1 --discretize 5
   acl-gym train my_module:MyEnv-v0 --max-steps 200 --log run.csv --json
 """
@@ -116,6 +118,7 @@ def train(
             metavar="M",
             help="Number of ants: slots of the vector environment.  [default: 5 of the "
             "returning colony; of others 250, or 200 in environments of other packages; "
+            "on the travelling salesman as many as are usual; "
             "with --resume: as before]",
             show_default=False,
         ),
@@ -312,7 +315,7 @@ def train(
                 f"--agent must be {known}, as in {resume}, got {agent!r}; leave it out."
             )
         wanted = list(param or ())
-        if agent is None and not AGENTS[known].deposits:
+        if agent is None and "deposit" not in parameters(known):
             wanted = _without_deposit(wanted, known)
         changes = parse_parameters("--param", wanted, parameters(known))
         for option, value, now in (

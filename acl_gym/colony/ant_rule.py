@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
+from dataclasses import fields, replace
 from typing import Any
 
 import numpy as np
@@ -46,6 +47,31 @@ class AntRule(UpdateRule):
         ):  # the fields of dataclasses are parameters only
             self._best = BestSolution()
         return self._best
+
+    @property
+    def solutions(self) -> list[BestSolution]:
+        """All that are remembered."""
+        return [self.best]
+
+    def forget(self) -> None:
+        """Forget all solutions: those of another task mean nothing."""
+        self._best = BestSolution()
+        self._restored.clear()
+
+    def parameters(self) -> dict[str, Any]:
+        """What the rule was made with, by name."""
+        rule: Any = self  # each rule is a dataclass
+        return {each.name: getattr(self, each.name) for each in fields(rule)}
+
+    def change(self, name: str, value: Any) -> None:
+        """Change a parameter from the next trial on; what is remembered stays.
+
+        Args:
+            name: of the parameter.
+            value: checked as in the constructor, also against the other parameters.
+        """
+        rule: Any = self
+        setattr(self, name, getattr(replace(rule, **{name: value}), name))
 
     @property
     def exploitation(self) -> float:

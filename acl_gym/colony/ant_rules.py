@@ -237,9 +237,16 @@ class MaxMinUpdate(AntRule):
         )
         self.patience = validation.integer("patience", self.patience, at_least=0)
         check_flag("symmetric", self.symmetric)
-        self._forget()
+        self.forget()
 
-    def _forget(self) -> None:
+    @property
+    def solutions(self) -> list[BestSolution]:
+        """See `AntRule`."""
+        return [*super().solutions, self.since_restart]
+
+    def forget(self) -> None:
+        """See `AntRule`."""
+        super().forget()
         self.since_restart = BestSolution()
         self.restarts = 0
         # Trials since the last restart, and since its best solution was found.

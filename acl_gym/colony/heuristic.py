@@ -44,19 +44,20 @@ def checked_heuristic(found: Any, shape: tuple[int, ...]) -> FloatArray:
         ValueError: they do not have that shape, or are not finite, >= 0 and positive
             somewhere in each row.
     """
-    eta = validation.real_array("heuristic", found, finite=False, boolean=True)
-    if eta.shape != shape:
-        raise ValueError(
-            f"heuristic must have shape {shape}, a row per cell and a column per "
-            f"action, got {eta.shape}."
-        )
-    valid = np.isfinite(eta).all(axis=1) & (eta >= 0.0).all(axis=1)
-    valid &= (eta > 0.0).any(axis=1)
+    eta = _table("heuristic", found, shape, finite=False, boolean=True)
+    valid = np.isfinite(eta) & (eta >= 0.0)
     if not valid.all():
-        cell = int(np.argmin(valid))
+        cell, action = np.argwhere(~valid)[0]
         raise ValueError(
-            "heuristic must be finite, >= 0 and positive for at least one action of "
-            f"each cell, got {eta[cell].tolist()!r:.200} in cell {cell}."
+            "heuristic must be finite and >= 0, got "
+            f"{eta[cell, action]:g} for action {action} in cell {cell}."
+        )
+    some = (eta > 0.0).any(axis=1)
+    if not some.all():
+        raise ValueError(
+            "heuristic must be positive for at least one action of each cell, got only 0 "
+            f"in cell {int(np.argmin(some))}; give 1 to all actions of a cell of which "
+            "nothing is known."
         )
     eta.flags.writeable = False
     return eta
@@ -114,11 +115,38 @@ def checked_initial(found: Any, shape: tuple[int, ...]) -> FloatArray:
     Raises:
         ValueError: they do not have that shape, or are not finite.
     """
-    levels = validation.real_array("initial", found)
-    if levels.shape != shape:
-        raise ValueError(
-            f"initial must have shape {shape}, a row per cell and a column per action, "
-            f"got {levels.shape}."
-        )
+    levels = _table("initial", found, shape)
     levels.flags.writeable = False
     return levels
+
+
+def _table(name: str, found: Any, shape: tuple[int, ...], **how: bool) -> FloatArray:
+    """A new array with a row per cell and a column per action.
+
+    Args:
+        name: what messages call it.
+        found: the candidate.
+        shape: `(n_cells, n_actions)`.
+        how: see `validation.real_array`.
+
+    Raises:
+        ValueError: it is no array of numbers, or has another shape.
+    """
+    wanted = f"shape {shape}, a row per cell and a column per action"
+    lengths = {len(row) for row in found} if _is_ragged(found) else set()
+    if len(lengths) > 1:
+        raise ValueError(
+            f"{name} must be an array of real numbers of {wanted}, got {len(found)} rows "
+            f"of {min(lengths)} to {max(lengths)} entries."
+        )
+    table = validation.real_array(name, found, **how)
+    if table.shape != shape:
+        raise ValueError(f"{name} must have {wanted}, got {table.shape}.")
+    return table
+
+
+def _is_ragged(found: Any) -> bool:
+    """Whether it is a list of lists, which may differ in length."""
+    return isinstance(found, (list, tuple)) and all(
+        isinstance(row, (list, tuple)) for row in found
+    )

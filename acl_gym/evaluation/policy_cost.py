@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
-from weakref import WeakSet
 
 import numpy as np
 from gymnasium.vector import VectorEnv
@@ -15,13 +14,13 @@ from acl_gym.colony.costs import Cost, as_cost, solution_costs
 from acl_gym.colony.episodes import Episode
 from acl_gym.envs.control.environments import ControlVectorEnv
 from acl_gym.envs.control.single import ControlEnv
+from acl_gym.evaluation.predictions import chosen_actions, require_predictor
 from acl_gym.evaluation.rollout import Rollout
 from acl_gym.evaluation.rows import rows_of
-from acl_gym.policies import PartitionPolicy
-from acl_gym.utils import validation
+from acl_gym.evaluation.slots import rows_of_states, with_slots_for
 from acl_gym.utils.pictures import guarded, table
 from acl_gym.utils.text import digits
-from acl_gym.utils.typing import FloatArray, IntArray, Predictor, Row
+from acl_gym.utils.typing import FloatArray, Predictor, Row
 from acl_gym.utils.vector_envs import require_vector_env
 
 
@@ -99,23 +98,6 @@ class PolicyCost:
         return float(self.returns.mean())
 
 
-@dataclass(frozen=True)
-class Trajectory:
-    """One episode under a policy.
-
-    Attributes:
-        states: x(0) .. x(n), `(n + 1, state_size)`.
-        actions: u(0) .. u(n - 1) as indices, `(n,)`.
-        costs: stage costs of the steps, `(n,)`.
-        success: whether it reached the goal.
-    """
-
-    states: FloatArray
-    actions: NDArray[np.int64]
-    costs: FloatArray
-    success: bool
-
-
 def evaluate_policy_cost(
     model: Predictor,
     env: VectorEnv[Any, Any, Any],
@@ -155,7 +137,7 @@ def evaluate_policy_cost(
     require_vector_env(env)
     base = env.unwrapped
     if states is not None:
-        states = _rows(states)
+        states = rows_of_states(states)
     if isinstance(base, ControlVectorEnv):
         if states is None:
             states = base.system.evaluation_states()
@@ -180,62 +162,13 @@ def evaluate_policy_cost(
     memory = None
     while rollout.ants.size:
         seen = rows_of(observation, rollout.ants)
-        actions, memory = _chosen(model, seen, rollout, memory)
+        actions, memory = chosen_actions(model, seen, rollout, memory)
         observation = rollout.step(actions).observation
     costs = rollout.cost
     if episode_cost is not None:
         costs = solution_costs(episode_cost, rollout.episodes())
     rollout.release()
     return PolicyCost(costs, rollout.success, rollout.length, -rollout.cost)
-
-
-def _rows(states: Any) -> FloatArray:
-    """Return states, one row for each episode."""
-    rows = validation.real_array("states", states)
-    if rows.ndim == 0:
-        raise ValueError(
-            "states must hold one row for each episode, got "
-            f"{validation.shown(states)}; pass [state]."
-        )
-    return rows
-
-
-def with_slots_for(
-    env: VectorEnv[Any, Any, Any], states: FloatArray | None = None
-) -> VectorEnv[Any, Any, Any]:
-    """An environment for evaluations, with one slot per initial state.
-
-    To evaluate often, call this once and pass the result to `evaluate_policy_cost`
-    each time: it is not copied again.
-
-    Args:
-        env: where to evaluate.
-        states: initial states; None takes `evaluation_states()` of an environment of
-            this package.
-
-    Returns:
-        A new environment of the same system, whose random numbers continue a copy of
-        the stream of `env`; or `env` itself if it is wrapped or of another package, or
-        is such a new environment with the right number of slots.
-
-    Raises:
-        TypeError: `env` is not a vector environment.
-    """
-    require_vector_env(env)
-    base = env.unwrapped
-    if base is not env or not isinstance(base, ControlVectorEnv):
-        return env
-    if states is None:
-        states = base.system.evaluation_states()
-    if base in _OWN and base.num_envs == len(states):
-        return base
-    copied = base.with_slots(len(states))
-    _OWN.add(copied)
-    return copied
-
-
-_OWN: WeakSet[ControlVectorEnv] = WeakSet()
-"""Environments that were made for evaluations, so that nobody else steps them."""
 
 
 def reports_returns(
@@ -279,168 +212,3 @@ def _is_own(env: VectorEnv[Any, Any, Any]) -> bool:
     return isinstance(base, ControlVectorEnv) or any(
         isinstance(each.unwrapped, ControlEnv) for each in singles[:1]
     )
-
-
-def _chosen(
-    model: Predictor, observation: Any, rollout: Rollout, memory: Any
-) -> tuple[NDArray[np.int64], Any]:
-    """Indices of the actions that `model` takes in the active slots, and its state."""
-    allowed = rollout.allowed()
-    if isinstance(model, PartitionPolicy):
-        starts = np.full(rollout.ants.size, rollout.steps == 0)
-        found = model.predict(observation, memory, starts, action_masks=allowed)
-        memory = found[1]
-    else:
-        found = model.predict(observation, deterministic=True)
-    first, count = rollout.first_action, rollout.n_actions
-    return _checked_actions(found, rollout.ants, first, count) - first, memory
-
-
-def _checked_actions(
-    found: Any, slots: IntArray, first: int, count: int
-) -> NDArray[np.int64]:
-    """The actions that `predict` returned, if they are one for each slot.
-
-    Args:
-        found: what it returned.
-        slots: whose observations it was given, `(m,)`.
-        first: the first action of the environment.
-        count: how many actions the environment has.
-
-    Raises:
-        ValueError: they are not integers of the action space, one for each slot.
-    """
-    if not isinstance(found, tuple) or len(found) != 2:
-        raise ValueError(
-            "model.predict must return (actions, state), got "
-            f"{validation.shown(found)}; return (actions, None) where it has no state."
-        )
-    array = validation.as_array(found[0])
-    if array is None or array.dtype.kind not in "iu":
-        what = validation.shown(found[0]) if array is None else f"dtype {array.dtype}"
-        raise ValueError(
-            f"model.predict must return integers as actions, got {what}; round them in "
-            "predict and cast with .astype(np.int64)."
-        )
-    if array.shape == (slots.size, 1) or (array.ndim == 0 and slots.size == 1):
-        array = array.reshape(slots.size)
-    if array.shape != slots.shape:
-        raise ValueError(
-            f"model.predict must return one action for each of the {slots.size} "
-            f"observations, got shape {array.shape}; check that it handles batches."
-        )
-    wrong = (array < first) | (array >= first + count)
-    if wrong.any():
-        j = int(np.argmax(wrong))
-        raise ValueError(
-            f"model.predict must return actions in {first}..{first + count - 1}, got "
-            f"{array[j]} in slot {slots[j]}; check that the model is of this "
-            "environment."
-        )
-    return array.astype(np.int64)
-
-
-def record_trajectory(
-    model: Predictor,
-    env: VectorEnv[Any, Any, Any],
-    state: FloatArray,
-    *,
-    max_steps: int | None = None,
-) -> Trajectory:
-    """Run the policy of `model` once and record every state, action and cost.
-
-    Args:
-        model: see `evaluate_policy_cost`.
-        env: an environment of this package with one slot, wrapped or not. One that is
-            not wrapped is left alone, a wrapped one is left as after a reset.
-        state: the initial state, `(state_size,)`.
-        max_steps: T; None takes that of the environment.
-
-    Raises:
-        TypeError: `model` has no `predict`, or `env` is of another package.
-        ValueError: it has more than one slot.
-    """
-    require_predictor(model)
-    base = control_env(env)
-    if env.num_envs != 1:
-        raise ValueError(f"env must have one slot, got {env.num_envs}.")
-    states_of_one = np.asarray(state)[None]
-    env = with_slots_for(env, states_of_one)
-    base = control_env(env)
-    rollout = Rollout(
-        env, base.system.evaluation_steps if max_steps is None else max_steps
-    )
-    observation = rollout.start(states=states_of_one)
-    states, actions, costs = [base.states[0]], [], []
-    memory = None
-    while rollout.ants.size:
-        action, memory = _chosen(model, observation, rollout, memory)
-        step = rollout.step(action)
-        observation = step.observation
-        states.append(base.states[0])
-        actions.append(int(action[0]))
-        costs.append(float(step.cost[0]))
-    rollout.release()
-    return Trajectory(
-        np.array(states),
-        np.array(actions),
-        np.array(costs),
-        bool(rollout.terminated[0]),
-    )
-
-
-def actions_in(
-    model: Predictor, env: VectorEnv[Any, Any, Any], states: FloatArray
-) -> NDArray[np.int64]:
-    """The action of the policy in each of some states, `(n,)`.
-
-    Args:
-        model: see `evaluate_policy_cost`.
-        env: an environment of this package with one slot per state, wrapped or not. One
-            that is not wrapped is left alone, a wrapped one is left as after a reset.
-        states: `(n, state_size)`.
-
-    Raises:
-        TypeError: `model` has no `predict`, or `env` is of another package.
-    """
-    require_predictor(model)
-    control_env(env)
-    states = _rows(states)
-    env = with_slots_for(env, states)
-    observation, _ = env.reset(options={"state": states})
-    space: Any = env.single_action_space
-    if isinstance(model, PartitionPolicy):
-        found = model.predict(observation, None, np.ones(len(observation), np.bool_))
-    else:
-        found = model.predict(observation, deterministic=True)
-    first, count = int(space.start), int(space.n)
-    return _checked_actions(found, np.arange(env.num_envs), first, count)
-
-
-def require_predictor(model: Any) -> None:
-    """Check that an object can choose actions.
-
-    Raises:
-        TypeError: `model` has no method `predict`.
-    """
-    if not callable(getattr(model, "predict", None)) or isinstance(model, type):
-        raise TypeError(
-            "model must be an agent or a policy with "
-            f"predict(observation, deterministic=True), got {validation.shown(model)}."
-        )
-
-
-def control_env(env: VectorEnv[Any, Any, Any]) -> ControlVectorEnv:
-    """The environment of this package that `env` is or wraps.
-
-    Raises:
-        TypeError: it is no vector environment, or of another package.
-    """
-    require_vector_env(env)
-    base = env.unwrapped
-    if not isinstance(base, ControlVectorEnv):
-        raise TypeError(
-            "env must be a vector environment of acl_gym, which can start from any "
-            f"state, got {type(base).__name__}."
-        )
-    return base

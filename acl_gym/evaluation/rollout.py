@@ -8,12 +8,11 @@ still walking.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from gymnasium import spaces
 from gymnasium.vector import AutoresetMode, VectorEnv
-from numpy.typing import NDArray
 
 from acl_gym.colony.episodes import Episodes
 from acl_gym.envs import received
@@ -21,62 +20,12 @@ from acl_gym.envs.control.environments import ControlVectorEnv, is_native
 from acl_gym.envs.wrappers.partial_reset import reset_slots
 from acl_gym.envs.wrappers.waiting import WaitingSlots
 from acl_gym.evaluation.rows import fixed, require_array, set_row
+from acl_gym.evaluation.steps import Outcome, Record, Step, account, spread_actions
 from acl_gym.utils import validation
-from acl_gym.utils.compiling import njit
 from acl_gym.utils.typing import BoolArray, FloatArray, IntArray
 from acl_gym.utils.vector_envs import require_vector_env
 
 _INT = np.dtype(np.int64)
-
-
-class Step(NamedTuple):
-    """The outcome of one step for the ants that took it, arrays of shape `(m,)`."""
-
-    ants: IntArray
-    """The slots that took the step."""
-    observation: NDArray[Any]
-    """Observations of all slots after the step, `(num_envs, ...)`."""
-    cost: FloatArray
-    """Stage costs, -reward."""
-    terminated: BoolArray
-    """Whether the episode ended in a terminal state."""
-    finished: BoolArray
-    """Whether the episode is over: a terminal state, the environment's limit or T."""
-
-
-class Outcome(NamedTuple):
-    """What the episodes of a trial came to."""
-
-    costs: FloatArray
-    """J of each finished episode, the sum of its stage costs."""
-    success: BoolArray | None
-    """Whether each was a success; None where nothing is known of success."""
-    n_steps: int
-    """Steps of all slots together."""
-
-
-class _Record:
-    """Observations, actions and stage costs of all slots, step by step.
-
-    Args:
-        observation: the first ones.
-        fresh: whether every observation is an array of its own. Other environments may
-            write the next one to the same array, so that each is copied.
-    """
-
-    def __init__(self, observation: NDArray[Any], fresh: bool) -> None:
-        self._fresh = fresh
-        self.observations = [observation if fresh else observation.copy()]
-        self.actions: list[IntArray] = []
-        self.costs: list[FloatArray] = []
-
-    def append(
-        self, observation: NDArray[Any], actions: IntArray, reward: FloatArray
-    ) -> None:
-        """Add a step; the last two arguments are new arrays, or copied."""
-        self.observations.append(observation if self._fresh else observation.copy())
-        self.actions.append(actions)
-        self.costs.append(-reward)
 
 
 class Rollout:
@@ -219,7 +168,7 @@ class Rollout:
         self._due = self.max_steps
         if record:
             require_array(observation)
-        self._record = _Record(observation, self._fresh) if record else None
+        self._record = Record(observation, self._fresh) if record else None
         return observation
 
     def step(self, actions: IntArray) -> Step:
@@ -290,7 +239,9 @@ class Rollout:
         if self._stale is not None:
             reset_slots(self.env, self._stale)
             self._stale = None
-        bad = _spread(ants, actions, self.first_action, self.n_actions, self._actions)
+        bad = spread_actions(
+            ants, actions, self.first_action, self.n_actions, self._actions
+        )
         if bad >= 0:
             raise ValueError(
                 f"actions must lie in 0..{self.n_actions - 1}, got {actions[bad]} in "
@@ -316,7 +267,7 @@ class Rollout:
         self.steps += 1
 
         left = np.empty(m, np.int64)
-        n_left, bad = _account(
+        n_left, bad = account(
             ants,
             reward,
             terminated,
@@ -402,7 +353,7 @@ class Rollout:
             validation.read_only(self.terminated),
         )
 
-    def _recorded(self) -> _Record:
+    def _recorded(self) -> Record:
         """What was recorded, checked."""
         record = self._record
         if record is None or not record.actions:
@@ -529,72 +480,3 @@ class Rollout:
             allowed = received.action_mask(last, self.num_envs, self.n_actions)
             self.action_mask[stopped] = True if allowed is None else allowed[stopped]
         return shown
-
-
-@njit
-def _spread(
-    ants: IntArray,
-    actions: IntArray,
-    first_action: int,
-    n_actions: int,
-    all_actions: IntArray,
-) -> int:
-    """Write the actions of the walking ants into the array of all slots.
-
-    Returns:
-        The first ant whose action is not in 0..n_actions - 1, or -1; after it, nothing
-        is written.
-    """
-    for j in range(ants.size):
-        if not 0 <= actions[j] < n_actions:
-            return j
-        all_actions[np.uint64(ants[j])] = actions[j] + first_action
-    return -1
-
-
-@njit
-def _account(
-    ants: IntArray,
-    reward: FloatArray,
-    terminated: BoolArray,
-    truncated: BoolArray,
-    total_cost: FloatArray,
-    length: IntArray,
-    ended: BoolArray,
-    cost: FloatArray,
-    reached: BoolArray,
-    stopped: BoolArray,
-    left: IntArray,
-) -> tuple[int, int]:
-    """Add a step of the walking ants to their totals.
-
-    Args:
-        ants: the walking slots, `(m,)`.
-        reward: of all slots.
-        terminated: of all slots.
-        truncated: of all slots.
-        total_cost: J so far of all slots, updated.
-        length: steps so far of all slots, updated.
-        ended: whether each slot has ended in a terminal state, updated.
-        cost: receives the stage cost of each walking ant, `(m,)`.
-        reached: receives whether it is in a terminal state, `(m,)`.
-        stopped: receives whether its episode has ended in any way, `(m,)`.
-        left: receives the ants that are still walking, `(m,)`.
-
-    Returns:
-        The number of ants still walking, and a slot whose reward is not finite, or -1.
-    """
-    n_left = 0
-    for j in range(ants.size):
-        ant = np.uint64(ants[j])
-        if not np.isfinite(reward[ant]):
-            return n_left, int(ants[j])
-        cost[j] = -reward[ant]
-        total_cost[ant] += cost[j]
-        length[ant] += 1
-        ended[ant] |= terminated[ant]
-        reached[j] = terminated[ant]
-        stopped[j] = terminated[ant] | truncated[ant]
-        left[n_left] = ants[j]
-        n_left += not stopped[j]
-    return n_left, -1

@@ -14,8 +14,9 @@ from gymnasium.vector import AsyncVectorEnv, AutoresetMode, SyncVectorEnv, Vecto
 from acl_gym.colony.episodes import Episodes
 from acl_gym.envs import received
 from acl_gym.envs.wrappers.partial_reset import reset_slots
-from acl_gym.evaluation.rollout import Outcome, Rollout
+from acl_gym.evaluation.rollout import Rollout
 from acl_gym.evaluation.rows import fixed, with_rows
+from acl_gym.evaluation.steps import Outcome
 from acl_gym.utils.typing import BoolArray, FloatArray, IntArray
 
 _NEVER = 2**62

@@ -9,6 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from numpy.typing import ArrayLike
 
+from acl_gym.agents.ant_agent import AntAgent
 from acl_gym.envs.graph.cities import TravellingSalesmanInstance, checked_tours
 from acl_gym.envs.graph.pictures import checked_levels, places_of, strongest_arcs
 from acl_gym.plotting import style
@@ -21,8 +22,8 @@ _FAINTEST, _DARKEST = (
 
 
 def plot_tour(
-    instance: TravellingSalesmanInstance,
-    tour: ArrayLike | None,
+    instance: TravellingSalesmanInstance | AntAgent,
+    tour: ArrayLike | None = None,
     pheromone: Any = None,
     ax: Axes | None = None,
 ) -> Axes:
@@ -32,7 +33,9 @@ def plot_tour(
     the tour and, where the optimum is known, by how much it exceeds that.
 
     Args:
-        instance: the cities.
+        instance: the cities; or an `AntSystem`, `AntColonySystem` or `MaxMinAntSystem`
+            that looks for their shortest tour: its best tour is then drawn, and its
+            pheromone, where nothing else is given.
         tour: each city once, numbered from 0, `(n,)`; None draws the cities only.
         pheromone: levels on the arcs, >= 0, `(n, n)`, such as the table of a colony. Of
             each city the eight highest are drawn, the higher the darker.
@@ -43,8 +46,13 @@ def plot_tour(
 
     Raises:
         TypeError: `instance`, `pheromone` or `ax` is of the wrong kind.
-        ValueError: the tour or the pheromone does not fit the instance.
+        ValueError: the tour or the pheromone does not fit the instance, or an agent has
+            none.
     """
+    if isinstance(instance, AntAgent):
+        agent, instance = instance, _instance_of(instance)
+        tour = agent.best_tour if tour is None else tour
+        pheromone = agent.table if pheromone is None else pheromone
     if not isinstance(instance, TravellingSalesmanInstance):
         raise TypeError(
             "instance must be a TravellingSalesmanInstance, got "
@@ -88,6 +96,16 @@ def plot_tour(
         ax.spines[:].set_visible(False)
         ax.set_title(_title(instance, order))
     return ax
+
+
+def _instance_of(agent: AntAgent) -> TravellingSalesmanInstance:
+    if agent.instance is None:
+        raise ValueError(
+            "an agent must have the travelling salesman's environment for a picture of "
+            f"its tour, got {validation.shown(agent)}; call set_env(env), or pass the "
+            "instance and the tour."
+        )
+    return agent.instance
 
 
 def _title(instance: TravellingSalesmanInstance, order: Any) -> str:

@@ -269,3 +269,13 @@ def test_the_time_limit_of_the_environment_is_t() -> None:
     pendulum_grid = Fuzzy.from_box(spaces.Box(0.0, 1.0, (2,), np.float64), 3)
     assert ACL(limited, pendulum_grid).max_steps == 120
     env.close()
+
+
+@pytest.mark.parametrize("mode", ["sync", "async"])
+def test_the_limit_of_the_caller_goes_before_that_of_the_id(mode: str) -> None:
+    """Which is 100 for the lake."""
+    for given, steps in ((40, 40), (None, 100)):
+        more = {} if given is None else {"max_episode_steps": given}
+        env = gym.make_vec("FrozenLake-v1", num_envs=2, vectorization_mode=mode, **more)
+        assert ACL(env, deposit="return").max_steps == steps
+        env.close()

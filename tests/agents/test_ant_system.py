@@ -9,11 +9,13 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 import pytest
+from gymnasium.vector import SyncVectorEnv
 from gymnasium.wrappers.vector import RecordEpisodeStatistics
 
 import acl_gym
 from acl_gym import AntColonySystem, AntSystem, MaxMinAntSystem, evaluate_policy_cost
 from acl_gym.agents.ant_optimizer import AntOptimizer
+from acl_gym.agents.ant_system import NoSolutionWarning
 from acl_gym.colony.schedules import Linear
 from acl_gym.envs.graph.instances import TravellingSalesmanInstance, load_instance
 from acl_gym.partitions import Fuzzy
@@ -155,13 +157,33 @@ def test_deposits_beyond_all_sums_give_one_clear_error() -> None:
         AntSystem(env, seed=0)
 
 
+class FarChain(Chain):
+    """All ants set out from the far end, so that there is one shortest path."""
+
+    def reset(self, **kwargs: Any) -> tuple[Array, dict[str, Any]]:
+        super().reset(**kwargs)
+        self.cell = 0
+        return np.array([0.0]), {}
+
+
+def far_chains(ants: int, length: int) -> SyncVectorEnv:
+    return SyncVectorEnv([lambda: FarChain(length)] * ants)
+
+
 @pytest.mark.parametrize("kind", KINDS)
 def test_shortest_paths_where_ants_walk(kind: type[Any]) -> None:
-    """On a chain, every start is a problem of its own; its neighbour's solution is best."""
-    colony = kind(chains(30, length=5), acl_gym.Crisp([np.arange(5.0)]), seed=2)
-    colony.learn(trials=12)
-    assert colony.best_cost == 1.0
-    assert colony.best_solution.tolist() == [[3, 1]]
+    """Six steps, while ants that know nothing take 42 on the average, n (n + 1)."""
+    cells = acl_gym.Crisp([np.arange(7.0)])
+    colony = kind(far_chains(20, 7), cells, global_decay=0.3, seed=2)
+    colony.learn(trials=40)
+    first, costs = colony.history[0], [row["ants_cost"] for row in colony.history]
+    assert first["best_cost"] > 6.0
+    assert costs[0] > 30.0
+    assert colony.best_cost == 6.0
+    assert colony.best_solution.tolist() == [[cell, 1] for cell in range(6)]
+    assert np.mean(costs[-5:]) < 8.0
+    policy, _ = colony.predict(np.arange(6.0)[:, None])
+    assert policy.tolist() == [1] * 6
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -181,15 +203,27 @@ def test_finite_spaces_of_other_packages(kind: type[Any]) -> None:
     assert ((found >= 0) & (found < 4)).all()
 
 
-def test_ants_that_never_arrive_deposit_nothing() -> None:
-    colony = AntSystem(
-        chains(3, length=50), acl_gym.Crisp([np.arange(50.0)]), max_steps=1, seed=0
+@pytest.mark.parametrize(
+    ("kind", "kept"), [(AntSystem, 0.7), (AntColonySystem, 1.0), (MaxMinAntSystem, 0.7)]
+)
+def test_ants_that_never_arrive_deposit_nothing(kind: type[Any], kept: float) -> None:
+    """Of levels that all differ, trials without a solution leave what evaporation leaves.
+
+    The Ant Colony System has none, and does not know yet to what its levels decay.
+    """
+    cells = acl_gym.Crisp([np.arange(50.0)])
+    colony = kind(far_chains(3, 50), cells, global_decay=0.3, max_steps=10, seed=0)
+    levels = np.random.default_rng(0).uniform(0.5, 2.0, (50, 2))
+    colony.set_table(levels)
+    with pytest.warns(NoSolutionWarning):
+        colony.learn(trials=3)
+    assert colony.num_timesteps == 3 * 3 * 10
+    assert colony.best_tour is None
+    assert colony.best_cost == np.inf
+    np.testing.assert_allclose(colony.table, kept**3 * levels, rtol=1e-12)
+    assert all(
+        {"best_cost", "trial_best_cost"}.isdisjoint(row) for row in colony.history
     )
-    colony.env.reset(seed=0)
-    colony.learn(trials=3)
-    assert colony.best_tour is None or colony.best_cost == 1.0
-    assert (colony.table == colony.table[0, 0]).all()
-    assert "best_cost" not in colony.history[0]
 
 
 @pytest.mark.parametrize(

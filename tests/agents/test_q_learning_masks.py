@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -102,3 +105,13 @@ def test_a_state_that_offers_nothing() -> None:
     agent = QLearning(vector(cab(), 3, start=0, masks=offered), grid, **keywords)
     with pytest.raises(ValueError, match="allowed action, got none in slot"):
         agent.learn(trials=5)
+
+
+def test_an_export_says_that_masks_are_left_out(tmp_path: Path, caplog: Any) -> None:
+    agent = QLearning(vector(cab(), 6, "NextStep", masks=CAB), seed=0).learn(trials=1)
+    free = QLearning(vector(cab(), 6, "NextStep"), seed=0).learn(trials=1)
+    with caplog.at_level("WARNING", "acl_gym"):
+        free.to_numpy(tmp_path / "free")
+        assert not caplog.records
+        agent.to_numpy(tmp_path / "masked")
+    assert "not allow every action" in caplog.text

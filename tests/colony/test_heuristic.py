@@ -168,7 +168,10 @@ def test_a_heuristic_is_saved_with_the_colony(tmp_path: Path) -> None:
         (np.full((6, 2), np.inf), "cell 0"),
         ([[1, 1]] * 5 + [[np.nan, 1]], "cell 5"),
         ("x", "an array of real numbers, got 'x'"),
-        ([[1, 1], [1]], "an array of real numbers"),
+        ([[1, 1], [1]], r"shape \(6, 2\).* got 2 rows of 1 to 2 entries"),
+        (np.ones(6), r"shape \(6, 2\).* got \(6,\)"),
+        ([[1, 1]] * 5 + [[1, -2]], "got -2 for action 1 in cell 5"),
+        ([[1, 1]] * 4 + [[0, 0]] * 2, "got only 0 in cell 4"),
         ([], "an array of real numbers"),
     ],
 )

@@ -8,7 +8,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
-from acl_gym import policies
 from acl_gym.colony import greedy, selection
 from acl_gym.colony import pheromone as pheromone_module
 from acl_gym.colony.greedy import greedy_actions
@@ -16,6 +15,7 @@ from acl_gym.colony.pheromone import Pheromone
 from acl_gym.colony.selection import RULES, choose_actions
 from acl_gym.colony.update_rules import EachVisit, Reinforcement
 from acl_gym.partitions.kernels import MOST_WRITTEN_OUT, written_out
+from acl_gym.policies import table as tables
 from tests.agents import reference_colony as reference
 from tests.colony.listed import recorded
 from tests.colony.test_pheromone import degrees
@@ -235,7 +235,7 @@ def test_the_policy_maximises_the_weighted_level(
     pheromone, index, degree, rng = colony
     table = np.round(pheromone.levels) if rounded else pheromone.levels
     n_cells, n_actions = table.shape
-    ranks = policies.random_ranks(n_cells, n_actions, rng)
+    ranks = tables.random_ranks(n_cells, n_actions, rng)
     actions = greedy_actions(table, ranks, index, degree)
     for j, action in enumerate(actions):
         best = reference.maximisers(
@@ -260,17 +260,17 @@ def test_the_best_action_of_a_cell_is_its_policy(
     pheromone, _, _, rng = colony
     table = np.round(pheromone.levels)
     n_cells, n_actions = table.shape
-    ranks = policies.random_ranks(n_cells, n_actions, rng)
+    ranks = tables.random_ranks(n_cells, n_actions, rng)
     centres = np.arange(n_cells, dtype=np.int32)[:, None]
-    best = policies._best_actions(table, ranks)
+    best = tables.best_of_rows(table, ranks)
     np.testing.assert_array_equal(
         best, greedy_actions(table, ranks, centres, np.ones((n_cells, 1)))
     )
-    np.testing.assert_array_equal(best, policies._best_actions.py_func(table, ranks))
+    np.testing.assert_array_equal(best, tables.best_of_rows.py_func(table, ranks))
 
 
 def test_ranks_are_orders_and_each_order_is_as_likely() -> None:
-    ranks = policies.random_ranks(60_000, 3, np.random.default_rng(3))
+    ranks = tables.random_ranks(60_000, 3, np.random.default_rng(3))
     assert ranks.dtype == np.int32
     np.testing.assert_array_equal(np.sort(ranks, axis=1), [[0, 1, 2]] * 60_000)
     _, counts = np.unique(ranks, axis=0, return_counts=True)
@@ -318,7 +318,7 @@ def test_the_policy_of_allowed_actions_is_that_of_their_columns(
     columns = columns if columns.size else np.array([0])
     allowed = np.zeros((len(index), table.shape[1]), dtype=bool)
     allowed[:, columns] = True
-    ranks = policies.random_ranks(*table.shape, rng)
+    ranks = tables.random_ranks(*table.shape, rng)
     among = greedy_actions(table[:, columns], ranks[:, columns], index, degree)
     np.testing.assert_array_equal(
         greedy_actions(table, ranks, index, degree, allowed), columns[among]
@@ -336,7 +336,7 @@ def test_kernels_agree_with_themselves_as_plain_python(
     levels, alpha = pheromone.levels, pheromone.alpha
     ants, (n_cells, n_actions) = len(index), levels.shape
     draws = rng.random((2, ants))
-    ranks = policies.random_ranks(n_cells, n_actions, rng)
+    ranks = tables.random_ranks(n_cells, n_actions, rng)
     allowed = greedy.ALL
     if restricted:
         allowed = rng.random((ants, n_actions)) < 0.7

@@ -19,7 +19,8 @@ from gymnasium.wrappers.vector import RecordEpisodeStatistics
 
 import acl_gym  # noqa: F401
 from acl_gym import WaitingVectorEnv
-from acl_gym.evaluation.rollout import Rollout, _account
+from acl_gym.evaluation.rollout import Rollout
+from acl_gym.evaluation.steps import account
 from tests.agents.reference_colony import Chain, chains
 
 MODES = ("NextStep", "SameStep", "Disabled")
@@ -260,7 +261,7 @@ def test_the_kernel_agrees_with_itself_as_plain_python(bad: int) -> None:
         reward[bad] = np.nan
     flags = rng.random((2, 8)) < 0.5
     results = []
-    for kernel in (_account, _account.py_func):
+    for kernel in (account, account.py_func):
         totals, length = np.zeros(8), np.zeros(8, dtype=np.int64)
         success = np.zeros(8, dtype=np.bool_)
         cost, reached, stopped = np.zeros(4), *np.zeros((2, 4), dtype=np.bool_)

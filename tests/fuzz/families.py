@@ -28,7 +28,7 @@ from acl_gym.callbacks import Checkpoint, CSVLog, EarlyStop, PolicyEvaluation
 from acl_gym.colony import costs, deposits, schedules, selection
 from acl_gym.envs.wrappers.perturbations import perturbed
 from acl_gym.evaluation import evaluate_policy_cost
-from acl_gym.evaluation.policy_cost import actions_in, record_trajectory
+from acl_gym.evaluation.trajectory import actions_in, record_trajectory
 from acl_gym.partitions.automatic import automatic_partition, thesis_partition
 from acl_gym.partitions.bounds import estimate_bounds
 from acl_gym.planning.model import TabularModel

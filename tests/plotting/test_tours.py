@@ -2,11 +2,13 @@
 
 from typing import Any
 
+import gymnasium as gym
 import numpy as np
 import pytest
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
+from acl_gym import AntColonySystem, AntSystem, MaxMinAntSystem
 from acl_gym.envs.graph import (
     TravellingSalesmanInstance,
     load_instance,
@@ -66,3 +68,35 @@ def test_mistakes(
 ) -> None:
     with pytest.raises(error, match=message):
         plot_tour(*arguments)
+
+
+@pytest.mark.parametrize("kind", [AntSystem, AntColonySystem, MaxMinAntSystem])
+def test_an_agent_shows_its_best_tour_and_its_pheromone(kind: Any) -> None:
+    env = gym.make_vec("acl_gym/TravellingSalesman-v0", num_envs=10)
+    agent = kind(env, seed=0)
+    ax = plot_tour(agent)
+    assert len(ax.lines) == 1  # the cities; there is no tour yet
+    agent.learn(trials=3)
+    ax = plot_tour(agent)
+    line, _ = ax.lines
+    tour, places = agent.best_tour, ATT48.coordinates
+    assert places is not None
+    np.testing.assert_array_equal(
+        np.transpose(line.get_data()), places[[*tour, tour[0]]]
+    )
+    (arcs,) = (each for each in ax.collections if isinstance(each, LineCollection))
+    (expected,) = plot_tour(ATT48, None, agent.table).collections
+    assert isinstance(expected, LineCollection)
+    np.testing.assert_array_equal(arcs.get_segments(), expected.get_segments())
+    assert f"att48: {agent.best_cost:,.6g}" in (
+        ax.get_title(loc="left") + ax.get_title()
+    )
+    # What is given goes before what the agent has.
+    line, _ = plot_tour(agent, WAY).lines
+    np.testing.assert_array_equal(np.transpose(line.get_data()), places[[*WAY, WAY[0]]])
+
+
+def test_an_agent_of_another_task_has_no_map() -> None:
+    agent = AntSystem(gym.make_vec("acl_gym/DoubleBridge-v0", num_envs=2), seed=0)
+    with pytest.raises(ValueError, match="an agent must have the travelling salesman"):
+        plot_tour(agent)

@@ -27,11 +27,7 @@ from acl_gym import (
     VectorEnvAdapter,
     evaluate_policy_cost,
 )
-from acl_gym.evaluation.policy_cost import (
-    actions_in,
-    record_trajectory,
-    with_slots_for,
-)
+from acl_gym.evaluation import actions_in, record_trajectory, with_slots_for
 from acl_gym.sb3.callback import PolicyCostCallback
 from acl_gym.utils.vector_envs import require_vector_env
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import inspect
+from difflib import get_close_matches
 from typing import Any, Protocol
 
 import gymnasium as gym
@@ -13,6 +15,26 @@ from acl_gym.envs.control.system import ControlSystem
 from acl_gym.utils import validation
 from acl_gym.utils.compiling import njit
 from acl_gym.utils.typing import BoolArray, FloatArray, IntArray
+
+
+def made_system(kind: type[ControlSystem], parameters: dict[str, Any]) -> ControlSystem:
+    """A system with these parameters.
+
+    Raises:
+        TypeError: it has no parameter of such a name.
+        ValueError: a parameter is not valid.
+    """
+    known = inspect.signature(kind).parameters
+    if all(each.kind is not each.VAR_KEYWORD for each in known.values()):
+        for name in parameters:
+            if name not in known:
+                similar = get_close_matches(name, known, 1)
+                hint = f" Did you mean {similar[0]!r}?" if similar else ""
+                raise TypeError(
+                    f"{kind.__name__} has no parameter {name!r}; choose from "
+                    f"{', '.join(known) or 'none'}.{hint}"
+                )
+    return kind(**parameters)
 
 
 class Seeded(Protocol):

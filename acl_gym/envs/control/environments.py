@@ -27,6 +27,7 @@ from acl_gym.envs.control.bookkeeping import (
     draw_uniforms,
     final_infos,
     finish,
+    made_system,
     states_of_slots,
     warn_of_no_render_mode,
 )
@@ -87,7 +88,7 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
         self.set_autoreset_mode(autoreset_mode)
         self.render_mode = checked_render_mode(render_mode, self.metadata)
         self.parameters = copy.deepcopy(parameters)  # the caller may change a list
-        self._system = self.system_type(**parameters)
+        self._system = made_system(self.system_type, parameters)
         self.single_observation_space = self.system.observation_space
         self.single_action_space = self.system.action_space
         validation.check_memory(

@@ -14,6 +14,7 @@ from acl_gym.envs.control.bookkeeping import (
     checked_options,
     checked_render_mode,
     draw_uniforms,
+    made_system,
     warn_of_no_render_mode,
 )
 from acl_gym.envs.control.rendering import Frame, Renderer
@@ -44,7 +45,7 @@ class ControlEnv(gym.Env[NDArray[Any], np.int64]):
 
     def __init__(self, render_mode: str | None = None, **parameters: Any) -> None:
         self.render_mode = checked_render_mode(render_mode, self.metadata)
-        self.system = self.system_type(**parameters)
+        self.system = made_system(self.system_type, parameters)
         self.observation_space = self.system.observation_space
         self.action_space = self.system.action_space
         self._n_actions = int(self.system.action_space.n)

@@ -163,6 +163,12 @@ class TravellingSalesmanInstance:
         np.fill_diagonal(distances, 0.0)
         for tail, head, length in graph.edges(data=weight):
             if tail != head:
+                if length is None:
+                    raise ValueError(
+                        f"each edge must have an attribute {weight!r}, its length, but "
+                        f"the one from {tail!r} to {head!r} has none; set it, or name "
+                        "another: from_networkx(graph, weight=...)."
+                    )
                 value = validation.number(
                     f"the {weight!r} of edge ({tail!r}, {head!r})", length, at_least=0
                 )

@@ -12,6 +12,7 @@ from __future__ import annotations
 import os
 import re
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -258,10 +259,22 @@ def _matrix(file: _File, form: str, n_cities: int) -> FloatArray:
 def _read(path: str | os.PathLike[str]) -> tuple[str, str]:
     """The text of a file, and its name for messages."""
     checked = validation.file_path("path", path)
+    try:
+        return _text_of(checked), checked.name
+    except OSError as error:
+        # Of the same class, so that a missing file is still a FileNotFoundError.
+        raise type(error)(
+            f"path must be a file of TSPLIB that can be read, got "
+            f"{validation.shown(str(path))} ({error.strerror or error}); check the name, "
+            f"which is looked for from {os.getcwd()}, and the permissions."
+        ) from None
+
+
+def _text_of(checked: Path) -> str:
     # Devices and pipes may have no end, and large files cannot be meant.
-    if checked.exists() and not checked.is_file():
-        raise ValueError(f"path must be a file, got {validation.shown(str(checked))}.")
     size = checked.stat().st_size
+    if not checked.is_file():
+        raise ValueError(f"path must be a file, got {validation.shown(str(checked))}.")
     if size > _LARGEST:
         raise ValueError(
             f"{checked.name}: the file must have at most {_LARGEST:,} bytes, got "
@@ -271,8 +284,7 @@ def _read(path: str | os.PathLike[str]) -> tuple[str, str]:
     validation.check_memory(
         f"the words of {checked.name}", 20 * size, "take fewer cities"
     )
-    text = checked.read_bytes().decode("utf-8", errors="replace")
-    return text, checked.name
+    return checked.read_bytes().decode("utf-8", errors="replace")
 
 
 def _parsed(text: str, source: str) -> _File:

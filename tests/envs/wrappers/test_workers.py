@@ -360,6 +360,8 @@ def test_only_environments_that_can_be_made_anew_are_spread() -> None:
     wrapped = RecordEpisodeStatistics(gym.make_vec("CartPole-v1", num_envs=2))
     with pytest.raises(ValueError, match=r"without vector wrappers.*WorkersVectorEnv"):
         ReturningACL(wrapped, workers=2)
+    with pytest.raises(ValueError, match=r"executor.*'ray' without workers"):
+        ReturningACL(gym.make_vec("CartPole-v1", num_envs=2), executor="ray")
 
 
 # --- The end -------------------------------------------------------------------

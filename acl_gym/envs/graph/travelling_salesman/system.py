@@ -10,7 +10,11 @@ import numpy as np
 from gymnasium import spaces
 
 from acl_gym.envs.control.system import ControlSystem, SlotError
-from acl_gym.envs.graph.instances import TravellingSalesmanInstance, load_instance
+from acl_gym.envs.graph.instances import (
+    OPTIMA,
+    TravellingSalesmanInstance,
+    load_instance,
+)
 from acl_gym.envs.graph.travelling_salesman import kernels
 from acl_gym.envs.graph.travelling_salesman.kernels import (
     ARCS,
@@ -93,6 +97,8 @@ class TravellingSalesman(ControlSystem):
                 "metric is for coordinates alone, got "
                 f"{validation.shown(self.metric)} with {' and '.join(given) or 'none'}."
             )
+        for name in given:
+            _refuse_others(name, getattr(self, name))
         if self.tsplib is not None:
             return read_tsplib(self.tsplib)
         if self.distances is not None:
@@ -271,6 +277,26 @@ class TravellingSalesman(ControlSystem):
             count = min(self.n_cities, _MOST_EVALUATED)
             cities = np.arange(count) * self.n_cities // count
         return self.starting_in(cities).T.copy()
+
+
+def _refuse_others(name: str, value: Any) -> None:
+    """Say what to make of a graph, or of what is no instance.
+
+    Raises:
+        TypeError: the value is a graph of networkx.
+        ValueError: it is to be an instance, and is neither that nor the name of one.
+    """
+    if hasattr(value, "nodes") and hasattr(value, "edges"):
+        raise TypeError(
+            f"{name} must not be a graph, got {validation.shown(value)}; pass "
+            "instance=TravellingSalesmanInstance.from_networkx(graph)."
+        )
+    if name == "instance" and not isinstance(value, (TravellingSalesmanInstance, str)):
+        raise ValueError(
+            f"instance must be one of {', '.join(map(repr, OPTIMA))} or a "
+            f"TravellingSalesmanInstance, got {validation.shown(value)}; pass a matrix as "
+            "distances, points as coordinates, a file as tsplib."
+        )
 
 
 def instance_of(system: ControlSystem) -> TravellingSalesmanInstance:

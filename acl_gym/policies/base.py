@@ -1,4 +1,4 @@
-"""Policies over a partition: the result of every method of this package."""
+"""What every policy over a partition offers."""
 
 from __future__ import annotations
 
@@ -9,27 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from acl_gym.colony.greedy import NUMBERS_PER_ACTION, greedy_actions
-from acl_gym.colony.pheromone import Pheromone
-from acl_gym.colony.selection import choose_actions
-from acl_gym.envs.control.signals import Signals
 from acl_gym.export import Source, write_c_header, write_numpy_file
 from acl_gym.partitions import Partition, checked_partition, locate_all
 from acl_gym.utils import validation
-from acl_gym.utils.compiling import njit
 from acl_gym.utils.parameters import Fixed
 from acl_gym.utils.text import short
-from acl_gym.utils.typing import BoolArray, CellArray, FloatArray, IntArray, RankArray
-
-
-def random_ranks(n_cells: int, n_actions: int, rng: np.random.Generator) -> RankArray:
-    """A random order of the actions for each cell, `(n_cells, n_actions)`.
-
-    Ties are broken at random (4.16). Drawing the order once makes the policy a function
-    (a decision).
-    """
-    ranks = np.tile(np.arange(n_actions, dtype=np.int32), (n_cells, 1))
-    return np.asarray(rng.permuted(ranks, axis=1), dtype=np.int32)
+from acl_gym.utils.typing import BoolArray, CellArray, FloatArray, IntArray
 
 
 class Action(np.ndarray[tuple[()], np.dtype[np.int64]]):
@@ -189,7 +174,8 @@ class PartitionPolicy(Fixed, ABC):
         ```
 
         The arrays are described in `acl_gym.export.numpy_file.numpy_arrays`; where
-        they are known, `inputs` and `input_values` say what each action sets.
+        they are known, `inputs` and `input_values` say what each action sets. Action
+        masks are not known, as in `to_c`.
 
         Args:
             path: the file; `.npz` is added where it is missing.
@@ -232,7 +218,9 @@ class PartitionPolicy(Fixed, ABC):
         With "float", half the memory, they differ only where rounding to a float, one
         part in 10^7, moves an observation across such a border. An observation that
         `predict` refuses (NaN, infinite, out of the range of a discrete variable) gives
-        `name_INVALID`.
+        `name_INVALID`. The program knows no action masks: where an environment does not
+        allow every action, it may choose one that is not allowed, which `predict` with
+        `action_masks` never does.
 
         Args:
             path: the file; `.h` is added to a name without an ending.
@@ -284,235 +272,9 @@ class PartitionPolicy(Fixed, ABC):
         return np.ascontiguousarray(given == 1)
 
 
-class TablePolicy(PartitionPolicy):
-    """The greedy policy, eq. (4.16): the action of the largest degree-weighted entry.
-
-    Args:
-        partition: turns observations into cells and degrees.
-        table: `(n_cells, n_actions)`, pheromone levels or action values.
-        ranks: `(n_cells, n_actions)`, the order in which tied actions are preferred;
-            None draws it from a fixed seed.
-        first_action: the action that column 0 stands for, `Discrete.start`.
-        signals: what observations and actions mean, for `to_c` and `to_numpy`; None if
-            unknown.
-
-    Raises:
-        TypeError: `partition` is no partition, or `first_action` not an integer.
-        ValueError: `table` or `ranks` do not fit the partition, or an entry is
-            NaN.
-    """
-
-    _fixed = ("partition", "table", "ranks", "first_action")
-
-    def __init__(
-        self,
-        partition: Partition,
-        table: FloatArray,
-        ranks: RankArray | None = None,
-        first_action: int = 0,
-        signals: Signals | None = None,
-    ) -> None:
-        if not isinstance(table, np.ndarray) or table.dtype != np.float64:
-            got = getattr(table, "dtype", type(table).__name__)
-            raise ValueError(f"table must be an array of float64, got {got}.")
-        self._check_fits("table", table, partition)
-        if np.isnan(table).any():
-            cell = int(np.argmax(np.isnan(table).any(axis=1)))
-            raise ValueError(
-                f"table must not hold NaN, got {validation.shown(table[cell].tolist())} in "
-                f"cell {cell}."
-            )
-        n_cells, n_actions = table.shape
-        if ranks is None:
-            ranks = random_ranks(n_cells, n_actions, np.random.default_rng(0))
-        if (
-            not isinstance(ranks, np.ndarray)
-            or ranks.shape != table.shape
-            or ranks.dtype.kind not in "iu"
-        ):
-            raise ValueError(
-                f"ranks must be integers in the shape of the table, {table.shape}, got "
-                f"{validation.shown(ranks)}."
-            )
-        if ranks.dtype != np.int32:
-            ranks = ranks.astype(np.int32)
-        self.partition = partition
-        self.table = table
-        self.ranks = ranks
-        self.first_action = _checked_first(first_action)
-        self.signals = signals
-
-    @property
-    def n_actions(self) -> int:
-        """See `PartitionPolicy.n_actions`."""
-        return int(self.table.shape[1])
-
-    @property
-    def _n_cells(self) -> int:
-        return len(self.table)
-
-    def _act(
-        self,
-        index: CellArray,
-        degree: FloatArray,
-        deterministic: bool,
-        allowed: BoolArray | None,
-    ) -> IntArray:
-        return greedy_actions(self.table, self.ranks, index, degree, allowed)
-
-    def best_actions(self) -> IntArray:
-        """The greedy policy, eq. (3.10): the best column of each cell, `(n_cells,)`."""
-        return _best_actions(self.table, self.ranks)
-
-    def copy(self) -> TablePolicy:
-        """The same policy over a table that no longer changes."""
-        return TablePolicy(
-            self.partition,
-            self.table.copy(),
-            self.ranks,
-            self.first_action,
-            self.signals,
-        )
-
-    def _source(self, inputs: ArrayLike | None = None) -> Source:
-        signals = self.signals
-        if inputs is not None:
-            names = () if signals is None else signals.observations
-            signals = Signals.of_inputs(inputs, names)
-        return Source.of(
-            self.partition, self.table, self.ranks, self.first_action, signals
-        )
-
-
-class SoftPolicy(PartitionPolicy):
-    """Boltzmann selection, eq. (4.11), as in learning, but with a larger exponent.
-
-    A greedy policy on a coarse table can fall into a cycle beside the goal that it
-    never leaves (docs/hovering.md). Drawing in proportion to tau^exponent follows
-    the same pheromone, and leaves every cycle sooner or later.
-
-    An evaluation is a function of the seed. Called with `episode_start`, as
-    Stable-Baselines3's `evaluate_policy` and `evaluate_policy_cost` do, `predict`
-    changes nothing: the state that it takes, None at first, and returns holds how many
-    numbers the evaluation has drawn. Called without `episode_start`, for instance in
-    a loop of your own, it continues the random numbers of its own generator.
-    `deterministic` makes no difference.
-
-    Args:
-        partition: turns observations into cells and degrees.
-        levels: pheromone, `(n_cells, n_actions)`, finite and > 0; copied.
-        exponent: > 0; the larger, the closer to the greedy policy.
-        seed: of the draws, >= 0; None draws one from the system.
-        first_action: the action that column 0 stands for, `Discrete.start`.
-
-    Raises:
-        TypeError: `seed` is not an integer.
-        ValueError: `levels` do not fit the partition or are not all > 0 and finite,
-            `exponent` is not > 0 and finite, or `seed` is negative.
-    """
-
-    _fixed = ("partition", "first_action", "_pheromone")
-
-    def __init__(
-        self,
-        partition: Partition,
-        levels: FloatArray,
-        exponent: float = 10.0,
-        seed: int | None = None,
-        first_action: int = 0,
-    ) -> None:
-        levels = validation.real_array("levels", levels)
-        self._check_fits("levels", levels, partition)
-        if not (levels > 0.0).all():
-            raise ValueError(f"levels must all be > 0, got {levels.min():g}.")
-        exponent = validation.number("exponent", exponent, above=0)
-        seed = validation.seed(seed)
-        self.partition = partition
-        self.first_action = _checked_first(first_action)
-        n_cells, n_actions = levels.shape
-        self._pheromone = Pheromone(n_cells, n_actions, 1.0, exponent)
-        self._pheromone.set_levels(levels)
-        self._seeds = np.random.SeedSequence(seed)
-        self._by_hand = self._stream(0)
-
-    @property
-    def table(self) -> FloatArray:
-        """The levels, `(n_cells, n_actions)`, read-only."""
-        view = self._pheromone.levels.view()
-        view.flags.writeable = False
-        return view
-
-    @property
-    def n_actions(self) -> int:
-        """See `PartitionPolicy.n_actions`."""
-        return int(self._pheromone.levels.shape[1])
-
-    @property
-    def _n_cells(self) -> int:
-        return len(self._pheromone.levels)
-
-    def _act(
-        self,
-        index: CellArray,
-        degree: FloatArray,
-        deterministic: bool,
-        allowed: BoolArray | None,
-    ) -> IntArray:
-        return self._draw(self._by_hand, index, degree, allowed)
-
-    def _act_in_state(
-        self, state: Any, episode_start: Any, *situation: Any
-    ) -> tuple[IntArray, Any]:
-        if episode_start is None:
-            return super()._act_in_state(state, episode_start, *situation)
-        index, degree, _, allowed = situation
-        drawn = _drawn(state)
-        columns = self._draw(self._stream(drawn), index, degree, allowed)
-        return columns, (np.array(drawn + NUMBERS_PER_ACTION * len(columns)),)
-
-    def _draw(
-        self,
-        rng: np.random.Generator,
-        index: CellArray,
-        degree: FloatArray,
-        allowed: BoolArray | None,
-    ) -> IntArray:
-        return choose_actions(
-            "boltzmann", self._pheromone, index, degree, 0.0, rng, allowed
-        )
-
-    def _stream(self, drawn: int) -> np.random.Generator:
-        """The generator of the seed, advanced by `drawn` numbers."""
-        return np.random.Generator(np.random.PCG64(self._seeds).advance(drawn))
-
-
-def _checked_first(first_action: Any) -> int:
+def checked_first_action(first_action: Any) -> int:
     """`Discrete.start`: any integer to which the actions can be added."""
     least = -(2**62)
     return validation.integer(
         "first_action", first_action, at_least=least, at_most=-least
     )
-
-
-def _drawn(state: Any) -> int:
-    """How many numbers an evaluation has drawn, from the state of `SoftPolicy`."""
-    if state is None:
-        return 0
-    if not isinstance(state, tuple) or len(state) != 1 or np.ndim(state[0]) != 0:
-        raise ValueError(
-            "state must be None at first, and then what predict returned, got "
-            f"{validation.shown(state)}."
-        )
-    value = state[0].item() if isinstance(state[0], np.ndarray) else state[0]
-    return validation.integer("the number in state", value, at_least=0)
-
-
-@njit
-def _best_actions(table: FloatArray, ranks: RankArray) -> IntArray:
-    best = np.zeros(table.shape[0], dtype=np.int64)
-    for cell in range(table.shape[0]):
-        for u in range(1, table.shape[1]):
-            lead = table[cell, u] - table[cell, best[cell]]
-            if lead > 0.0 or (lead == 0.0 and ranks[cell, u] < ranks[cell, best[cell]]):
-                best[cell] = u
-    return best

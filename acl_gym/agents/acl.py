@@ -355,12 +355,7 @@ class ACL(ColonyAgent):
         Raises:
             ValueError: the shape differs, or a level is not positive and finite.
         """
-        levels = self._checked_table(table)
-        if not (levels > 0.0).all():
-            raise ValueError(
-                f"table must hold positive levels only, got {levels.min():g}."
-            )
-        self.pheromone.set_levels(levels)
+        self.pheromone.set_levels(table, "table")
 
     def set_env(self, env: VectorEnv[Any, Any, Any]) -> None:
         """See `TabularAgent.set_env`; warns if tau0 is too high for `env`."""

@@ -306,12 +306,7 @@ class AntAgent(TabularAgent):
         Raises:
             ValueError: the shape differs, or a level is not positive and finite.
         """
-        levels = self._checked_table(table)
-        if not (levels > 0.0).all():
-            raise ValueError(
-                f"table must hold positive levels only, got {levels.min():g}."
-            )
-        self.pheromone.set_levels(levels)
+        self.pheromone.set_levels(table, "table")
         self._levels_are_set = True
 
     @property

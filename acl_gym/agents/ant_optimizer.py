@@ -18,9 +18,10 @@ from acl_gym.colony.ant_kernels import branching_factor
 from acl_gym.colony.deposits import checked_deposits
 from acl_gym.colony.local_search import METHODS, LocalSearch, nearest_neighbours
 from acl_gym.colony.solutions import Solutions
-from acl_gym.colony.tours import Tours, nearest_neighbour_tour, tour_lengths
+from acl_gym.colony.tours import Tours, nearest_neighbour_tour
 from acl_gym.colony.update_rule import TrialResult
 from acl_gym.envs.graph.instances import TravellingSalesmanInstance
+from acl_gym.envs.graph.lengths import tour_lengths
 from acl_gym.envs.graph.travelling_salesman.lookup import Salesman, salesman_of
 from acl_gym.evaluation.steps import Outcome
 from acl_gym.partitions import Partition
@@ -129,11 +130,11 @@ class AntOptimizer(AntAgent):
                 has_solved |= bool(result.terminated.any())
                 training.end_trial(result.costs)
         if not has_solved and self.trials > first:
+            walks = "" if self.tabu else ", or tabu=True, which rules out most circles"
             warnings.warn(
                 f"in {self.trials - first} trials none of {self.num_envs} ants has come to "
                 f"a terminal state within {self.max_steps} steps, so nothing was "
-                "deposited or learned; give them more steps (max_steps), take more ants, "
-                "or set tabu=True so that they do not walk in circles.",
+                f"deposited or learned; try more steps (max_steps) or more ants{walks}.",
                 NoSolutionWarning,
                 stacklevel=2,
             )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from acl_gym.colony.greedy import cells_out_of_range
 from acl_gym.colony.heuristic import checked_heuristic, to_the_power
@@ -137,18 +138,25 @@ class Pheromone(Fixed):
             self.levels.fill(self.tau0)
             self.stale[:] = True
 
-    def set_levels(self, levels: FloatArray) -> None:
+    def set_levels(self, levels: ArrayLike, name: str = "levels") -> None:
         """Replace all levels.
+
+        Args:
+            levels: > 0 and finite, in the shape of the table.
+            name: what error messages call them.
 
         Raises:
             ValueError: they do not have the shape of the table, or are not all > 0 and
                 finite.
         """
-        values = validation.real_array("levels", levels)
-        if values.shape != self.levels.shape or not (values > 0.0).all():
+        values = validation.real_array(name, levels)
+        if values.shape != self.levels.shape:
             raise ValueError(
-                f"levels must be > 0 in shape {self.levels.shape}, got "
-                f"{validation.shown(levels)}."
+                f"{name} must have shape {self.levels.shape}, got {values.shape}."
+            )
+        if not (values > 0.0).all():
+            raise ValueError(
+                f"{name} must be positive everywhere, got {values.min():g}."
             )
         self.levels[:] = values
         self.stale[:] = True

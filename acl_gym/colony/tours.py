@@ -110,21 +110,6 @@ def nearest_neighbour_tour(distances: FloatArray, start: int) -> CellArray:
     return tour
 
 
-@njit
-def tour_lengths(tours: CellArray, distances: FloatArray) -> FloatArray:
-    """The length of each tour, the closing arc included, `(m,)`.
-
-    Added up in the order of the steps, as an environment does.
-    """
-    m, n = tours.shape
-    lengths = np.zeros(m)
-    for a in range(m):
-        for t in range(n):
-            following = tours[a, t + 1] if t + 1 < n else tours[a, 0]
-            lengths[a] += distances[tours[a, t], following]
-    return lengths
-
-
 @njit(error_model="numpy")
 def build_tours(
     starts: IntArray,

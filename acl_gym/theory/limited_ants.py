@@ -218,11 +218,12 @@ def _shortest(distances: FloatArray) -> float:
 
 def _checked_distances(distances: Any) -> FloatArray:
     matrix = validation.real_array("distances", distances, ndim=2)
+    validation.check_square("distances", matrix.shape, "city")
     n = len(matrix)
-    if matrix.shape != (n, n) or not 3 <= n <= MOST_CITIES:
+    if not 3 <= n <= MOST_CITIES:
         raise ValueError(
-            f"distances must have the shape (n, n) with 3 <= n <= {MOST_CITIES}, so "
-            f"that all tours can be tried, got {matrix.shape}."
+            f"distances must be those of 3 to {MOST_CITIES} cities, so that all tours "
+            f"can be tried, got {n}."
         )
     if not (matrix[~np.eye(n, dtype=np.bool_)] > 0).all():
         raise ValueError(

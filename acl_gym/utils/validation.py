@@ -181,6 +181,24 @@ def real_array(
     return array.astype(np.float64)
 
 
+def check_square(name: str, shape: tuple[int, ...], rows: str = "row") -> None:
+    """Check that an array is a square matrix.
+
+    Args:
+        name: what the array is called in the error message.
+        shape: of the array.
+        rows: what has a row and a column each, such as "city".
+
+    Raises:
+        ValueError: it is not.
+    """
+    if len(shape) != 2 or shape[0] != shape[1] or shape[0] == 0:
+        raise ValueError(
+            f"{name} must be a square matrix, a row and a column for each {rows}, got "
+            f"shape {shape}."
+        )
+
+
 def as_array(values: Any) -> NDArray[Any] | None:
     """Return `values` as an array; None if they are ragged or have masked entries."""
     try:

@@ -102,8 +102,8 @@ def test_a_graph_is_made_an_instance_first(name: str) -> None:
     graph = networkx.complete_graph(4)
     with pytest.raises(TypeError, match=rf"{name} must .*Instance\.from_networkx\(gr"):
         gym.make_vec(SALESMAN, **{name: graph})
-    words = r"an attribute 'weight'.* the one from 0 to 1 has none; .*weight=\.\.\."
-    with pytest.raises(ValueError, match=words):
+    words = r"the 'weight' of edge \(0, 1\) must .*it has none; .*weight=\.\.\."
+    with pytest.raises(TypeError, match=words):
         TravellingSalesmanInstance.from_networkx(graph)
 
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from acl_gym.colony.local_search import LocalSearch, nearest_neighbours, two_opt
+from acl_gym.colony.local_search import LocalSearch, nearest_neighbours
 
 SQUARE = np.array(
     [
@@ -94,6 +94,7 @@ def read_only(tours: Any) -> Any:
 
 
 TOUR = np.array([[0, 2, 1, 3]], np.int32)
+TWO_OPT = LocalSearch("2-opt", SQUARE, NEAREST)
 
 
 @pytest.mark.parametrize(
@@ -109,7 +110,7 @@ TOUR = np.array([[0, 2, 1, 3]], np.int32)
 )
 def test_wrong_arrays_of_tours(wrong: Any) -> None:
     with pytest.raises(ValueError, match=r"^tours must be a writable, C-contiguous"):
-        two_opt(wrong, SQUARE, NEAREST)
+        TWO_OPT.improve(wrong)
 
 
 @pytest.mark.parametrize("wrong", [[0, 1, 1, 2], [0, 1, 2, 4], [0, 1, 2, -1]])
@@ -118,11 +119,11 @@ def test_rows_that_are_no_tours(wrong: list[int]) -> None:
     with pytest.raises(
         ValueError, match=r"^tours\[1\] must hold each of .* 0 to 3 once"
     ):
-        two_opt(tours, SQUARE, NEAREST)
+        TWO_OPT.improve(tours)
 
 
 def test_no_tours() -> None:
-    assert two_opt(np.empty((0, 4), np.int32), SQUARE, NEAREST).shape == (0,)
+    assert TWO_OPT.improve(np.empty((0, 4), np.int32)).shape == (0,)
 
 
 def test_methods() -> None:
@@ -148,4 +149,4 @@ def test_asymmetry_anywhere_is_seen() -> None:
 
 def test_a_square_is_walked_round() -> None:
     tours = TOUR.copy()
-    assert two_opt(tours, SQUARE, NEAREST).tolist() == [4.0]
+    assert TWO_OPT.improve(tours).tolist() == [4.0]

@@ -13,8 +13,8 @@ from acl_gym.colony.ant_rule import AntRule
 from acl_gym.colony.ant_rules import AntColonySystemUpdate, AntSystemUpdate
 from acl_gym.colony.candidates import candidate_lists, inverse_distances
 from acl_gym.colony.pheromone import Pheromone
-from acl_gym.colony.tours import Tours, nearest_neighbour_tour, tour_lengths
-from acl_gym.envs.graph.instances import TravellingSalesmanInstance, load_instance
+from acl_gym.colony.tours import Tours, nearest_neighbour_tour
+from acl_gym.envs.graph.instances import load_instance
 from tests.colony import reference_ants as reference
 
 Array = np.ndarray
@@ -252,14 +252,6 @@ def test_nearest_neighbour_tour_by_hand() -> None:
     distances = np.abs(places[:, None] - places)
     assert nearest_neighbour_tour(distances, 0).tolist() == [0, 2, 1, 3]
     assert nearest_neighbour_tour(distances, 3).tolist() == [3, 1, 2, 0]
-
-
-def test_lengths_are_those_of_the_instance() -> None:
-    distances = np.random.default_rng(3).integers(1, 90, (11, 11)).astype(float)
-    instance = TravellingSalesmanInstance.from_distances(distances)
-    tours = np.stack([np.random.default_rng(s).permutation(11) for s in range(5)])
-    found = tour_lengths(tours.astype(np.int32), instance.distances)
-    np.testing.assert_array_equal(found, instance.length(tours))
 
 
 @pytest.mark.parametrize(("n", "m"), [(5, 3), (2, 1), (1_000, 9), (5_000, 2)])

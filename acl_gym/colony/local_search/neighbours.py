@@ -47,11 +47,7 @@ def checked_distances(distances: Any) -> FloatArray:
     """
     if type(distances) is not np.ndarray or distances.dtype != np.float64:
         distances = validation.real_array("distances", distances, ndim=2)
-    if not (distances.ndim == 2 and distances.shape[0] == distances.shape[1] > 0):
-        raise ValueError(
-            "distances must be a square matrix, from each city to each other one, got "
-            f"shape {distances.shape}."
-        )
+    validation.check_square("distances", distances.shape, "city")
     # Kernels are compiled once, for arrays that may not be written to.
     matrix: FloatArray = validation.read_only(np.ascontiguousarray(distances))
     if not (matrix.min() >= 0.0 and matrix.max() < np.inf):  # NaN fails both

@@ -148,57 +148,6 @@ class LocalSearch:
         return lists, nearby
 
 
-def two_opt(tours: CellArray, distances: Any, neighbours: Any) -> FloatArray:
-    """Improve tours in place by 2-opt; see `LocalSearch`, which serves many calls.
-
-    Args:
-        tours: permutations of the cities, a C-contiguous array of int32, `(m, n)`.
-        distances: symmetric, `(n, n)`.
-        neighbours: candidates of each city, `(n, k)`.
-
-    Returns:
-        Lengths of the tours, `(m,)`.
-
-    Raises:
-        ValueError: see `LocalSearch`.
-    """
-    return LocalSearch("2-opt", distances, neighbours).improve(tours)
-
-
-def or_opt(tours: CellArray, distances: Any, neighbours: Any) -> FloatArray:
-    """Improve tours in place by Or-opt; see `LocalSearch`, which serves many calls.
-
-    Args:
-        tours: permutations of the cities, a C-contiguous array of int32, `(m, n)`.
-        distances: `(n, n)`; where they are symmetric, 2-opt is done along with it.
-        neighbours: candidates of each city, `(n, k)`.
-
-    Returns:
-        Lengths of the tours, `(m,)`.
-
-    Raises:
-        ValueError: see `LocalSearch`.
-    """
-    return LocalSearch("or-opt", distances, neighbours).improve(tours)
-
-
-def three_opt(tours: CellArray, distances: Any, neighbours: Any) -> FloatArray:
-    """Improve tours in place by 3-opt; see `LocalSearch`, which serves many calls.
-
-    Args:
-        tours: permutations of the cities, a C-contiguous array of int32, `(m, n)`.
-        distances: `(n, n)`; where they are asymmetric, all directions are kept.
-        neighbours: candidates of each city, `(n, k)`.
-
-    Returns:
-        Lengths of the tours, `(m,)`.
-
-    Raises:
-        ValueError: see `LocalSearch`.
-    """
-    return LocalSearch("3-opt", distances, neighbours).improve(tours)
-
-
 def _described(array: Any) -> str:
     if not isinstance(array, np.ndarray):
         return validation.shown(array)

@@ -11,6 +11,7 @@ import numpy as np
 from gymnasium.error import DependencyNotInstalled
 from numpy.typing import ArrayLike, NDArray
 
+from acl_gym.envs.graph.lengths import tour_lengths
 from acl_gym.envs.graph.metrics import distances_between
 from acl_gym.utils import validation
 from acl_gym.utils.typing import FloatArray
@@ -163,15 +164,13 @@ class TravellingSalesmanInstance:
         np.fill_diagonal(distances, 0.0)
         for tail, head, length in graph.edges(data=weight):
             if tail != head:
+                what = f"the {weight!r} of edge ({tail!r}, {head!r})"
                 if length is None:
-                    raise ValueError(
-                        f"each edge must have an attribute {weight!r}, its length, but "
-                        f"the one from {tail!r} to {head!r} has none; set it, or name "
-                        "another: from_networkx(graph, weight=...)."
+                    raise TypeError(
+                        f"{what} must be a real number, its length, but it has none; set "
+                        "it, or name another attribute: from_networkx(graph, weight=...)."
                     )
-                value = validation.number(
-                    f"the {weight!r} of edge ({tail!r}, {head!r})", length, at_least=0
-                )
+                value = validation.number(what, length, at_least=0)
                 distances[index[tail], index[head]] = value
                 if not graph.is_directed():
                     distances[index[head], index[tail]] = value
@@ -212,9 +211,9 @@ class TravellingSalesmanInstance:
             ValueError: the shape is wrong, or a tour misses a city.
         """
         tours = checked_tours(tour, self.n_cities)
-        following = np.roll(tours, -1, axis=-1)
-        lengths = self.distances[tours, following].sum(axis=-1)
-        return float(lengths) if tours.ndim == 1 else lengths
+        rows = np.atleast_2d(tours).astype(np.int32)
+        lengths: FloatArray = tour_lengths(rows, self.distances)
+        return float(lengths[0]) if tours.ndim == 1 else lengths
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, TravellingSalesmanInstance):
@@ -319,11 +318,7 @@ def _checked_coordinates(values: Any) -> FloatArray:
 def _checked_distances(values: Any) -> FloatArray:
     matrix = validation.real_array("distances", values, ndim=2, finite=False)
     n_cities = len(matrix)
-    if matrix.shape != (n_cities, n_cities):
-        raise ValueError(
-            "distances must be a square matrix, a row and a column for each city, got "
-            f"shape {matrix.shape}."
-        )
+    validation.check_square("distances", matrix.shape, "city")
     check_size(n_cities)
     np.fill_diagonal(matrix, 0.0)
     # No tour is longer than n times the longest road, which must be a number too.

@@ -114,6 +114,22 @@ def test_unknown_names() -> None:
         optimal_tour("lin318")
 
 
+def test_lengths_are_added_up_in_the_order_of_the_steps() -> None:
+    """As rewards are, so that a best tour has the cost of the ant that found it."""
+    rng = np.random.default_rng(3)
+    instance = TravellingSalesmanInstance.from_distances(rng.random((40, 40)) + 1e-3)
+    tours = np.stack([rng.permutation(40) for _ in range(50)])
+    found = instance.length(tours)
+    assert isinstance(found, np.ndarray)
+    for tour, length in zip(tours, found, strict=True):
+        total = 0.0
+        for city, following in zip(tour, [*tour[1:], tour[0]], strict=True):
+            total += instance.distances[city, following]
+        assert length == total
+        assert instance.length(tour) == total
+    assert instance.length(tours[:0]).shape == (0,)  # type: ignore[union-attr]
+
+
 def test_lengths_of_tours_are_sums_with_the_closing_arc() -> None:
     instance = made(ASYMMETRIC)
     assert not instance.symmetric

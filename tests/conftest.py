@@ -52,7 +52,7 @@ if worker := os.environ.get("PYTEST_XDIST_WORKER"):
     @pytest.hookimpl(tryfirst=True)
     def pytest_runtest_setup() -> None:
         """Compile nothing that another worker has compiled."""
-        kernel_cache.copy_from_others()
+        kernel_cache.copy_now_and_then()
 
 
 # The first example of a test may wait for a kernel to compile: no deadline. Each run

@@ -4,9 +4,14 @@ from __future__ import annotations
 
 import itertools
 import pickle
+import time
 from pathlib import Path
 
 from numba.core.caching import IndexDataCacheFile
+
+PAUSE = 0.5
+"""Seconds, which most kernels take to compile; looking for files takes half a
+millisecond, and there are thousands of tests."""
 
 
 class KernelCache:
@@ -25,6 +30,13 @@ class KernelCache:
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self._copied: dict[Path, int] = {}
+        self._looked = -PAUSE
+
+    def copy_now_and_then(self) -> None:
+        """Copy from the others unless that was tried less than `PAUSE` seconds ago."""
+        if time.monotonic() - self._looked >= PAUSE:
+            self.copy_from_others()
+            self._looked = time.monotonic()
 
     def copy_from_others(self) -> None:
         """Copy the kernels that other workers have compiled since the last call."""

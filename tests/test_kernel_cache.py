@@ -60,7 +60,7 @@ def test_a_kernel_that_is_still_being_written_comes_later(
     content = file.read_bytes()
     file.unlink()
     cache = KernelCache(tmp_path / "gw1")
-    cache.copy_from_others()
+    cache.copy_now_and_then()
     assert not list((tmp_path / "gw1").rglob("*.nbc"))
     file.write_bytes(content)
     cache.copy_from_others()

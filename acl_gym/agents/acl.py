@@ -7,10 +7,11 @@ from typing import Any, Self
 
 import numpy as np
 from gymnasium.vector import VectorEnv
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from acl_gym.agents.bounds import PheromoneBoundWarning, warn_if_tau0_is_high
 from acl_gym.agents.colony import ColonyAgent
+from acl_gym.agents.pheromone_agent import PheromoneAgent
 from acl_gym.agents.saving import with_prefix
 from acl_gym.agents.training import Training
 from acl_gym.callbacks.base import Callbacks
@@ -38,13 +39,13 @@ from acl_gym.partitions import Partition
 from acl_gym.policies import SoftPolicy
 from acl_gym.utils import validation
 from acl_gym.utils.parameters import Parameter, fixed
-from acl_gym.utils.serialization import Missing, to_settings
+from acl_gym.utils.serialization import to_settings
 from acl_gym.utils.typing import BoolArray, CellArray, FloatArray, IntArray, Row
 
 __all__ = ["ACL", "PheromoneBoundWarning"]
 
 
-class ACL(ColonyAgent):
+class ACL(PheromoneAgent, ColonyAgent):
     """A colony of ants that learns a control policy (van Ast, 2010).
 
     Each slot of the environment is an ant. Through a `Crisp` partition the agent is
@@ -204,7 +205,6 @@ class ACL(ColonyAgent):
         levels = as_initial(initial, env, self.partition, shape, self.tau0)
         if levels is not None:
             self.pheromone.set_levels(levels)
-        self._solutions: Solutions | None = None
         self._rule = self._update  # of the trial under way; see `watched`
         # How many have come back of M ants; once they all have, others count.
         self._in_batch, self._batch_is_full = 0, True
@@ -252,7 +252,8 @@ class ACL(ColonyAgent):
                 rollout, solutions = self.rollout, self._empty_solutions()
                 rule = self._rule = watched(self.update, self.n_actions)
                 record = self._needs_episodes()
-                epsilon = self._set_exponents()
+                self._set_exponents()
+                epsilon = self._now("epsilon")
                 observation = rollout.start(seed=self._next_seed(), record=record)
                 rule.start_trial(pheromone, self.trials)
                 costs: list[FloatArray] = []
@@ -262,7 +263,7 @@ class ACL(ColonyAgent):
                     # 8: fuzzify the states
                     index, degree = self._locate(observation, ants)
                     # 9: select actions, by default all on the same pheromone
-                    allowed = self._allowed(rollout, solutions, index)
+                    allowed = self._allowed(solutions, index)
                     actions = self._choose(index, degree, epsilon, allowed)
                     # 10: add the pairs to the partial solutions
                     solutions.append(ants, observation, index, actions)
@@ -286,15 +287,6 @@ class ACL(ColonyAgent):
                 pheromone.check_levels()
                 training.end_trial(np.concatenate(costs))  # 21: k <- k + 1
         return self
-
-    @property
-    def heuristic(self) -> FloatArray | None:
-        """The heuristic eta, `(n_cells, n_actions)`, fixed once the colony is made."""
-        return self.pheromone.heuristic
-
-    @heuristic.setter
-    def heuristic(self, value: Heuristic | None) -> None:
-        raise fixed("heuristic", value)
 
     @property
     def cost(self) -> Cost | None:
@@ -344,18 +336,6 @@ class ACL(ColonyAgent):
     @selection.setter
     def selection(self, value: str) -> None:
         raise fixed("selection", value)
-
-    @property
-    def _table(self) -> FloatArray:
-        return self.pheromone.levels
-
-    def set_table(self, table: ArrayLike) -> None:
-        """Replace all pheromone levels.
-
-        Raises:
-            ValueError: the shape differs, or a level is not positive and finite.
-        """
-        self.pheromone.set_levels(table, "table")
 
     def set_env(self, env: VectorEnv[Any, Any, Any]) -> None:
         """See `TabularAgent.set_env`; warns if tau0 is too high for `env`."""
@@ -462,22 +442,6 @@ class ACL(ColonyAgent):
         alpha = self.pheromone.alpha
         return {"sensitivity": mean_sensitivity(self._table, policy, alpha)}
 
-    def _now(self, name: str) -> float:
-        """The value that a number or schedule has in the next trial."""
-        parameter: Parameter = getattr(type(self), name)
-        return parameter.at(self, self.trials)
-
-    def _at_first(self, name: str) -> float:
-        """The value with which to begin; 1 where a file could not hold the schedule."""
-        missing = isinstance(getattr(self, name), Missing)
-        return 1.0 if missing else self._now(name)
-
-    def _set_exponents(self) -> float:
-        """Set alpha and beta to their values in the next trial; return its epsilon."""
-        self.pheromone.alpha = self._now("alpha")
-        self.pheromone.beta = self._now("beta")
-        return self._now("epsilon")
-
     def _needs_episodes(self) -> bool:
         """Whether the cost or the update rule looks at every step of a solution."""
         return self.cost is not None or self.update.needs_episodes
@@ -515,17 +479,6 @@ class ACL(ColonyAgent):
             begins,
         )
 
-    def _allowed(
-        self, rollout: Rollout, solutions: Solutions, index: CellArray
-    ) -> BoolArray | None:
-        """U_q of each walking ant, less what is tabu; None: all actions."""
-        allowed = rollout.allowed()
-        if not self.tabu:
-            return allowed
-        if allowed is None:
-            allowed = np.ones((rollout.ants.size, self.n_actions), dtype=np.bool_)
-        return solutions.untried(rollout.ants, index, allowed)
-
     def _choose(
         self,
         index: CellArray,
@@ -548,23 +501,14 @@ class ACL(ColonyAgent):
     def _explore(
         self, index: CellArray, degree: FloatArray, allowed: BoolArray | None
     ) -> IntArray:
-        epsilon = self._set_exponents()
+        self._set_exponents()
         # Never by the update rule, which may change the pheromone.
         return choose_actions(
             self.selection,
             self.pheromone,
             index,
             degree,
-            epsilon,
+            self._now("epsilon"),
             self._predict_rng,
             allowed,
         )
-
-    def _empty_solutions(self) -> Solutions:
-        """Memory for a trial, reused from trial to trial."""
-        kept, shape = self._solutions, (self.num_envs, self.max_steps)
-        if kept is None or (kept.n_ants, kept.max_steps) != shape:
-            kept = Solutions(*shape, self.n_actions, self.partition)
-            self._solutions = kept
-        kept.clear()
-        return kept

@@ -11,6 +11,7 @@ from gymnasium.vector import VectorEnv
 from numpy.typing import ArrayLike, NDArray
 
 from acl_gym.agents.base import TabularAgent, time_limit
+from acl_gym.agents.pheromone_agent import PheromoneAgent
 from acl_gym.agents.saving import with_prefix
 from acl_gym.colony.ant_rule import AntRule, check_flag
 from acl_gym.colony.candidates import NONE, candidate_lists, inverse_distances
@@ -26,8 +27,8 @@ from acl_gym.envs.graph.travelling_salesman.lookup import salesman_of
 from acl_gym.partitions import Partition
 from acl_gym.policies import TablePolicy
 from acl_gym.utils import validation
-from acl_gym.utils.parameters import Parameter, fixed
-from acl_gym.utils.serialization import Missing, to_settings
+from acl_gym.utils.parameters import fixed
+from acl_gym.utils.serialization import to_settings
 from acl_gym.utils.typing import BoolArray, CellArray, FloatArray, IntArray
 
 UNKNOWN_TAU0 = 1.0
@@ -38,7 +39,7 @@ USUAL_CANDIDATES = 20
 """How many cities ants look at first on the travelling salesman problem, as in ACOTSP."""
 
 
-class AntAgent(TabularAgent):
+class AntAgent(PheromoneAgent):
     """The table of a colony that looks for one best solution, and its files.
 
     Args:
@@ -228,15 +229,6 @@ class AntAgent(TabularAgent):
     def symmetric(self, value: bool | None) -> None:
         raise fixed("symmetric", value)
 
-    @property
-    def heuristic(self) -> FloatArray | None:
-        """The heuristic variables eta, `(n_cells, n_actions)`, read-only; None: 1."""
-        return self.pheromone.heuristic
-
-    @heuristic.setter
-    def heuristic(self, value: Heuristic | None) -> None:
-        raise fixed("heuristic", value)
-
     def _check_states(self, env: Any) -> None:
         """Refuse observations of which no partition of single cells follows.
 
@@ -296,17 +288,9 @@ class AntAgent(TabularAgent):
         # Where there are no lists, every city is a candidate of every other.
         self._lists: CellArray | None = lists if lists.size else None
 
-    @property
-    def _table(self) -> FloatArray:
-        return self.pheromone.levels
-
     def set_table(self, table: ArrayLike) -> None:
-        """Replace all pheromone levels.
-
-        Raises:
-            ValueError: the shape differs, or a level is not positive and finite.
-        """
-        self.pheromone.set_levels(table, "table")
+        """See `PheromoneAgent.set_table`; tau0 sets these levels no more."""
+        super().set_table(table)
         self._levels_are_set = True
 
     @property
@@ -345,23 +329,6 @@ class AntAgent(TabularAgent):
         return choose_actions(
             "boltzmann", self.pheromone, index, degree, 0.0, rng, allowed
         )
-
-    def _now(self, name: str) -> float:
-        """The value that a number or schedule has in the next trial."""
-        parameter: Parameter = getattr(type(self), name)
-        return parameter.at(self, self.trials)
-
-    def _at_first(self, name: str) -> float:
-        """The value with which to begin; 1 where a file could not hold the schedule."""
-        value = self.__dict__[name]
-        if isinstance(value, Missing):
-            return 1.0
-        parameter: Parameter = getattr(type(self), name)
-        return parameter.at(self, 0)
-
-    def _set_exponents(self) -> None:
-        self.pheromone.alpha = self._now("alpha")
-        self.pheromone.beta = self._now("beta")
 
     def parameters(self) -> dict[str, Any]:
         """The keyword arguments of the constructor, except `heuristic`, an array."""

@@ -17,7 +17,6 @@ from acl_gym.callbacks.base import Callbacks
 from acl_gym.colony.ant_kernels import branching_factor
 from acl_gym.colony.deposits import checked_deposits
 from acl_gym.colony.local_search import METHODS, LocalSearch, nearest_neighbours
-from acl_gym.colony.solutions import Solutions
 from acl_gym.colony.tours import Tours, nearest_neighbour_tour
 from acl_gym.colony.update_rule import TrialResult
 from acl_gym.envs.graph.instances import TravellingSalesmanInstance
@@ -27,7 +26,7 @@ from acl_gym.evaluation.steps import Outcome
 from acl_gym.partitions import Partition
 from acl_gym.utils import validation
 from acl_gym.utils.serialization import from_json, to_settings
-from acl_gym.utils.typing import BoolArray, CellArray, FloatArray, IntArray, Row
+from acl_gym.utils.typing import FloatArray, IntArray, Row
 
 _NEIGHBOURS = 20
 """How many neighbours of a city local search looks at, as in ACOTSP."""
@@ -58,7 +57,6 @@ class AntOptimizer(AntAgent):
         super().__init__(env, partition, **parameters)
         self._instance: TravellingSalesmanInstance | None = None
         self._tours: Tours | None = None
-        self._solutions: Solutions | None = None
         self._result: TrialResult | None = None
         self._set_tau0()
         self._check_env()
@@ -251,25 +249,6 @@ class AntOptimizer(AntAgent):
         if complete.any():  # else there is no solution
             deposits[complete] = self._fitness(rollout.cost[complete])
         return TrialResult(solutions, rollout.cost, deposits, complete)
-
-    def _allowed(self, solutions: Solutions, index: CellArray) -> BoolArray | None:
-        """What each walking ant may do, less what is tabu; None: everything."""
-        rollout = self.rollout
-        allowed = rollout.allowed()
-        if not self.tabu:
-            return allowed
-        if allowed is None:
-            allowed = np.ones((rollout._ants.size, self.n_actions), np.bool_)
-        return solutions.untried(rollout._ants, index, allowed)
-
-    def _empty_solutions(self) -> Solutions:
-        """Memory for a trial, reused from trial to trial."""
-        kept, shape = self._solutions, (self.num_envs, self.max_steps)
-        if kept is None or (kept.n_ants, kept.max_steps) != shape:
-            kept = Solutions(*shape, self.n_actions, self.partition)
-            self._solutions = kept
-        kept.clear()
-        return kept
 
     def outcome(self) -> Outcome:
         """What the solutions of the trial that has just ended came to."""

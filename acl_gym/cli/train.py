@@ -47,7 +47,7 @@ Examples:
   acl-gym train acl_gym/Pendulum-v0 --param epsilon=linear:0.3:0.01:50
   acl-gym train acl_gym/Pendulum-v0 --env-arg torques=[-1,0,1] --cells 64,65
   acl-gym train CartPole-v1 --param deposit=rank:5
-  acl-gym train acl_gym/TravellingSalesman-v0 --agent max-min --env-arg instance=eil51
+  acl-gym train acl_gym/TravellingSalesman-v0 --agent max-min
   acl-gym train Pendulum-v1 --discretize 5
   acl-gym train my_module:MyEnv-v0 --max-steps 200 --log run.csv --json
 """

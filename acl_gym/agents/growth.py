@@ -21,7 +21,7 @@ WHERE = ("tried", "varied", "everywhere")
 """Where cells may be halved before those of the whole grid are, see `Growth`."""
 
 TWICE = 2.0
-"""How much oftener than the average the pairs between two centres must be tried."""
+"""How many times `visits_to_grow` the pairs between two centres must have been tried."""
 
 NARROWEST = 2.0**-10
 """The share of a variable's range below which single intervals are not halved.
@@ -40,7 +40,7 @@ class Growth:
     Args:
         on: whether it grows at all.
         where: where cells are halved before pairs have been tried often enough on the
-            average. `"tried"`: where pairs have been tried twice as often. `"varied"`:
+            average. `"tried"`: where pairs have been tried twice as often as that. `"varied"`:
             where they have been tried often enough and the policy varies most (§7.3),
             weighted with how often they were tried. `"everywhere"`: nowhere sooner than
             elsewhere.
@@ -157,7 +157,7 @@ class Growth:
         """Say once for each limit that it keeps cells from being halved."""
         if self._told != max_cells:
             self._told = max_cells
-            logger.info(
+            logger.warning(
                 "The partition has %d cells and would be made finer, but max_cells is "
                 "%d; a higher limit allows finer cells.",
                 n_cells,

@@ -1,4 +1,4 @@
-"""The colony that remembers: ants walk back and lay what they know by then."""
+"""The colony that remembers: ants walk back and lay what they then know."""
 
 from __future__ import annotations
 
@@ -36,8 +36,8 @@ class ReturningACL(InformedAgent, ColonyAgent):
     levels over (cell, action) pairs. Three things differ, each of which the thesis names
     (§2.3, §7.3):
 
-    - After a while the ants walk their paths back. At each pair an ant lays what it
-      expects by then: the reward of the step and what follows, see
+    - After a while the ants walk their paths back. At each pair an ant lays what it then
+      expects: the reward of the step and what follows, see
       `acl_gym.colony.walking_back`. A pair is judged by itself, not by the cost of the
       whole solution, and levels become means, not sums, so that what is popular does not
       beat what is good.
@@ -98,8 +98,9 @@ class ReturningACL(InformedAgent, ColonyAgent):
             pairs have been tried often enough on the average; then all cells are halved,
             whatever this says.
         restart_after: after how many steps all ants set out anew, though they have not
-            finished, >= 1. None takes 60 where they start anywhere, and never does so
-            where all start in the same place, see `acl_gym.colony.starts`.
+            finished, >= 1. None takes 60 until 20 starts have been seen. Where these are
+            spread widely it stays so; where all start in the same place, ants walk to the
+            end of their episodes from then on, see `acl_gym.colony.starts`.
         schedule: `"synchronous"`: an ant that has finished waits until all have.
             `"asynchronous"` (§7.3): it sets out again at once, until the last ant is back
             from its first way of the trial; the trial then ends for all, and paths that
@@ -369,7 +370,7 @@ class ReturningACL(InformedAgent, ColonyAgent):
 
     @property
     def restart_after(self) -> int | None:
-        """After how many steps all ants set out anew; None: it depends on the starts."""
+        """After how many steps all ants set out anew; None: 60, or it depends on the starts."""
         return self._restart_after
 
     @restart_after.setter

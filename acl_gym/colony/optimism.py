@@ -58,8 +58,8 @@ def possible_levels(
     Args:
         memory: what the ants remember.
         discount: gamma_rl, in [0, 1].
-        horizon: the most steps of an episode. They bound what can be had where discount
-            is 1: what ends by then promises what comes after, for ever.
+        horizon: the most steps of an episode. Where discount is 1, so many rewards can be
+            had at most.
     """
     steps = _steps_that_count(discount, horizon)
     going, ending, worst = _extreme_rewards(

@@ -1,4 +1,4 @@
-"""Whether ants had better set out anew than walk on.
+"""Whether ants learn more from setting out anew than from walking on.
 
 An ant that starts anywhere sees more of the task from many short walks than from a few
 long ones: what follows the end of a walk is promised by what others have seen. Where all

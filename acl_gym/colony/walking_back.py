@@ -1,4 +1,4 @@
-"""The returning ants: they walk their paths back and lay what they know by then.
+"""The returning ants: they walk their paths back and lay what they then know.
 
 Levels promise Q(x, u), the sum of those of the cells of x weighted with its degrees, and
 V(x), the largest Q(x, u) over the allowed u. At a pair (x_t, u_t) an ant on its way back

@@ -298,7 +298,8 @@ class Grid(FixedPartition):
         if bad >= 0:
             raise ValueError(
                 f"states must be finite, got {validation.shown(states[bad].tolist())} "
-                f"in row {bad}."
+                f"in row {bad}; where these are observations, a row is a slot: check what "
+                "the environment returns there."
             )
 
     def cell_states(self) -> FloatArray:

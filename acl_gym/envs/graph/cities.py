@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from acl_gym.envs.graph.lengths import tour_lengths
 from acl_gym.envs.graph.metrics import distances_between
 from acl_gym.utils import validation
+from acl_gym.utils.hashing import hashed_numbers
 from acl_gym.utils.typing import FloatArray
 
 MOST_CITIES = 100_000
@@ -197,6 +198,27 @@ class TravellingSalesmanInstance:
     def symmetric(self) -> bool:
         """Whether each road has the same length in both directions."""
         return bool(np.array_equal(self.distances, self.distances.T))
+
+    @cached_property
+    def fingerprint(self) -> bytes:
+        """A hash of the distances, 32 bytes: equal only where all distances are."""
+        return hashed_numbers(self.distances)
+
+    def difference(self, other: TravellingSalesmanInstance) -> str | None:
+        """In words how its distances differ from those of another; None if they do not.
+
+        Names, coordinates and optima do not count: tours have the same lengths.
+        """
+        mine, others = self.distances, other.distances
+        if mine is others or np.array_equal(mine, others):
+            return None
+        if len(mine) != len(others):
+            return f"{len(mine)} cities in place of {len(others)}"
+        i, j = np.argwhere(mine != others)[0]
+        return (
+            f"a distance of {float(mine[i, j])!r} from city {i} to city {j} in place of "
+            f"{float(others[i, j])!r}"
+        )
 
     def length(self, tour: ArrayLike) -> float | FloatArray:
         """Return the length of a tour, or of each of several, closing arc included.

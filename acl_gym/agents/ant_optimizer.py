@@ -74,7 +74,10 @@ class AntOptimizer(AntAgent):
 
     @classmethod
     def usual_ants(cls, n_cities: int, local_search: str | None = None) -> int:
-        """As many as there are cities; with local search 25; of ACS 10; as in ACOTSP.
+        """How many ants are usual, as in ACOTSP.
+
+        As many as there are cities, with local search 25; Ant Colony System has 10 in any
+        case.
 
         Args:
             n_cities: n, >= 2.
@@ -385,9 +388,8 @@ class AntOptimizer(AntAgent):
                     f"wrappers of your own, and walk=False, got {validation.shown(self.env)} "
                     f"and walk={self.walk}; leave local_search out."
                 )
-            distances = salesman.instance.distances
-            near = nearest_neighbours(distances, min(_NEIGHBOURS, len(distances) - 1))
-            self._search = LocalSearch(self._local_search, distances, near)
+            near = nearest_neighbours(salesman.instance, _NEIGHBOURS)
+            self._search = LocalSearch(self._local_search, salesman.instance, near)
         if salesman is not None:
             self._instance = salesman.instance
 

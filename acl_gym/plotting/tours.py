@@ -10,7 +10,11 @@ from matplotlib.collections import LineCollection
 from numpy.typing import ArrayLike
 
 from acl_gym.agents.ant_agent import AntAgent
-from acl_gym.envs.graph.cities import TravellingSalesmanInstance, checked_tours
+from acl_gym.envs.graph.cities import (
+    TravellingSalesmanInstance,
+    checked_instance,
+    checked_tours,
+)
 from acl_gym.envs.graph.pictures import checked_levels, places_of, strongest_arcs
 from acl_gym.plotting import style
 from acl_gym.utils import validation
@@ -53,12 +57,7 @@ def plot_tour(
         agent, instance = instance, _instance_of(instance)
         tour = agent.best_tour if tour is None else tour
         pheromone = agent.table if pheromone is None else pheromone
-    if not isinstance(instance, TravellingSalesmanInstance):
-        raise TypeError(
-            "instance must be a TravellingSalesmanInstance, got "
-            f"{validation.shown(instance)}; take env.unwrapped.instance."
-        )
-    n_cities = instance.n_cities
+    n_cities = checked_instance(instance).n_cities
     order = None if tour is None else checked_tours(tour, n_cities)
     if order is not None and order.ndim != 1:
         raise ValueError(

@@ -235,6 +235,18 @@ def test_remedies_are_those_that_ant_agents_take(kind: type[Any]) -> None:
         assert "rank" not in str(words.value)
 
 
+@pytest.mark.parametrize("local_search", [None, "2-opt", "or-opt", "3-opt"])
+def test_the_best_cost_is_the_length_of_the_best_tour_bit_for_bit(
+    local_search: str | None,
+) -> None:
+    """Sums of forty distances that are no whole numbers round in the order of adding."""
+    for seed in range(5):
+        places = np.random.default_rng(seed).uniform(0, 9, (40, 2))
+        env = salesman(10, coordinates=places, distances=None)
+        colony = MaxMinAntSystem(env, seed=0, local_search=local_search).learn(trials=3)
+        assert colony.best_cost == colony.instance.length(colony.best_tour)
+
+
 def test_what_other_agents_say_passes_through_processes() -> None:
     with pytest.raises(UndefinedDepositError, match='elsewhere deposit="rank"') as said:
         InverseCost()(np.array([1.0, 0.0]), 1.0)

@@ -280,6 +280,21 @@ def _rebuilt(
     )
 
 
+def checked_instance(value: Any) -> TravellingSalesmanInstance:
+    """Return an instance if it is one.
+
+    Raises:
+        TypeError: it is not.
+    """
+    if not isinstance(value, TravellingSalesmanInstance):
+        raise TypeError(
+            "instance must be a TravellingSalesmanInstance, got "
+            f"{validation.shown(value)}; take env.unwrapped.instance, or "
+            "TravellingSalesmanInstance.from_distances(distances)."
+        )
+    return value
+
+
 def checked_tours(tour: Any, n_cities: int) -> NDArray[np.int64]:
     """Return tours as int64 `(n,)` or `(k, n)`, each city once.
 
@@ -327,11 +342,18 @@ def check_size(n_cities: int) -> None:
 
 
 def _checked_coordinates(values: Any) -> FloatArray:
-    places = validation.real_array("coordinates", values, ndim=2)
+    places = validation.real_array("coordinates", values, ndim=2, finite=False)
     if places.shape[1] != 2:
         raise ValueError(
             "coordinates must have two columns, x and y, got shape "
             f"{places.shape}; pass a matrix of distances for other spaces."
+        )
+    bad = ~np.isfinite(places).all(axis=1)
+    if bad.any():
+        city = int(np.argmax(bad))
+        raise ValueError(
+            f"coordinates must be finite, got {places[city].tolist()} for city {city} of "
+            f"0 to {len(places) - 1}; correct it or leave the city out."
         )
     check_size(len(places))
     return places

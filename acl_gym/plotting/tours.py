@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from acl_gym.agents.ant_agent import AntAgent
 from acl_gym.envs.graph.cities import (
+    UNNAMED,
     TravellingSalesmanInstance,
     checked_instance,
     checked_tours,
@@ -18,6 +20,7 @@ from acl_gym.envs.graph.cities import (
 from acl_gym.envs.graph.pictures import checked_levels, places_of, strongest_arcs
 from acl_gym.plotting import style
 from acl_gym.utils import validation
+from acl_gym.utils.typing import FloatArray
 
 _FAINTEST, _DARKEST = (
     0.92,
@@ -33,8 +36,9 @@ def plot_tour(
 ) -> Axes:
     """Draw a tour over the map, and below it the arcs with much pheromone in grey.
 
-    Cities whose coordinates are unknown lie on a circle. The title tells the length of
-    the tour and, where the optimum is known, by how much it exceeds that.
+    Cities whose coordinates are unknown lie on a circle. Where roads are longer in one
+    direction, arrowheads show that of the tour. The title tells the length of the tour
+    and, where the optimum is known, by how much it exceeds that.
 
     Args:
         instance: the cities; or an `AntSystem`, `AntColonySystem` or `MaxMinAntSystem`
@@ -80,6 +84,8 @@ def plot_tour(
         if order is not None:
             way = places[np.append(order, order[0])]
             ax.plot(*way.T, color=style.BLUE, linewidth=1.2, zorder=2.0)
+            if not instance.symmetric:
+                _draw_arrowheads(ax, way)
         ax.plot(
             *places.T,
             color="0.25",
@@ -107,11 +113,33 @@ def _instance_of(agent: AntAgent) -> TravellingSalesmanInstance:
     return agent.instance
 
 
+def _draw_arrowheads(ax: Axes, way: FloatArray) -> None:
+    """A small arrowhead in the middle of each arc that has a length in the picture."""
+    for tail, head in pairwise(way):
+        if (tail != head).any():
+            middle = 0.5 * (tail + head)
+            ax.annotate(
+                "",
+                xy=tuple(middle + 0.01 * (head - tail)),
+                xytext=tuple(middle),
+                arrowprops={
+                    "arrowstyle": "-|>",
+                    "color": style.BLUE,
+                    "linewidth": 0.0,
+                    "mutation_scale": 8.0,
+                    "shrinkA": 0.0,
+                    "shrinkB": 0.0,
+                },
+                zorder=2.5,
+            )
+
+
 def _title(instance: TravellingSalesmanInstance, order: Any) -> str:
+    name = "" if instance.name in UNNAMED else instance.name
     if order is None:
-        return instance.name
+        return name
     length, best = instance.length(order), instance.optimum
-    title = f"{instance.name}: {length:,.6g}"
+    title = f"{name}: {length:,.6g}" if name else f"tour of length {length:,.6g}"
     if best:
         title += f", {100.0 * (length / best - 1.0):.1f}% above the optimum"
     return title

@@ -52,6 +52,31 @@ def test_cities_alone_and_without_an_optimum() -> None:
     assert (ax.get_title(loc="left") or ax.get_title()) == "four: 4"
 
 
+def test_arrowheads_only_where_directions_count() -> None:
+    one_way = TravellingSalesmanInstance.from_distances(
+        np.arange(16.0).reshape(4, 4),
+        # Between two cities at the same place there is nothing to point at.
+        coordinates=[[0, 0], [0, 0], [3, 0], [0, 2]],
+    )
+    heads = plot_tour(one_way, [0, 1, 2, 3]).texts
+    points = [(each.xyann, each.xy) for each in heads]
+    assert len(points) == 3
+    start, end = np.array(points[0])
+    np.testing.assert_allclose(start, [1.5, 0.0])  # in the middle from city 1 to 2
+    assert end[0] > start[0]
+    assert not plot_tour(ATT48, WAY).texts
+    assert not plot_tour(one_way).texts
+
+
+def test_the_title_without_a_name() -> None:
+    places = np.array([[0.0, 0.0], [0.0, 1.0], [1.0, 1.0]])
+    instance = TravellingSalesmanInstance.from_coordinates(places)
+    ax = plot_tour(instance, [0, 1, 2])
+    assert (ax.get_title(loc="left") or ax.get_title()) == "tour of length 3.41421"
+    ax = plot_tour(instance)
+    assert (ax.get_title(loc="left") or ax.get_title()) == ""
+
+
 @pytest.mark.parametrize(
     ("arguments", "error", "message"),
     [

@@ -20,6 +20,9 @@ from acl_gym.utils.typing import FloatArray
 MOST_CITIES = 100_000
 """Cities of an instance at most; a matrix of so many takes 80 GB."""
 
+UNNAMED = ("distances", "coordinates", "graph")
+"""Names of instances to which nobody has given one: what they were made of."""
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class TravellingSalesmanInstance:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -26,6 +25,9 @@ _FAINTEST, _DARKEST = (
     0.92,
     0.35,
 )  # grey of arcs with little pheromone, and with the most
+
+_HEAD = 0.08
+"""Length of an arrowhead, inches."""
 
 
 def plot_tour(
@@ -115,23 +117,26 @@ def _instance_of(agent: AntAgent) -> TravellingSalesmanInstance:
 
 def _draw_arrowheads(ax: Axes, way: FloatArray) -> None:
     """A small arrowhead in the middle of each arc that has a length in the picture."""
-    for tail, head in pairwise(way):
-        if (tail != head).any():
-            middle = 0.5 * (tail + head)
-            ax.annotate(
-                "",
-                xy=tuple(middle + 0.01 * (head - tail)),
-                xytext=tuple(middle),
-                arrowprops={
-                    "arrowstyle": "-|>",
-                    "color": style.BLUE,
-                    "linewidth": 0.0,
-                    "mutation_scale": 8.0,
-                    "shrinkA": 0.0,
-                    "shrinkB": 0.0,
-                },
-                zorder=2.5,
-            )
+    arcs = np.diff(way, axis=0)
+    sizes = np.hypot(*arcs.T)
+    shown = sizes > 0.0
+    middles = (0.5 * (way[1:] + way[:-1]))[shown]
+    directions = arcs[shown] / sizes[shown, None]
+    ax.quiver(
+        *middles.T,
+        *directions.T,
+        angles="xy",
+        units="inches",
+        scale_units="inches",
+        scale=1.0 / _HEAD,  # as long as its head
+        width=_HEAD / 5.0,
+        headwidth=4.0,
+        headlength=5.0,
+        headaxislength=5.0,
+        pivot="mid",
+        color=style.BLUE,
+        zorder=2.5,
+    )
 
 
 def _title(instance: TravellingSalesmanInstance, order: Any) -> str:

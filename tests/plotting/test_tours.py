@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
+from matplotlib.quiver import Quiver
 
 from acl_gym import AntColonySystem, AntSystem, MaxMinAntSystem
 from acl_gym.envs.graph import (
@@ -58,14 +59,16 @@ def test_arrowheads_only_where_directions_count() -> None:
         # Between two cities at the same place there is nothing to point at.
         coordinates=[[0, 0], [0, 0], [3, 0], [0, 2]],
     )
-    heads = plot_tour(one_way, [0, 1, 2, 3]).texts
-    points = [(each.xyann, each.xy) for each in heads]
-    assert len(points) == 3
-    start, end = np.array(points[0])
-    np.testing.assert_allclose(start, [1.5, 0.0])  # in the middle from city 1 to 2
-    assert end[0] > start[0]
-    assert not plot_tour(ATT48, WAY).texts
-    assert not plot_tour(one_way).texts
+    ax = plot_tour(one_way, [0, 1, 2, 3])
+    (heads,) = (each for each in ax.collections if isinstance(each, Quiver))
+    # In the middle of the ways from city 1 to 2, to 3 and back to 0.
+    np.testing.assert_allclose(heads.XY, [[1.5, 0.0], [1.5, 1.0], [0.0, 1.0]])
+    directions = np.array([[3.0, 0.0], [-3.0, 2.0], [0.0, -2.0]])
+    directions /= np.hypot(*directions.T)[:, None]
+    np.testing.assert_allclose(np.column_stack([heads.U, heads.V]), directions)
+    ax.figure.canvas.draw()
+    for ax in (plot_tour(ATT48, WAY), plot_tour(one_way)):
+        assert not any(isinstance(each, Quiver) for each in ax.collections)
 
 
 def test_the_title_without_a_name() -> None:

@@ -309,10 +309,13 @@ class AntOptimizer(AntAgent):
                 travelling salesman problem than that by whose distances ants choose.
             RuntimeError: a trial is under way.
         """
+        found = salesman_of(env)
+        if found is not None:
+            check_instance(found.instance, self._instance, self._fingerprint)
         before, known, instance = self.env, self._salesman, self._instance
         super().set_env(env)
         try:
-            self._salesman = salesman_of(env)
+            self._salesman = found
             self._check_env()
             same = before is None or self._is_same_task(before, known)
             if same:
@@ -378,9 +381,8 @@ class AntOptimizer(AntAgent):
             return
         salesman = self._salesman
         if salesman is not None:
-            instance = salesman.instance
-            check_instance(instance, self._instance, self._fingerprint)
-            check_steps(instance.n_cities, time_limit(self.env), self.max_steps)
+            n_cities = salesman.instance.n_cities
+            check_steps(n_cities, time_limit(self.env), self.max_steps)
         if self._local_search is not None:
             if salesman is None or not self.builds_tours:
                 raise ValueError(

@@ -142,6 +142,16 @@ def test_only_distances_tell_instances_apart() -> None:
         colony.set_env(salesman(distances=changed))
 
 
+@pytest.mark.parametrize("kind", KINDS)
+def test_another_number_of_cities_is_said_so(kind: type[Any]) -> None:
+    colony = kind(salesman(), seed=0)
+    with pytest.raises(ValueError, match="got 11 cities in place of 12; make a new"):
+        colony.set_env(salesman(distances=roads(11)))
+    with pytest.raises(ValueError, match="got others, of <distances: 11 cities"):
+        kind.load(file_of(colony), env=salesman(distances=roads(11)))
+    assert colony.learn(trials=1).best_tour.size == 12
+
+
 def lake(wrapper: Any = None, slots: int = 10) -> Any:
     env = gym.make_vec("FrozenLake-v1", num_envs=slots, vectorization_mode="sync")
     return env if wrapper is None else TransformReward(env, wrapper)

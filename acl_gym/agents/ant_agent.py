@@ -118,8 +118,8 @@ class AntAgent(PheromoneAgent):
         if isinstance(self.deposit, Rank):
             raise ValueError(
                 "deposit must say of each solution alone how good it is, so that the best "
-                "so far can be told, got 'rank'; take 'inverse' for costs, 'return' for "
-                "rewards, or a function of the costs."
+                "so far can be told, got 'rank'; take 'inverse_cost' for costs, 'return' "
+                "for rewards that are never negative, or a function of the costs."
             )
         self.tabu, self.walk = tabu, walk
         self._local_search = local_search

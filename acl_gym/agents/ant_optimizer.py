@@ -11,11 +11,13 @@ from gymnasium.vector import VectorEnv
 from numpy.typing import NDArray
 
 from acl_gym.agents.ant_agent import UNKNOWN_TAU0, AntAgent
-from acl_gym.agents.same_task import is_same_task
+from acl_gym.agents.base import time_limit
+from acl_gym.agents.salesman_checks import check_instance, check_steps, fitness_error
+from acl_gym.agents.same_task import is_same_task, same_wrappers
 from acl_gym.agents.training import Training
 from acl_gym.callbacks.base import Callbacks
 from acl_gym.colony.ant_kernels import branching_factor
-from acl_gym.colony.deposits import checked_deposits
+from acl_gym.colony.deposits import UndefinedDepositError, checked_deposits
 from acl_gym.colony.local_search import METHODS, LocalSearch, nearest_neighbours
 from acl_gym.colony.tours import Tours, nearest_neighbour_tour
 from acl_gym.colony.update_rule import TrialResult
@@ -33,6 +35,10 @@ _NEIGHBOURS = 20
 
 _LEAST_DEPOSIT, _MOST_DEPOSIT = 1e-150, 1e150
 """What ants may deposit, so that no sum or quotient of levels leaves the range of floats."""
+
+
+_BYTES = 32
+"""Of the hash of an instance in a file."""
 
 
 class NoSolutionWarning(UserWarning):
@@ -56,6 +62,8 @@ class AntOptimizer(AntAgent):
     ) -> None:
         super().__init__(env, partition, **parameters)
         self._instance: TravellingSalesmanInstance | None = None
+        # Of the instance that a file was made with, which holds no more of it.
+        self._fingerprint: bytes | None = None
         self._tours: Tours | None = None
         self._result: TrialResult | None = None
         self._set_tau0()
@@ -66,7 +74,10 @@ class AntOptimizer(AntAgent):
 
     @classmethod
     def usual_ants(cls, n_cities: int, local_search: str | None = None) -> int:
-        """As many as there are cities; with local search 25; of ACS 10; as in ACOTSP.
+        """How many ants are usual, as in ACOTSP.
+
+        As many as there are cities, with local search 25; Ant Colony System has 10 in any
+        case.
 
         Args:
             n_cities: n, >= 2.
@@ -147,13 +158,14 @@ class AntOptimizer(AntAgent):
         """Set tau0 by the formula of the literature, as soon as that is possible.
 
         On the travelling salesman problem by the length of the nearest-neighbour tour
-        from city 0. Elsewhere by the best cost of the first trial, in which all levels are
-        equal, so that it does not matter which they are.
+        from city 0. Elsewhere, and where a wrapper may change what a tour costs, by the
+        best cost of the first trial, in which all levels are equal, so that it does not
+        matter which they are.
         """
         if not self._tau0_is_due or self.env is None:
             return
         tau0, salesman = self.tau0, self._salesman
-        if tau0 is None and salesman is not None:
+        if tau0 is None and salesman is not None and salesman.is_plain:
             distances = salesman.instance.distances
             tour = nearest_neighbour_tour(distances, 0)[None]
             length = tour_lengths(tour, distances)
@@ -181,7 +193,10 @@ class AntOptimizer(AntAgent):
         """F of solutions, what ants deposit for them."""
         # The offset of some deposits must not change when tau0 becomes known: F of
         # solutions of different trials are compared.
-        found = self.deposit(costs, UNKNOWN_TAU0)
+        try:
+            found = self.deposit(costs, UNKNOWN_TAU0)
+        except UndefinedDepositError as error:
+            raise fitness_error(error, self._salesman) from None
         deposits = checked_deposits(found, costs.size)
         if not _LEAST_DEPOSIT <= deposits.min() <= deposits.max() <= _MOST_DEPOSIT:
             raise ValueError(
@@ -281,11 +296,12 @@ class AntOptimizer(AntAgent):
         """Learn on another environment from now on; its number of slots may differ.
 
         The pheromone stays. The best solution stays only where the task is known to be
-        the same: the same instance of the travelling salesman problem, the same object
-        below the wrappers, equal systems of this package, or slots that Gymnasium made
-        by the same id with the same arguments. Of any other task its cost would say
-        nothing, so the colony begins without one. An agent that had no environment, such
-        as one read from a file, keeps it.
+        the same: the same object; or the same wrappers, those that only watch aside,
+        around the same instance of the travelling salesman problem, the same object,
+        equal systems of this package, or slots that Gymnasium made by the same id with
+        the same arguments. Of any other task its cost would say nothing, so the colony
+        begins without one. An agent that had no environment, such as one read from a
+        file, keeps it.
 
         Raises:
             TypeError: `env` is not a vector environment.
@@ -293,16 +309,19 @@ class AntOptimizer(AntAgent):
                 travelling salesman problem than that by whose distances ants choose.
             RuntimeError: a trial is under way.
         """
-        before, known = self.env, self._salesman
+        found = salesman_of(env)
+        if found is not None:
+            check_instance(found.instance, self._instance, self._fingerprint)
+        before, known, instance = self.env, self._salesman, self._instance
         super().set_env(env)
         try:
-            self._salesman = salesman_of(env)
+            self._salesman = found
             self._check_env()
             same = before is None or self._is_same_task(before, known)
             if same:
                 self._check_best()
         except ValueError:
-            self._salesman = known
+            self._salesman, self._instance = known, instance
             if before is None:
                 self.env = self._rollout = None
             else:  # which the agent goes on with
@@ -321,14 +340,32 @@ class AntOptimizer(AntAgent):
         """Whether the environment poses the task of that which was there before."""
         if known is not None or self._salesman is not None:
             # Another instance is refused.
-            return known is not None and self._salesman is not None
+            found = self._salesman
+            if known is None or found is None:
+                return False
+            if before is self.env or (known.is_plain and found.is_plain):
+                return True
+            return same_wrappers(before, self.env)
         return is_same_task(before, self.env)
+
+    def _arrays(self) -> dict[str, NDArray[Any]]:
+        known = self._instance
+        found = self._fingerprint if known is None else known.fingerprint
+        if found is None:
+            return super()._arrays()
+        # The heuristic and the candidate lists are of these cities only.
+        return {**super()._arrays(), "instance": np.frombuffer(found, np.uint8)}
 
     def _restore(
         self, header: dict[str, Any], arrays: Mapping[str, NDArray[Any]]
     ) -> None:
         super()._restore(header, arrays)
         self._rule.check_fits(self.pheromone)
+        kept = arrays.get("instance")  # which older files do not hold
+        if kept is not None:
+            if kept.dtype != np.uint8 or kept.shape != (_BYTES,):
+                raise ValueError(f"instance must be a hash of {_BYTES} bytes")
+            self._fingerprint = kept.tobytes()
         saved = from_json(header["parameters"])["deposit"]
         if to_settings(self.deposit) != saved:  # `load` was given another
             for solution in self._rule.solutions:
@@ -344,19 +381,8 @@ class AntOptimizer(AntAgent):
             return
         salesman = self._salesman
         if salesman is not None:
-            known, instance = self._instance, salesman.instance
-            if known is not None and instance != known:
-                raise ValueError(
-                    f"env must have the instance {known.name!r}, by whose distances this "
-                    f"agent chooses, got {instance.name!r}; make a new agent for another "
-                    "instance."
-                )
-            self._instance = instance
-            if self.max_steps < instance.n_cities:
-                raise ValueError(
-                    "max_steps must be at least the number of cities, "
-                    f"{instance.n_cities}, got {self.max_steps}; leave it out."
-                )
+            n_cities = salesman.instance.n_cities
+            check_steps(n_cities, time_limit(self.env), self.max_steps)
         if self._local_search is not None:
             if salesman is None or not self.builds_tours:
                 raise ValueError(
@@ -364,18 +390,20 @@ class AntOptimizer(AntAgent):
                     f"wrappers of your own, and walk=False, got {validation.shown(self.env)} "
                     f"and walk={self.walk}; leave local_search out."
                 )
-            distances = salesman.instance.distances
-            near = nearest_neighbours(distances, min(_NEIGHBOURS, len(distances) - 1))
-            self._search = LocalSearch(self._local_search, distances, near)
+            near = nearest_neighbours(salesman.instance, _NEIGHBOURS)
+            self._search = LocalSearch(self._local_search, salesman.instance, near)
+        if salesman is not None:
+            self._instance = salesman.instance
 
     def _check_best(self) -> None:
         """Check that the best tour is one through the cities of the environment."""
-        best, instance = self._rule.best, self.instance
-        if best.found and instance is not None:
-            length = tour_lengths(best.cells[None], instance.distances)[0]
+        best, salesman = self._rule.best, self._salesman
+        # Where a wrapper may change rewards, the cost of a tour need not be its length.
+        if best.found and salesman is not None and salesman.is_plain:
+            length = tour_lengths(best.cells[None], salesman.instance.distances)[0]
             if not np.isclose(length, best.cost, rtol=1e-9):
                 raise ValueError(
                     "env must be the instance on which the best tour has a length of "
-                    f"{best.cost:g}, got one where it has {length:g}; make a new agent "
-                    "for another instance."
+                    f"{best.cost:g}, got one where it has {length:g}; take the one that "
+                    "the agent learned on, with its wrappers, or make a new agent."
                 )

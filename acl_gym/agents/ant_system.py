@@ -75,10 +75,11 @@ class AntSystem(AntOptimizer):
             function of the environment and the partition that returns one. None:
             "distance" on the travelling salesman problem, else 1 everywhere.
         candidates: how many actions of each cell ants look at first, >= 1, those of the
-            largest eta: the nearest neighbours. Where none of them is left, an ant takes
-            the best of all that are; where nothing is used up, ants take no others. None:
-            all actions; so it is without a heuristic. "usual": 20 on the travelling
-            salesman problem, else None.
+            largest eta: the nearest neighbours. An ant that has used up all of them takes
+            the best of the other actions. Where actions are not used up, because there
+            are neither masks nor `tabu`, ants never take others. None: all actions, as
+            is the case without a heuristic. "usual": 20 on the travelling salesman
+            problem, else None.
         tau0: the initial level, > 0. None takes that of the literature, m / L_nn, or
             (e + m) / (rho L_nn) with elitists and w (w - 1) / (2 rho L_nn) with ranks,
             L_nn being the length of the nearest-neighbour tour. On other environments

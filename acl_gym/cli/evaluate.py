@@ -127,6 +127,7 @@ def evaluate(
 
         showing.check(render, video)
     from acl_gym.cli.agents import load_agent
+    from acl_gym.cli.solutions import seeks_best, solution, solution_in_words
 
     agent = load_agent(file)
     environment, how = _chosen(file, agent.metadata, typed, arguments, discretize)
@@ -143,13 +144,17 @@ def evaluate(
     settings = {"file": file, **settings}
     if video is not None:
         settings["video"] = str(video)
+    solutions = {"solution": solution(agent)} if seeks_best(agent) else {}
     if as_json:
-        print_json({**settings, **figures(result)})
+        print_json({**settings, **figures(result), **solutions})
     else:
         from acl_gym.evaluation import reports_returns
 
         returns = reports_returns(agent.env, getattr(agent, "cost", None))
         _print(settings, figures(result), returns)
+        for found in solutions.values():
+            for line in solution_in_words(found):
+                console().print(line, markup=False, highlight=False, soft_wrap=True)
 
 
 def _chosen(

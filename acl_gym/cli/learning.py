@@ -25,6 +25,7 @@ from acl_gym.cli.errors import (
 )
 from acl_gym.cli.interrupts import Interruption
 from acl_gym.cli.keeping import EqualCosts, Keeper, PlainProgress
+from acl_gym.cli.solutions import seeks_best, solution, solution_in_words
 from acl_gym.colony.deposits import InverseCost
 from acl_gym.envs.control.environments import ControlVectorEnv
 from acl_gym.envs.graph.travelling_salesman.lookup import salesman_of
@@ -95,8 +96,23 @@ def begin(
     seed: int,
     evaluate_every: int | None,
     trials: int,
+    chosen_for: bool = False,
 ) -> Plan:
     """A new agent.
+
+    Args:
+        environment: where.
+        kind: a key of `AGENTS`.
+        settings: parameters of the agent.
+        ants: slots; None takes as many as are usual.
+        partition: "auto", "fuzzy" or "crisp".
+        cells: of each variable, one number for all, or None.
+        max_steps: the most steps of an episode; None takes the limit.
+        seed: of the agent.
+        evaluate_every: trials between evaluations; None takes what is usual.
+        trials: how many.
+        chosen_for: whether the agent is none that the user has named, so that a word
+            about a better one is of use.
 
     Raises:
         BadArgumentError: an argument does not suit the environment or the agent.
@@ -106,6 +122,12 @@ def begin(
         grows = AGENTS[kind].grows
     ants = ants or _default_ants(environment, kind, grows, settings)
     env = environment.vector(ants)
+    if chosen_for and salesman_of(env) is not None:
+        report(
+            "acl-gym",
+            f"note: --agent {kind} learns a policy that does not see where it has been; "
+            "--agent max-min is made for shortest tours.",
+        )
     if AGENTS[kind].seeks_best:
         _check_states(environment, env, kind, partition)
     steps = max_steps or default_steps(env)
@@ -411,16 +433,12 @@ def _summary(plan: Plan, target: Path, best: Path | None) -> dict[str, Any]:
         "trials": learner.trials,
         "env_steps": learner.num_timesteps,
         "seconds": learner.seconds,
-        **({"best_cost": last.get("best_cost")} if _seeks_best(learner) else {}),
+        **({"solution": solution(learner)} if seeks_best(learner) else {}),
         **_measures(last),
         "file": str(target),
         "best": found,
         "rows": learner.history,
     }
-
-
-def _seeks_best(learner: Any) -> bool:
-    return AGENTS[name_of(learner)].seeks_best
 
 
 def _print_rows(plan: Plan, target: Path, best: Path | None) -> None:
@@ -453,13 +471,7 @@ def _print_rows(plan: Plan, target: Path, best: Path | None) -> None:
             f"The best policy, after trial {cheapest['trial']} with a {what} of "
             f"{cheapest[f'policy_{what}']:.4f}: {best}"
         )
-    if _seeks_best(learner):
-        found = learner.best_solution
-        lines.append(
-            "No ant has completed a solution."
-            if found is None
-            else f"The best solution of all ants: {len(found)} steps, a cost of "
-            f"{learner.best_cost:.6g}."
-        )
+    if seeks_best(learner):
+        lines += solution_in_words(solution(learner))
     for line in lines:
         screen.print(line, markup=False, highlight=False, soft_wrap=True)

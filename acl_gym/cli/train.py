@@ -298,6 +298,7 @@ def train(
             seed=seed or 0,
             evaluate_every=evaluate_every,
             trials=trials or learning.TRIALS,
+            chosen_for=agent is None and shown.progress,
         )
         if agent is None and kind != next(iter(AGENTS)) and shown.progress:
             report("acl-gym", f"note: these parameters are those of --agent {kind}.")

@@ -59,11 +59,16 @@ class AntSystemUpdate(AntRule):
         self.elitists = validation.number("elitists", self.elitists, at_least=0)
         self.ranks = validation.integer("ranks", self.ranks, at_least=0)
         check_flag("symmetric", self.symmetric)
-        if self.ranks and (self.elitists or self.update_set != "trial"):
+        others = {}
+        if self.elitists:
+            others["elitists"] = f"elitists={self.elitists:g}"
+        if self.update_set != "trial":
+            others["update_set"] = f"update_set={self.update_set!r}"
+        if self.ranks and others:
             raise ValueError(
-                "ranks must stand alone, got elitists="
-                f"{self.elitists:g} and update_set={self.update_set!r} as well; leave "
-                "these out."
+                f"ranks must stand alone, got ranks={self.ranks} with "
+                f"{' and '.join(others.values())}; leave {' and '.join(others)} out, or "
+                "ranks."
             )
 
     def initial_level(self, fitness: float, steps: int, ants: int, rho: float) -> float:

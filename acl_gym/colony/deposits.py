@@ -21,6 +21,27 @@ from acl_gym.utils.typing import FloatArray
 Function = Callable[[FloatArray], FloatArray]
 
 
+class UndefinedDepositError(ValueError):
+    """A deposit is not defined for the cost of a solution.
+
+    Attributes:
+        deposit: which.
+        cost: J of that solution.
+        problem: what is wrong, without a remedy.
+        remedy: what an agent may do that takes every deposit.
+    """
+
+    def __init__(
+        self, deposit: Deposit, cost: float, problem: str, remedy: str
+    ) -> None:
+        super().__init__(deposit, cost, problem, remedy)  # what a pickle holds
+        self.deposit, self.cost = deposit, cost
+        self.problem, self.remedy = problem, remedy
+
+    def __str__(self) -> str:
+        return f"{self.problem}{self.remedy}"
+
+
 class Deposit(Savable, ABC):
     """A function from the costs of a trial's solutions to their deposits."""
 
@@ -33,7 +54,8 @@ class Deposit(Savable, ABC):
             tau0: the initial pheromone level; no deposit should be below it.
 
         Raises:
-            ValueError: the deposit is not defined for one of the costs.
+            UndefinedDepositError: the deposit is not defined for one of the costs; a
+                `ValueError`.
         """
 
 
@@ -61,12 +83,14 @@ class InverseCost(Deposit):
         valid = (shifted > 0.0) & np.isfinite(deposits) & (deposits > 0.0)
         if not valid.all():
             ant = int(np.argmin(valid))
-            raise ValueError(
+            raise UndefinedDepositError(
+                self,
+                float(costs[ant]),
                 "the cost of a solution must be > 0 and finite, because ants deposit "
-                f"1 / cost; got {shifted[ant]:g} for ant {ant}. Where returns are never negative pass "
-                'deposit="return", elsewhere deposit="rank" or '
-                "deposit=InverseCost(offset=...) with an offset above the highest "
-                "return; or add a constant to your own cost."
+                f"1 / cost; got {shifted[ant]:g} for ant {ant}",
+                '. Where returns are never negative pass deposit="return", elsewhere '
+                'deposit="rank" or deposit=InverseCost(offset=...) with an offset above '
+                "the highest return; or add a constant to your own cost.",
             )
         return deposits
 
@@ -82,10 +106,13 @@ class Return(Deposit):
         """See `Deposit`."""
         if (costs > 0.0).any():
             ant = int(np.argmax(costs))
-            raise ValueError(
+            raise UndefinedDepositError(
+                self,
+                float(costs[ant]),
                 'deposit="return" needs returns that are never negative, got '
-                f'{-costs[ant]:g} for ant {ant}; pass deposit="rank", or '
-                '"inverse_cost" where all returns are negative.'
+                f"{-costs[ant]:g} for ant {ant}",
+                '; pass deposit="rank", or "inverse_cost" where all returns are '
+                "negative.",
             )
         return tau0 - costs
 

@@ -67,7 +67,6 @@ class Memory:
             "action": np.empty(0, np.min_scalar_type(n_actions - 1)),
             "reward": np.empty(0),
         }
-        self._state_shape: tuple[int, ...] = ()
         self.set_partition(partition)
 
     @property
@@ -122,9 +121,7 @@ class Memory:
         seen = new["seen"]
         size = len(seen)
         self._forget(self.most - size)
-        if isinstance(self.partition, Grid):
-            self._state_shape = seen.shape[1:]
-        else:
+        if not isinstance(self.partition, Grid):
             del new["seen"]
         rows = self._room(size, new)
         for name, kept in self._rows.items():

@@ -10,15 +10,24 @@ from matplotlib.collections import LineCollection
 from numpy.typing import ArrayLike
 
 from acl_gym.agents.ant_agent import AntAgent
-from acl_gym.envs.graph.cities import TravellingSalesmanInstance, checked_tours
+from acl_gym.envs.graph.cities import (
+    UNNAMED,
+    TravellingSalesmanInstance,
+    checked_instance,
+    checked_tours,
+)
 from acl_gym.envs.graph.pictures import checked_levels, places_of, strongest_arcs
 from acl_gym.plotting import style
 from acl_gym.utils import validation
+from acl_gym.utils.typing import FloatArray
 
 _FAINTEST, _DARKEST = (
     0.92,
     0.35,
 )  # grey of arcs with little pheromone, and with the most
+
+_HEAD = 0.08
+"""Length of an arrowhead, inches."""
 
 
 def plot_tour(
@@ -29,8 +38,9 @@ def plot_tour(
 ) -> Axes:
     """Draw a tour over the map, and below it the arcs with much pheromone in grey.
 
-    Cities whose coordinates are unknown lie on a circle. The title tells the length of
-    the tour and, where the optimum is known, by how much it exceeds that.
+    Cities whose coordinates are unknown lie on a circle. Where roads are longer in one
+    direction, arrowheads show that of the tour. The title tells the length of the tour
+    and, where the optimum is known, by how much it exceeds that.
 
     Args:
         instance: the cities; or an `AntSystem`, `AntColonySystem` or `MaxMinAntSystem`
@@ -53,12 +63,7 @@ def plot_tour(
         agent, instance = instance, _instance_of(instance)
         tour = agent.best_tour if tour is None else tour
         pheromone = agent.table if pheromone is None else pheromone
-    if not isinstance(instance, TravellingSalesmanInstance):
-        raise TypeError(
-            "instance must be a TravellingSalesmanInstance, got "
-            f"{validation.shown(instance)}; take env.unwrapped.instance."
-        )
-    n_cities = instance.n_cities
+    n_cities = checked_instance(instance).n_cities
     order = None if tour is None else checked_tours(tour, n_cities)
     if order is not None and order.ndim != 1:
         raise ValueError(
@@ -81,6 +86,8 @@ def plot_tour(
         if order is not None:
             way = places[np.append(order, order[0])]
             ax.plot(*way.T, color=style.BLUE, linewidth=1.2, zorder=2.0)
+            if not instance.symmetric:
+                _draw_arrowheads(ax, way)
         ax.plot(
             *places.T,
             color="0.25",
@@ -108,11 +115,36 @@ def _instance_of(agent: AntAgent) -> TravellingSalesmanInstance:
     return agent.instance
 
 
+def _draw_arrowheads(ax: Axes, way: FloatArray) -> None:
+    """A small arrowhead in the middle of each arc that has a length in the picture."""
+    arcs = np.diff(way, axis=0)
+    sizes = np.hypot(*arcs.T)
+    shown = sizes > 0.0
+    middles = (0.5 * (way[1:] + way[:-1]))[shown]
+    directions = arcs[shown] / sizes[shown, None]
+    ax.quiver(
+        *middles.T,
+        *directions.T,
+        angles="xy",
+        units="inches",
+        scale_units="inches",
+        scale=1.0 / _HEAD,  # as long as its head
+        width=_HEAD / 5.0,
+        headwidth=4.0,
+        headlength=5.0,
+        headaxislength=5.0,
+        pivot="mid",
+        color=style.BLUE,
+        zorder=2.5,
+    )
+
+
 def _title(instance: TravellingSalesmanInstance, order: Any) -> str:
+    name = "" if instance.name in UNNAMED else instance.name
     if order is None:
-        return instance.name
+        return name
     length, best = instance.length(order), instance.optimum
-    title = f"{instance.name}: {length:,.6g}"
+    title = f"{name}: {length:,.6g}" if name else f"tour of length {length:,.6g}"
     if best:
         title += f", {100.0 * (length / best - 1.0):.1f}% above the optimum"
     return title

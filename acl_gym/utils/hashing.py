@@ -7,11 +7,26 @@ import json
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from acl_gym.utils.typing import FloatArray
+
 
 def hashed(value: Any) -> str:
     """The SHA-256 hash of JSON types, in hexadecimal digits."""
     text = json.dumps(value, sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()
+
+
+def hashed_numbers(numbers: FloatArray) -> bytes:
+    """The SHA-256 hash of an array's shape and float64 numbers, 32 bytes.
+
+    The same on every machine; -0 counts as another number than 0.
+    """
+    content = np.ascontiguousarray(numbers, dtype="<f8")
+    found = hashlib.sha256(str(content.shape).encode())
+    found.update(content.data)
+    return found.digest()
 
 
 def digest(path: Path) -> str:

@@ -128,10 +128,27 @@ def test_where_a_step_may_be_another_ants_walk(env: Any) -> None:
     assert found.instance.n_cities == 12
 
 
+LIMIT = (
+    r"env must have a time limit of at least 12 .*got max_episode_steps=5, .*without"
+)
+
+
+def test_the_limit_of_the_environment_is_not_called_that_of_the_ants() -> None:
+    for env in (
+        native(distances=roads(), max_episode_steps=5),
+        RecordVector(native(distances=roads(), max_episode_steps=5)),
+    ):
+        for given in ({}, {"max_steps": 13}):
+            with pytest.raises(ValueError, match=LIMIT):
+                AntSystem(env, **given)
+    with pytest.raises(ValueError, match=r"max_steps must be at least .* 12, got 5"):
+        AntSystem(native(distances=roads()), max_steps=5)
+
+
 @pytest.mark.parametrize("vector", ["sync", "sync by hand", "async"])
 def test_a_limit_that_ends_tours_is_refused(vector: str) -> None:
     env = of_slots(vector, distances=roads(), max_episode_steps=5)
-    with pytest.raises(ValueError, match="max_steps must be at least the number of"):
+    with pytest.raises(ValueError, match=LIMIT):
         AntSystem(env)
     env.close()
 
@@ -262,7 +279,7 @@ def test_from_the_salesman_to_another_task_and_back(kind: type[Any]) -> None:
 def test_a_refused_environment_leaves_the_agent_as_it_was() -> None:
     colony = AntSystem(native(distances=roads()), seed=0).learn(trials=3)
     env, tour = colony.env, colony.best_tour
-    with pytest.raises(ValueError, match="env must have the instance"):
+    with pytest.raises(ValueError, match="env must have the distances by"):
         colony.set_env(native(distances=roads(seed=1)))
     assert colony.env is env
     np.testing.assert_array_equal(colony.best_tour, tour)

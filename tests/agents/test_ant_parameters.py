@@ -112,8 +112,13 @@ def test_what_is_set_is_checked_as_in_the_constructor(
 
 def test_ranks_stand_alone_also_when_they_are_set() -> None:
     colony = AntSystem(salesman(distances=roads()), elitists=2.0, seed=0)
-    with pytest.raises(ValueError, match="ranks must stand alone"):
+    with pytest.raises(
+        ValueError, match="ranks must stand alone, got ranks=6 with eli"
+    ) as e:
         colony.ranks = 6
+    assert "update_set" not in str(e.value)  # which nobody has set
+    with pytest.raises(ValueError, match="with update_set='best-so-far'; leave update"):
+        AntSystem(salesman(distances=roads()), ranks=6, update_set="best-so-far")
     colony.elitists = 0
     colony.ranks = 6
     assert (colony.ranks, colony.update.ranks) == (6, 6)

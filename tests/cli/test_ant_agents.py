@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 
 from acl_gym.cli.settings import agent_with
+from acl_gym.envs.graph import load_instance
 from tests.cli.runner import invoke
 
 SALESMAN = "acl_gym/TravellingSalesman-v0"
@@ -30,13 +31,18 @@ def test_a_tour_is_found_kept_and_improved(agent: str, tmp_path: Path) -> None:
     )
     assert begin["agent"] == agent
     assert begin["ants"] == (10 if agent == "ant-colony-system" else 51)
-    assert begin["best_cost"] == min(r["trial_best_cost"] for r in begin["rows"])
-    assert 426 <= begin["best_cost"] < 800
+    found = begin["solution"]
+    assert found["cost"] == min(r["trial_best_cost"] for r in begin["rows"])
+    assert 426 <= found["cost"] < 800
+    assert found["steps"] == 51
+    assert load_instance("eil51").length(found["tour"]) == found["cost"]
+    assert "best_cost" not in begin  # beside `best`, which is of the policies
     more = figures("train", "--resume", file, "--trials", "5")
     assert more["trials"] == 20
-    assert more["best_cost"] <= begin["best_cost"]
-    cost = figures("evaluate", file)["policy_cost"]
-    assert cost == more["policy_cost"]
+    assert more["solution"]["cost"] <= found["cost"]
+    evaluated = figures("evaluate", file)
+    assert evaluated["policy_cost"] == more["policy_cost"]
+    assert evaluated["solution"] == more["solution"]
 
 
 def test_the_best_solution_is_printed(tmp_path: Path) -> None:
@@ -45,7 +51,36 @@ def test_the_best_solution_is_printed(tmp_path: Path) -> None:
         *("--param", "local_search=3-opt", "--out", str(tmp_path / "tour.npz")),
     )
     assert shown.exit_code == 0, shown.output
-    assert "The best solution of all ants: 48 steps, a cost of 10" in shown.stdout
+    said = "The best solution of all ants: 48 steps, a cost of 10"
+    assert said in shown.stdout
+    assert shown.stdout.endswith(", ... and 36 more (--json gives all)\n")
+    again = invoke("evaluate", str(tmp_path / "tour.npz"))
+    assert shown.stdout[shown.stdout.index(said) :] in again.stdout
+
+
+def test_a_short_tour_is_printed_as_a_whole(tmp_path: Path) -> None:
+    shown = invoke(
+        *("train", SALESMAN, "--agent", "max-min", "--trials", "1"),
+        *("--env-arg", "distances=[[0,1,9],[9,0,1],[1,9,0]]"),
+        *("--env-arg", "start=0", "--out", str(tmp_path / "tour.npz")),
+    )
+    assert shown.exit_code == 0, shown.output
+    assert shown.stdout.endswith("a cost of 3.\nIts tour: 0, 1, 2\n")
+
+
+NOTE = (
+    "note: --agent {} learns a policy that does not see where it has been; --agent max"
+)
+
+
+def test_a_word_where_nobody_has_chosen_the_ants(tmp_path: Path) -> None:
+    train = ["train", SALESMAN, "--env-arg", "instance=eil51", "--trials", "1"]
+    train += ["--out", str(tmp_path / "tour.npz")]
+    assert NOTE.format("returning") in invoke(*train).stderr
+    chosen = invoke(*train, "--agent", "returning")
+    assert chosen.exit_code == 0, chosen.output
+    assert "where it has been" not in chosen.stderr
+    assert "where it has been" not in invoke(*train, "--json").stderr
 
 
 @pytest.mark.parametrize("agent", AGENTS)
@@ -56,7 +91,8 @@ def test_a_finite_space_of_another_package(agent: str, tmp_path: Path) -> None:
         *("--out", str(tmp_path / "cliff.npz")),
     )
     assert found["ants"] == 40
-    assert found["best_cost"] >= 13
+    assert found["solution"]["cost"] >= 13
+    assert set(found["solution"]) == {"cost", "steps"}
 
 
 @pytest.mark.parametrize("agent", AGENTS)

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
+from matplotlib.quiver import Quiver
 
 from acl_gym import AntColonySystem, AntSystem, MaxMinAntSystem
 from acl_gym.envs.graph import (
@@ -50,6 +51,33 @@ def test_cities_alone_and_without_an_optimum() -> None:
     assert (ax.get_title(loc="left") or ax.get_title()) == "four"
     ax = plot_tour(instance, [0, 1, 2, 3])
     assert (ax.get_title(loc="left") or ax.get_title()) == "four: 4"
+
+
+def test_arrowheads_only_where_directions_count() -> None:
+    one_way = TravellingSalesmanInstance.from_distances(
+        np.arange(16.0).reshape(4, 4),
+        # Between two cities at the same place there is nothing to point at.
+        coordinates=[[0, 0], [0, 0], [3, 0], [0, 2]],
+    )
+    ax = plot_tour(one_way, [0, 1, 2, 3])
+    (heads,) = (each for each in ax.collections if isinstance(each, Quiver))
+    # In the middle of the ways from city 1 to 2, to 3 and back to 0.
+    np.testing.assert_allclose(heads.XY, [[1.5, 0.0], [1.5, 1.0], [0.0, 1.0]])
+    directions = np.array([[3.0, 0.0], [-3.0, 2.0], [0.0, -2.0]])
+    directions /= np.hypot(*directions.T)[:, None]
+    np.testing.assert_allclose(np.column_stack([heads.U, heads.V]), directions)
+    ax.figure.canvas.draw()
+    for ax in (plot_tour(ATT48, WAY), plot_tour(one_way)):
+        assert not any(isinstance(each, Quiver) for each in ax.collections)
+
+
+def test_the_title_without_a_name() -> None:
+    places = np.array([[0.0, 0.0], [0.0, 1.0], [1.0, 1.0]])
+    instance = TravellingSalesmanInstance.from_coordinates(places)
+    ax = plot_tour(instance, [0, 1, 2])
+    assert (ax.get_title(loc="left") or ax.get_title()) == "tour of length 3.41421"
+    ax = plot_tour(instance)
+    assert (ax.get_title(loc="left") or ax.get_title()) == ""
 
 
 @pytest.mark.parametrize(

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from acl_gym.colony.local_search.exchanges import best_exchange
-from acl_gym.colony.local_search.moves import TWO, apply, find_places, length_of
+from acl_gym.colony.local_search.moves import TWO, apply, find_places
 from acl_gym.colony.local_search.segments import best_insertion, best_segment_exchange
+from acl_gym.envs.graph.lengths import tour_length
 from acl_gym.utils.compiling import njit
 from acl_gym.utils.typing import BoolArray, CellArray, FloatArray
 
@@ -23,7 +24,6 @@ def improve(
     nearby: FloatArray,
     method: int,
     symmetric: bool,
-    thorough: bool,
     lengths: FloatArray,
 ) -> int:
     """Improve tours in place, each by itself, and fill in their lengths.
@@ -38,7 +38,6 @@ def improve(
         nearby: distances to them, `(n, k)`.
         method: `TWO_OPT`, `OR_OPT`, with 2-opt where symmetric, or `THREE_OPT`.
         symmetric: whether tours may be turned round; must be so for `TWO_OPT`.
-        thorough: whether all cities are looked at again after the last move.
         lengths: filled in, `(m,)`.
 
     Returns:
@@ -53,27 +52,24 @@ def improve(
         tour = tours[row]
         if not find_places(tour, places):
             return row
-        again = True
-        while again:
-            moved = _look_at_all(
-                tour,
-                places,
-                distances,
-                neighbours,
-                nearby,
-                method,
-                symmetric,
-                kept,
-                waiting,
-                awake,
-            )
-            again = thorough and moved
-        lengths[row] = length_of(tour, distances)
+        _improve_tour(
+            tour,
+            places,
+            distances,
+            neighbours,
+            nearby,
+            method,
+            symmetric,
+            kept,
+            waiting,
+            awake,
+        )
+        lengths[row] = tour_length(tour, distances)
     return DONE
 
 
 @njit
-def _look_at_all(
+def _improve_tour(
     tour: CellArray,
     places: CellArray,
     distances: FloatArray,
@@ -84,15 +80,18 @@ def _look_at_all(
     kept: CellArray,
     waiting: CellArray,
     awake: BoolArray,
-) -> bool:
-    """Whether any move was made."""
+) -> None:
+    """Make moves, in `tour` and `places`, until no city waits to be looked at.
+
+    The other arguments are those of `improve`, and room for n cities each: `kept`,
+    `waiting` and `awake`.
+    """
     n = tour.size
     move = np.empty(6, np.int32)
     other = np.empty(6, np.int32)
     waiting[:] = tour
     awake[:] = True
     head, count = 0, n
-    moved = False
     while count:
         t1 = waiting[head]
         found = True
@@ -133,7 +132,7 @@ def _look_at_all(
                     )
                 if gain > 0.0:
                     apply(tour, places, t1, direction, move, kept)
-                    found = moved = True
+                    found = True
                     for i in range(1, 4 if move[0] == TWO else 6):
                         city = move[i]
                         if not awake[city]:
@@ -145,4 +144,3 @@ def _look_at_all(
         if head == n:
             head = 0
         count -= 1
-    return moved

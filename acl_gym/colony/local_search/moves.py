@@ -8,7 +8,7 @@ backwards (-1); where distances are symmetric, it is the same tour.
 from __future__ import annotations
 
 from acl_gym.utils.compiling import njit
-from acl_gym.utils.typing import CellArray, FloatArray
+from acl_gym.utils.typing import CellArray
 
 NONE, TWO, REVERSED, EXCHANGED, BOTH_REVERSED = range(5)
 """Kinds of moves, see `apply`."""
@@ -195,14 +195,3 @@ def find_places(tour: CellArray, places: CellArray) -> bool:
             return False
         places[city] = place
     return True
-
-
-@njit
-def length_of(tour: CellArray, distances: FloatArray) -> float:
-    """Length of a tour, the arc back to the first city included."""
-    total = 0.0
-    last = tour[tour.size - 1]
-    for city in tour:
-        total += distances[last, city]
-        last = city
-    return total

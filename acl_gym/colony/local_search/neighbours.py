@@ -1,62 +1,40 @@
-"""Nearest neighbours of cities: the candidates of local searches and of ants."""
+"""Nearest neighbours of cities, to which local searches lead new arcs.
+
+Ants have lists of their own, `colony.candidates`: those follow the heuristic, which may
+be any, and are in the order of the cities.
+"""
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
+from acl_gym.envs.graph.cities import TravellingSalesmanInstance, checked_instance
 from acl_gym.utils import validation
 from acl_gym.utils.compiling import njit
 from acl_gym.utils.typing import CellArray, FloatArray
 
 
-def nearest_neighbours(distances: Any, k: int) -> CellArray:
+def nearest_neighbours(instance: TravellingSalesmanInstance, k: int) -> CellArray:
     """The k cities that are nearest from each city, the nearest first.
 
     Of cities equally far, that with the lower number comes first.
 
     Args:
-        distances: from city i (row) to city j (column), `(n, n)`; the diagonal does
-            not count.
+        instance: the cities.
         k: >= 1; of fewer than k other cities, all are returned.
 
     Returns:
         Indices of cities, `(n, min(k, n - 1))`.
 
     Raises:
-        TypeError: `k` is not an integer.
-        ValueError: the distances are no square matrix of numbers >= 0, or k < 1.
+        TypeError: `instance` is none, or `k` is not an integer.
+        ValueError: k < 1.
     """
-    matrix = checked_distances(distances)
-    n = len(matrix)
+    n = checked_instance(instance).n_cities
     k = min(validation.integer("k", k, at_least=1), n - 1)
     neighbours = np.empty((n, k), np.int32)
-    if k:
-        _fill_nearest(matrix, neighbours)
+    _fill_nearest(instance.distances, neighbours)
     return neighbours
-
-
-def checked_distances(distances: Any) -> FloatArray:
-    """Distances as kernels take them: float64, C-contiguous, read-only.
-
-    They are copied only where they must be converted.
-
-    Raises:
-        ValueError: they are no square matrix of finite numbers >= 0.
-    """
-    if type(distances) is not np.ndarray or distances.dtype != np.float64:
-        distances = validation.real_array("distances", distances, ndim=2)
-    validation.check_square("distances", distances.shape, "city")
-    # Kernels are compiled once, for arrays that may not be written to.
-    matrix: FloatArray = validation.read_only(np.ascontiguousarray(distances))
-    if not (matrix.min() >= 0.0 and matrix.max() < np.inf):  # NaN fails both
-        raise ValueError(
-            "distances must be finite numbers >= 0, got some that are negative, "
-            "infinite or NaN; give arcs that do not exist a distance longer than any "
-            "tour."
-        )
-    return matrix
 
 
 @njit

@@ -20,9 +20,9 @@ from acl_gym.colony.local_search.improve import (
     TWO_OPT,
     improve,
 )
-from acl_gym.colony.local_search.neighbours import checked_distances, fill_nearby
+from acl_gym.colony.local_search.neighbours import fill_nearby
+from acl_gym.envs.graph.cities import TravellingSalesmanInstance, checked_instance
 from acl_gym.utils import validation
-from acl_gym.utils.compiling import njit
 from acl_gym.utils.typing import CellArray, FloatArray
 
 _KERNELS = {"2-opt": TWO_OPT, "or-opt": OR_OPT, "3-opt": THREE_OPT}
@@ -47,31 +47,26 @@ class LocalSearch:
     Attributes:
         method: one of `METHODS`.
         symmetric: whether the distances are the same in both directions.
-        thorough: see below.
 
     Args:
         method: one of `METHODS`.
-        distances: from city i (row) to city j (column), >= 0, `(n, n)`. A C-contiguous
-            array of float64 is not copied and must not be changed thereafter.
+        instance: the cities.
         neighbours: candidates of each city, nearest first, int32 of shape `(n, k)`, as
-            `nearest_neighbours(distances, k)` gives them; k from 8 to 20 is common.
-        thorough: False ends when all don't-look bits are set. True then looks at all
-            cities again, until none has a move that gains: about 60% more time for
-            tours that are less than a thousandth shorter.
+            `nearest_neighbours(instance, k)` gives them; k from 8 to 20 is common.
 
     Raises:
+        TypeError: `instance` is none.
         ValueError: an argument is not as said above, or distances are asymmetric with
             2-opt.
     """
 
     def __init__(
-        self, method: str, distances: Any, neighbours: Any, *, thorough: bool = False
+        self, method: str, instance: TravellingSalesmanInstance, neighbours: CellArray
     ) -> None:
         self.method = validation.one_of("method", method, METHODS)
-        self.thorough = bool(thorough)
-        self._distances = checked_distances(distances)
+        self._distances = checked_instance(instance).distances
         self._neighbours, self._nearby = self._checked_neighbours(neighbours)
-        self.symmetric = bool(_is_symmetric(self._distances))
+        self.symmetric = instance.symmetric
         if method == "2-opt" and not self.symmetric:
             raise ValueError(
                 "2-opt turns paths round, which needs distances that are the same in "
@@ -113,7 +108,6 @@ class LocalSearch:
             self._nearby,
             _KERNELS[self.method],
             self.symmetric,
-            self.thorough,
             lengths,
         )
         if row != DONE:
@@ -133,7 +127,7 @@ class LocalSearch:
         ):
             raise ValueError(
                 f"neighbours must be an array of int32 of shape ({n}, k), got "
-                f"{_described(neighbours)}; nearest_neighbours(distances, k) makes it."
+                f"{_described(neighbours)}; nearest_neighbours(instance, k) makes it."
             )
         # A copy: kernels rely on what has been checked.
         lists = np.array(neighbours, order="C")
@@ -143,7 +137,7 @@ class LocalSearch:
             raise ValueError(
                 f"neighbours[{city}] must be other cities, 0 to {n - 1} without {city}"
                 f", nearest first, got {validation.shown(lists[city])}; "
-                "nearest_neighbours(distances, k) makes such an array."
+                "nearest_neighbours(instance, k) makes such an array."
             )
         return lists, nearby
 
@@ -152,16 +146,3 @@ def _described(array: Any) -> str:
     if not isinstance(array, np.ndarray):
         return validation.shown(array)
     return f"an array of {array.dtype} of shape {array.shape}"
-
-
-@njit
-def _is_symmetric(distances: FloatArray) -> bool:
-    n = len(distances)
-    block = 64  # rows and columns that the processor's cache holds
-    for top in range(0, n, block):
-        for left in range(0, top + 1, block):
-            for i in range(top, min(top + block, n)):
-                for j in range(left, min(left + block, i)):
-                    if distances[i, j] != distances[j, i]:
-                        return False
-    return True

@@ -14,10 +14,14 @@ from numpy.typing import ArrayLike, NDArray
 from acl_gym.envs.graph.lengths import tour_lengths
 from acl_gym.envs.graph.metrics import distances_between
 from acl_gym.utils import validation
+from acl_gym.utils.hashing import hashed_numbers
 from acl_gym.utils.typing import FloatArray
 
 MOST_CITIES = 100_000
 """Cities of an instance at most; a matrix of so many takes 80 GB."""
+
+UNNAMED = ("distances", "coordinates", "graph")
+"""Names of instances to which nobody has given one: what they were made of."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -198,6 +202,27 @@ class TravellingSalesmanInstance:
         """Whether each road has the same length in both directions."""
         return bool(np.array_equal(self.distances, self.distances.T))
 
+    @cached_property
+    def fingerprint(self) -> bytes:
+        """A hash of the distances, 32 bytes: equal only where all distances are."""
+        return hashed_numbers(self.distances)
+
+    def difference(self, other: TravellingSalesmanInstance) -> str | None:
+        """In words how its distances differ from those of another; None if they do not.
+
+        Names, coordinates and optima do not count: tours have the same lengths.
+        """
+        mine, others = self.distances, other.distances
+        if mine is others or np.array_equal(mine, others):
+            return None
+        if len(mine) != len(others):
+            return f"{len(mine)} cities in place of {len(others)}"
+        i, j = np.argwhere(mine != others)[0]
+        return (
+            f"a distance of {float(mine[i, j])!r} from city {i} to city {j} in place of "
+            f"{float(others[i, j])!r}"
+        )
+
     def length(self, tour: ArrayLike) -> float | FloatArray:
         """Return the length of a tour, or of each of several, closing arc included.
 
@@ -258,6 +283,21 @@ def _rebuilt(
     )
 
 
+def checked_instance(value: Any) -> TravellingSalesmanInstance:
+    """Return an instance if it is one.
+
+    Raises:
+        TypeError: it is not.
+    """
+    if not isinstance(value, TravellingSalesmanInstance):
+        raise TypeError(
+            "instance must be a TravellingSalesmanInstance, got "
+            f"{validation.shown(value)}; take env.unwrapped.instance, or "
+            "TravellingSalesmanInstance.from_distances(distances)."
+        )
+    return value
+
+
 def checked_tours(tour: Any, n_cities: int) -> NDArray[np.int64]:
     """Return tours as int64 `(n,)` or `(k, n)`, each city once.
 
@@ -305,11 +345,18 @@ def check_size(n_cities: int) -> None:
 
 
 def _checked_coordinates(values: Any) -> FloatArray:
-    places = validation.real_array("coordinates", values, ndim=2)
+    places = validation.real_array("coordinates", values, ndim=2, finite=False)
     if places.shape[1] != 2:
         raise ValueError(
             "coordinates must have two columns, x and y, got shape "
             f"{places.shape}; pass a matrix of distances for other spaces."
+        )
+    bad = ~np.isfinite(places).all(axis=1)
+    if bad.any():
+        city = int(np.argmax(bad))
+        raise ValueError(
+            f"coordinates must be finite, got {places[city].tolist()} for city {city} of "
+            f"0 to {len(places) - 1}; correct it or leave the city out."
         )
     check_size(len(places))
     return places

@@ -9,20 +9,32 @@ from acl_gym.utils.typing import CellArray, FloatArray
 
 
 @njit
-def tour_lengths(tours: CellArray, distances: FloatArray) -> FloatArray:
-    """The length of each tour, the closing arc included, `(m,)`.
+def tour_length(tour: CellArray, distances: FloatArray) -> float:
+    """The length of a tour, the closing arc included.
 
     Added up in the order of the steps, as an environment does, so that both come to the
     same number bit for bit.
 
     Args:
+        tour: the cities in their order, int32 `(n,)`; they are not checked.
+        distances: `(n, n)`.
+    """
+    length = 0.0
+    for t in range(tour.size):
+        following = tour[t + 1] if t + 1 < tour.size else tour[0]
+        length += distances[tour[t], following]
+    return length
+
+
+@njit
+def tour_lengths(tours: CellArray, distances: FloatArray) -> FloatArray:
+    """The `tour_length` of each tour, `(m,)`.
+
+    Args:
         tours: the cities of each in their order, int32 `(m, n)`; they are not checked.
         distances: `(n, n)`.
     """
-    m, n = tours.shape
-    lengths = np.zeros(m)
-    for a in range(m):
-        for t in range(n):
-            following = tours[a, t + 1] if t + 1 < n else tours[a, 0]
-            lengths[a] += distances[tours[a, t], following]
+    lengths = np.empty(len(tours))
+    for a in range(len(tours)):
+        lengths[a] = tour_length(tours[a], distances)
     return lengths

@@ -52,6 +52,10 @@ _LARGEST = 2**33
 """Bytes of a file at most: a full matrix of 30,000 cities with nine digits each."""
 
 
+class _FormatError(ValueError):
+    """A text is not of TSPLIB's format; the message names the text."""
+
+
 @dataclass(frozen=True)
 class _File:
     """What stands in a file.
@@ -66,26 +70,37 @@ class _File:
     header: dict[str, str]
     sections: dict[str, list[str]]
 
-    def error(self, message: str) -> ValueError:
-        return ValueError(f"{self.source}: {message}")
+    def error(self, message: str) -> _FormatError:
+        return _FormatError(f"{self.source}: {message}")
 
     def choice(self, key: str, choices: tuple[str, ...]) -> str:
         """The entry of the header, if it is one of the choices.
 
         TSPLIB writes remarks behind some, which do not count.
         """
-        found = (self.header.get(key, "").split() or [""])[0]
+        text = self._entry(key, f"one of {', '.join(choices)}")
+        found = (text.split() or [""])[0]
         if found not in choices:
             raise self.error(
                 f"{key} must be one of {', '.join(choices)}, got "
-                f"{validation.shown(self.header.get(key))}; this reader knows no others."
+                f"{validation.shown(text)}; this reader knows no others."
             )
         return found
 
+    def _entry(self, key: str, what: str) -> str:
+        """An entry that the header must have."""
+        text = self.header.get(key)
+        if text is None:
+            raise self.error(
+                f"there must be a line {key} : followed by {what}, but there is none; "
+                "check that it is a complete file of TSPLIB."
+            )
+        return text
+
     def dimension(self) -> int:
         """The number of cities."""
-        text = self.header.get("DIMENSION")
-        if text is None or not re.fullmatch(r"[0-9]{1,18}", text):
+        text = self._entry("DIMENSION", "the number of cities")
+        if not re.fullmatch(r"[0-9]{1,18}", text):
             raise self.error(
                 "DIMENSION must be the number of cities, got "
                 f"{validation.shown(text)}; check the header."
@@ -192,9 +207,9 @@ def parse_tsplib(
         found = TravellingSalesmanInstance.from_distances(
             matrix, coordinates=shown[0] if shown else None, **named
         )
-    except ValueError as error:
-        if str(error).startswith(source):
-            raise
+    except _FormatError:
+        raise
+    except ValueError as error:  # of the numbers, which say nothing of the file
         raise file.error(str(error)) from None
     if kind == "TSP" and not found.symmetric:
         raise file.error(
@@ -236,6 +251,13 @@ def _places(file: _File, section: str, n_cities: int) -> FloatArray:
     rows = file.numbers(section, 3 * n_cities).reshape(n_cities, 3)
     places = np.empty((n_cities, 2))
     places[_order(file, section, rows[:, 0])] = rows[:, 1:]
+    bad = ~np.isfinite(places).all(axis=1)
+    if bad.any():
+        city = int(np.argmax(bad))
+        raise file.error(
+            f"{section} must hold finite numbers, got {places[city].tolist()} for city "
+            f"{city + 1}."
+        )
     return places
 
 
@@ -291,7 +313,9 @@ def _parsed(text: str, source: str) -> _File:
     """Divide a text into its header and sections."""
     file = _File(source, {}, {})
     words: list[str] | None = None  # of the section that is being read
-    for number, line in enumerate(text.splitlines(), start=1):
+    # Editors may put a byte-order mark before the first line.
+    lines = text.removeprefix("\ufeff").splitlines()
+    for number, line in enumerate(lines, start=1):
         line = line.strip()
         if line == "EOF":
             break

@@ -225,6 +225,30 @@ def test_bad_coordinates_are_refused(places: Any) -> None:
         TravellingSalesmanInstance.from_coordinates(places)
 
 
+def test_the_city_whose_coordinates_are_no_numbers_is_named() -> None:
+    places = np.random.default_rng(0).random((500, 2))
+    places[321] = 3.5, NAN
+    with pytest.raises(
+        ValueError, match=r"got \[3\.5, nan\] for city 321 of 0 to 499;"
+    ):
+        TravellingSalesmanInstance.from_coordinates(places)
+
+
+def test_how_distances_differ() -> None:
+    distances = np.arange(9.0).reshape(3, 3)
+    instance = made(distances)
+    assert instance.difference(made(distances)) is None
+    assert instance.fingerprint == made(distances).fingerprint
+    assert len(instance.fingerprint) == 32
+    other = distances.copy()
+    other[2, 1] = 0.1
+    assert made(other).difference(instance) == (
+        "a distance of 0.1 from city 2 to city 1 in place of 7.0"
+    )
+    assert made(other).fingerprint != instance.fingerprint
+    assert made(np.ones((2, 2))).difference(instance) == "2 cities in place of 3"
+
+
 def test_other_bad_arguments() -> None:
     with pytest.raises(ValueError, match="metric must be one of 'euclidean'"):
         TravellingSalesmanInstance.from_coordinates([[0, 0], [1, 1]], "taxi")

@@ -141,6 +141,8 @@ def test_files(tmp_path: Path) -> None:
     # Letters of old files, and line ends of other systems.
     file.write_bytes(SMALL.replace("small", "Stra\xdfe").encode("latin-1"))
     assert read_tsplib(str(file)).n_cities == 3
+    file.write_bytes(SMALL.encode("utf-8-sig"))  # with a byte-order mark
+    assert read_tsplib(file).name == "small"
     file.write_bytes(SMALL.replace("\n", "\r\n").encode())
     assert read_tsplib(file).name == "small"
     (tmp_path / "a.tour").write_text(WAY)
@@ -166,9 +168,17 @@ def test_files_that_cannot_be_read(tmp_path: Path) -> None:
 
 
 CHANGES = {
-    "no type": ("TYPE : TSP\n", "", "TYPE must be one of TSP, ATSP, got None"),
+    "no type": (
+        "TYPE : TSP\n",
+        "",
+        "there must be a line TYPE : followed by one of TSP, ATSP,",
+    ),
     "vehicles": ("TYPE : TSP", "TYPE : CVRP", "got 'CVRP'"),
-    "no dimension": ("DIMENSION : 3\n", "", "DIMENSION must be the number of cities"),
+    "no dimension": (
+        "DIMENSION : 3\n",
+        "",
+        "a line DIMENSION : followed by the number of cities, but",
+    ),
     "half": ("DIMENSION : 3", "DIMENSION : 3.5", "got '3.5'"),
     "negative": ("DIMENSION : 3", "DIMENSION : -3", "got '-3'"),
     "one": ("DIMENSION : 3", "DIMENSION : 1", "2 to 100,000 cities, got 1"),
@@ -183,11 +193,15 @@ CHANGES = {
     "section": ("NODE_COORD", "DEPOT", "'DEPOT_SECTION' must be one of"),
     "two sections": ("EOF", "NODE_COORD_SECTION\nEOF", "second NODE_COORD_SECTION"),
     "edges": ("EOF", "FIXED_EDGES_SECTION\n1 2\n-1\nEOF", "fixed edges are not"),
-    "no format": ("EUC_2D", "EXPLICIT", "EDGE_WEIGHT_FORMAT must be one of"),
+    "no format": (
+        "EUC_2D",
+        "EXPLICIT",
+        "a line EDGE_WEIGHT_FORMAT : followed by one of",
+    ),
     "word": ("0 8", "0 eight", "must hold numbers, got 'eight'"),
     "underscore": ("0 8", "0 1_000", "must hold numbers, got '1_000'"),
-    "nan": ("0 8", "0 nan", "coordinates must be an array of 2 axes of finite"),
-    "infinite": ("0 8", "0 1e999", "coordinates must be an array of 2 axes of finite"),
+    "nan": ("0 8", "0 nan", "must hold finite numbers, got [0.0, nan] for city 3."),
+    "infinite": ("0 8", "0 1e999", "finite numbers, got [0.0, inf] for city 3."),
     "far": ("0 8", "0 1e300", "distances must be finite"),
     "third number": ("0 8", "0 8 9", "must hold 9 numbers, got 10"),
     "city twice": ("3 0 8", "2 0 8", "must number the cities 1 to 3, each once"),
@@ -234,7 +248,7 @@ def test_broken_tours(old: str, new: str, message: str) -> None:
 
 
 def test_empty_text() -> None:
-    with pytest.raises(ValueError, match="empty: TYPE must be one of"):
+    with pytest.raises(ValueError, match="empty: there must be a line TYPE : "):
         parse_tsplib("", "empty")
 
 

@@ -25,13 +25,13 @@ _NOT_OF_THE_TASK = (
 """Keywords of `gym.make_vec` that change nothing of what a solution costs."""
 
 _WATCHERS = (
-    *(
-        "HumanRendering",
-        "OrderEnforcing",
-        "PassiveEnvChecker",
-        "RecordEpisodeStatistics",
-    ),
-    *("RecordVideo", "RenderCollection", "TimeLimit"),
+    "HumanRendering",
+    "OrderEnforcing",
+    "PassiveEnvChecker",
+    "RecordEpisodeStatistics",
+    "RecordVideo",
+    "RenderCollection",
+    "TimeLimit",
 )
 """Wrappers of Gymnasium that change neither observations, actions nor rewards."""
 

@@ -15,7 +15,7 @@ from acl_gym import ReturningACL
 
 def learn(ants):
     env = gym.make_vec("acl_gym/Pendulum-v0", num_envs=ants)
-    colony = ReturningACL(env, max_steps=300, restart_after=300, seed=0)
+    colony = ReturningACL(env, max_steps=300, restart_after=300, walks_back=2, seed=0)
     colony.learn(trials=1)
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss  # kilobytes
     return colony.num_timesteps, peak / 2**20

@@ -91,11 +91,7 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
         self._system = made_system(self.system_type, parameters)
         self.single_observation_space = self.system.observation_space
         self.single_action_space = self.system.action_space
-        validation.check_memory(
-            f"{self.num_envs:,} slots",
-            self.num_envs * _least_bytes_a_slot(self.single_observation_space),
-            "use fewer ants or slots",
-        )
+        self._check_memory()
         self.observation_space = batch_space(
             self.single_observation_space, self.num_envs
         )
@@ -122,6 +118,14 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
     def max_episode_steps(self, value: int | None) -> None:
         self._max_episode_steps = checked_limit(value)
         self._limit = trial_limit(self._max_episode_steps, self._trial_steps)
+
+    def _check_memory(self) -> None:
+        """Refuse more slots than fit into memory, before any is taken."""
+        validation.check_memory(
+            f"{self.num_envs:,} slots",
+            self.num_envs * _least_bytes_a_slot(self.single_observation_space),
+            "use fewer ants or slots",
+        )
 
     # Not to be replaced: kernels rely on arrays of these sizes.
     @property

@@ -129,18 +129,20 @@ class TravellingSalesmanVectorEnv(_WithInstance, ControlVectorEnv):
             **parameters,
         )
         self.instance = instance_of(self.system)
-        n_cities = self.instance.n_cities
+        # What `with_slots` makes others of: a file may change.
+        start = parameters.get("start", TravellingSalesman.start)
+        self.parameters = {"instance": self.instance, "start": start}
+        if isinstance(self.max_episode_steps, RegisteredLimit):
+            steps = min(self.max_episode_steps, self.instance.n_cities + 1)
+            self.max_episode_steps = RegisteredLimit(steps)
+
+    def _check_memory(self) -> None:
+        n_cities = instance_of(self.system).n_cities
         validation.check_memory(
             f"tours of {self.num_envs:,} slots through {n_cities:,} cities",
             self.num_envs * (2 * 8 * (n_cities + 3) + n_cities),
             "use fewer ants or slots",
         )
-        # What `with_slots` makes others of: a file may change.
-        start = parameters.get("start", TravellingSalesman.start)
-        self.parameters = {"instance": self.instance, "start": start}
-        if isinstance(self.max_episode_steps, RegisteredLimit):
-            steps = min(self.max_episode_steps, n_cities + 1)
-            self.max_episode_steps = RegisteredLimit(steps)
 
     def _checked_states(self, given: Any, slots: IntArray) -> FloatArray:
         if self._state is not None:

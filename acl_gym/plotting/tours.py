@@ -145,6 +145,8 @@ def _title(instance: TravellingSalesmanInstance, order: Any) -> str:
         return name
     length, best = instance.length(order), instance.optimum
     title = f"{name}: {length:,.6g}" if name else f"tour of length {length:,.6g}"
-    if best:
+    if best and length == best:
+        title += ", the optimum"
+    elif best:
         title += f", {100.0 * (length / best - 1.0):.1f}% above the optimum"
     return title

@@ -29,8 +29,12 @@ def test_the_tour_is_closed_and_the_title_tells_its_length() -> None:
     )
     assert len(cities.get_xdata()) == 48
     title = ax.get_title(loc="left") or ax.get_title()
-    assert title == "att48: 10,628, 0.0% above the optimum"
+    assert title == "att48: 10,628, the optimum"
     ax.figure.canvas.draw()
+    longer = [*WAY[1:2], *WAY[:1], *WAY[2:]]
+    title = plot_tour(ATT48, longer).get_title(loc="left")
+    assert title.startswith("att48: 1")
+    assert title.endswith("% above the optimum")
 
 
 def test_pheromone_lies_below_the_tour() -> None:

@@ -27,6 +27,7 @@ from acl_gym.envs.graph.travelling_salesman.lookup import Salesman, salesman_of
 from acl_gym.evaluation.steps import Outcome
 from acl_gym.partitions import Partition
 from acl_gym.utils import validation
+from acl_gym.utils.hashing import NUMBERS_BYTES
 from acl_gym.utils.serialization import from_json, to_settings
 from acl_gym.utils.typing import FloatArray, IntArray, Row
 
@@ -35,10 +36,6 @@ _NEIGHBOURS = 20
 
 _LEAST_DEPOSIT, _MOST_DEPOSIT = 1e-150, 1e150
 """What ants may deposit, so that no sum or quotient of levels leaves the range of floats."""
-
-
-_BYTES = 32
-"""Of the hash of an instance in a file."""
 
 
 class NoSolutionWarning(UserWarning):
@@ -363,8 +360,8 @@ class AntOptimizer(AntAgent):
         self._rule.check_fits(self.pheromone)
         kept = arrays.get("instance")  # which older files do not hold
         if kept is not None:
-            if kept.dtype != np.uint8 or kept.shape != (_BYTES,):
-                raise ValueError(f"instance must be a hash of {_BYTES} bytes")
+            if kept.dtype != np.uint8 or kept.shape != (NUMBERS_BYTES,):
+                raise ValueError(f"instance must be a hash of {NUMBERS_BYTES} bytes")
             self._fingerprint = kept.tobytes()
         saved = from_json(header["parameters"])["deposit"]
         if to_settings(self.deposit) != saved:  # `load` was given another

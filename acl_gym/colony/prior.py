@@ -135,8 +135,8 @@ class PotentialPrior(Prior):
         potential: a function of states, `(n, d)`, that returns a number for each,
             `(n,)`, of which less is better: a distance to the goal, an error of energy.
         preferred: what the best action of a cell receives, 10.
-        others: what the worst one receives, 1, and what is forbidden. Between the two it is in proportion; all
-            receive `preferred` where the action makes no difference.
+        others: what the worst one receives, 1, and what is forbidden. Those between are
+            in proportion. All receive `preferred` where the action makes no difference.
 
     Raises:
         TypeError: `potential` is not a function.

@@ -11,6 +11,9 @@ import numpy as np
 
 from acl_gym.utils.typing import FloatArray
 
+NUMBERS_BYTES = hashlib.sha256().digest_size
+"""How many bytes `hashed_numbers` returns."""
+
 
 def hashed(value: Any) -> str:
     """The SHA-256 hash of JSON types, in hexadecimal digits."""
@@ -19,7 +22,7 @@ def hashed(value: Any) -> str:
 
 
 def hashed_numbers(numbers: FloatArray) -> bytes:
-    """The SHA-256 hash of an array's shape and float64 numbers, 32 bytes.
+    """The SHA-256 hash of an array's shape and float64 numbers, `NUMBERS_BYTES` long.
 
     The same on every machine; -0 counts as another number than 0.
     """

@@ -204,7 +204,7 @@ class TravellingSalesmanInstance:
 
     @cached_property
     def fingerprint(self) -> bytes:
-        """A hash of the distances, 32 bytes: equal only where all distances are."""
+        """A hash of the distances: equal only where all distances are."""
         return hashed_numbers(self.distances)
 
     def difference(self, other: TravellingSalesmanInstance) -> str | None:

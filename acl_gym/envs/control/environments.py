@@ -320,12 +320,36 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
         Its random numbers continue a copy of this environment's stream, if that was
         seeded.
         """
+        return self._made_anew(num_envs, self.parameters)
+
+    def with_parameters(self, **values: Any) -> Self:
+        """Make a new environment in which some parameters of the system differ.
+
+        Args:
+            values: of the parameters by their names, see the class of the system; of a
+                plant, those that its dynamics takes. A parameter that was uncertain is
+                known there.
+
+        Returns:
+            An environment with the same number of slots, see `with_slots`.
+
+        Raises:
+            TypeError: there is no parameter of that name, or a value has a wrong type.
+            ValueError: a value is not valid.
+        """
+        return self._made_anew(self.num_envs, self._parameters_with(values))
+
+    def _parameters_with(self, values: dict[str, Any]) -> dict[str, Any]:
+        """The arguments of the system if some of its parameters have other values."""
+        return {**self.parameters, **values}
+
+    def _made_anew(self, num_envs: int, parameters: dict[str, Any]) -> Self:
         made = type(self)(
             num_envs,
             max_episode_steps=self.max_episode_steps,
             autoreset_mode=self.autoreset_mode,
             render_mode=self.render_mode,
-            **self.parameters,
+            **parameters,
         )
         made._np_random = copy.deepcopy(self._np_random)
         made._np_random_seed = self._np_random_seed

@@ -138,6 +138,45 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
         """The parameters and dynamics of the system."""
         return self._system
 
+    def system_with(self, **values: Any) -> tuple[ControlSystem, dict[str, Any]]:
+        """The system with other values of some parameters, and the arguments of it.
+
+        Args:
+            values: see `with_parameters`.
+
+        Raises:
+            TypeError: see `with_parameters`.
+            ValueError: a value is not valid.
+        """
+        arguments = self._arguments_with(values)
+        return made_system(self.system_type, arguments), arguments
+
+    def set_system(self, system: ControlSystem, arguments: dict[str, Any]) -> None:
+        """Go on with another system, from the states where the slots are.
+
+        Args:
+            system: of `system_with`.
+            arguments: its arguments.
+
+        Raises:
+            ValueError: what can be observed or done there differs.
+        """
+        for name in ("observation_space", "action_space"):
+            own, other = (getattr(each, name) for each in (self._system, system))
+            if own != other:
+                raise ValueError(
+                    f"the {name.replace('_', ' ')} must stay as it is, {own}, got "
+                    f"{other}; let other parameters change."
+                )
+        self._system, self.parameters = system, arguments
+        self._step_some = PartialStep(system, self.num_envs)
+        self._renderer.set_system(system)
+
+    @property
+    def num_walking(self) -> int:
+        """How many slots the next step moves; it resets the others, or they wait."""
+        return self._num_envs if self._walking is None else self._walking.size
+
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observation, dict[str, Any]]:
@@ -337,9 +376,9 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
             TypeError: there is no parameter of that name, or a value has a wrong type.
             ValueError: a value is not valid.
         """
-        return self._made_anew(self.num_envs, self._parameters_with(values))
+        return self._made_anew(self.num_envs, self._arguments_with(values))
 
-    def _parameters_with(self, values: dict[str, Any]) -> dict[str, Any]:
+    def _arguments_with(self, values: dict[str, Any]) -> dict[str, Any]:
         """The arguments of the system if some of its parameters have other values."""
         return {**self.parameters, **values}
 

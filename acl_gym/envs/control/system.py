@@ -86,8 +86,8 @@ class ControlSystem(ABC):
         Raises:
             TypeError: there is no parameter of that name, or it is not a real number.
         """
-        named = [each.name for each in fields(self)] if is_dataclass(self) else []
-        numbers = [each for each in named if type(getattr(self, each)) is float]
+        known: tuple[Any, ...] = fields(self) if is_dataclass(self) else ()
+        numbers = [f.name for f in known if type(getattr(self, f.name)) is float]
         if name not in numbers:
             similar = get_close_matches(str(name), numbers, 1)
             hint = f" Did you mean {similar[0]!r}?" if similar else ""

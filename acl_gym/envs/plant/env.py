@@ -30,7 +30,7 @@ class PlantVectorEnv(ControlVectorEnv):
     system_type = Plant
     painter = _PAINTER
 
-    def _parameters_with(self, values: dict[str, Any]) -> dict[str, Any]:
+    def _arguments_with(self, values: dict[str, Any]) -> dict[str, Any]:
         known: PlantParameters = self.system.parameters  # type: ignore[attr-defined]
         for name in values:
             known.value_of(name)  # which must exist
@@ -163,7 +163,7 @@ def plant(
             arrays of the wrong shape, or an argument is out of range.
     """
     steps = validation.integer("max_episode_steps", max_episode_steps, at_least=1)
-    parameters: dict[str, Any] = {
+    settings: dict[str, Any] = {
         "dynamics": dynamics,
         "low": low,
         "high": high,
@@ -189,11 +189,11 @@ def plant(
             max_episode_steps=steps,
             autoreset_mode=autoreset_mode or AutoresetMode.NEXT_STEP,
             render_mode=render_mode,
-            **parameters,
+            **settings,
         )
     if autoreset_mode is not None:
         raise ValueError(
             "autoreset_mode belongs to a vector environment, got "
             f"{autoreset_mode!r}; give num_envs as well, or leave it out."
         )
-    return TimeLimit(PlantEnv(render_mode, **parameters), steps)
+    return TimeLimit(PlantEnv(render_mode, **settings), steps)

@@ -68,7 +68,8 @@ class PlantParameters:
     @property
     def nominal_drawn(self) -> FloatArray:
         """The nominal values of the uncertain ones, `(m,)`."""
-        return self.nominal[self.drawn]
+        values: FloatArray = self.nominal[self.drawn]
+        return values
 
     def value_of(self, name: str) -> float:
         """The nominal value of one.

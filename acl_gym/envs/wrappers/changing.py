@@ -6,6 +6,7 @@ from abc import ABC, abstractmethod
 from bisect import bisect_right
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 from gymnasium.vector import VectorEnv, VectorWrapper
@@ -317,7 +318,7 @@ def _checked_schedules(schedules: Any) -> dict[str, tuple[Change, ...]]:
                 f"schedules[{name!r}] must be a Jump or a Drift, or a list of them, got "
                 f"{validation.shown(given)}."
             )
-        for one, other in zip(changes, changes[1:], strict=False):
+        for one, other in pairwise(changes):
             begins = other.start if isinstance(other, Drift) else other.times[0]
             if begins < one.times[-1] or other.times[0] == one.times[-1]:
                 raise ValueError(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -75,7 +75,7 @@ class LearnedDynamics:
             self._inputs, of_row = np.unique(inputs, axis=0, return_inverse=True)
             groups = [of_row.ravel() == each for each in range(len(self._inputs))]
             self._check_groups(groups)
-        self._fits = []
+        self._fits: list[Fit] = []
         for number, group in enumerate(groups):
             matching = begin is not None and len(begin._fits) == len(groups)
             self._fits.append(
@@ -91,6 +91,10 @@ class LearnedDynamics:
                     else None,
                 )
             )
+
+    def __deepcopy__(self, memo: Any) -> Self:
+        """Itself: it does not change."""
+        return self
 
     def _check_groups(self, groups: list[Any]) -> None:
         for values, group in zip(self._inputs, groups, strict=True):  # type: ignore[arg-type]

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from acl_gym.envs.learned.quality import DataWarning
 from acl_gym.utils import validation
+from acl_gym.utils.boxes import declared_bounds
 
 UNEVEN = 0.1
 """The share of a sampling time by which a step may be longer or shorter."""
@@ -216,17 +217,11 @@ def arrays_of_minari(dataset: Any) -> dict[str, Any]:
     if not parts:
         raise ValueError("dataset must hold one episode or more, got none.")
     facts: dict[str, Any] = {n: np.concatenate(kept) for n, kept in parts.items()}
-    facts["low"], facts["high"] = _box_ends(seen)
+    facts["low"], facts["high"] = declared_bounds(seen)
     if numbered:
         numbers = np.arange(int(acted.start), int(acted.start + acted.n))
         facts |= {"values": numbers[:, None].astype(np.float64), "numbered": True}
     return facts
-
-
-def _box_ends(space: spaces.Box) -> tuple[Any, Any]:
-    from acl_gym.utils.boxes import declared_bounds
-
-    return declared_bounds(space)
 
 
 def _steps(

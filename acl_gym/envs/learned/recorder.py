@@ -168,7 +168,7 @@ class Recorder:
                 self._drawn, self._held = self.random_actions(), self.hold
             self._held -= 1
             return self._drawn
-        predict = getattr(self.policy, "predict", self.policy)
+        predict: Any = getattr(self.policy, "predict", self.policy)
         found: Any = predict(self.observation)
         return np.asarray(found[0] if isinstance(found, tuple) else found)
 

@@ -165,6 +165,7 @@ class Fit:
         seed: int,
         begin: Fit | None,
     ) -> None:
+        self.scales: list[Scales]
         same = begin is not None and begin.scales[0].lengths.size == rows.shape[1]
         self.scales = search_scales(
             rows, targets, begin.scales if begin is not None and same else None
@@ -315,7 +316,9 @@ def _ridge(
     normal = features.T @ features
     normal[np.diag_indices(len(normal))] += ridge
     factor = np.linalg.cholesky(normal)
-    return np.asarray(cho_solve((factor, True), features.T @ target)), factor
+    return np.asarray(cho_solve((factor, True), features.T @ target)), np.asarray(
+        factor
+    )
 
 
 def _relative(missed: FloatArray, targets: FloatArray) -> FloatArray:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from typing import Any, Self
 
 import numpy as np
@@ -13,6 +14,7 @@ from acl_gym.envs.learned.description import Description, described
 from acl_gym.envs.learned.quality import doubts
 from acl_gym.envs.learned.recorder import Policy, Recorder
 from acl_gym.utils import archives, validation
+from acl_gym.utils.angles import find_angles
 from acl_gym.utils.typing import BoolArray, FloatArray, IntArray
 
 MOST_BYTES = 2**32
@@ -52,7 +54,8 @@ class Transitions:
         circular: names or numbers of the variables that wrap around from `high` to
             `low`, such as angles; without ends these are -pi and pi. Angles that were
             counted on beyond the ends are brought back.
-        angles: pairs of variables that are cosine and sine of one angle.
+        angles: pairs of variables that are cosine and sine of one angle; None looks for
+            them.
         values: the inputs of each action, `(n_actions, n_inputs)`, where they are known.
         numbered: whether the inputs are numbers of actions, without order or size.
         sampling_time: s, > 0, where it is known.
@@ -75,7 +78,7 @@ class Transitions:
         low: Any = None,
         high: Any = None,
         circular: Iterable[int | str] = (),
-        angles: Any = (),
+        angles: Any = None,
         values: Any = None,
         numbered: bool = False,
         sampling_time: float | None = None,
@@ -92,7 +95,7 @@ class Transitions:
             low=low,
             high=high,
             circular=circular,
-            angles=angles,
+            angles=find_angles(x) if angles is None else angles,
             values=values,
             numbered=numbered,
             sampling_time=sampling_time,
@@ -273,7 +276,8 @@ class Transitions:
             arrays = {n: archive.arrays[n] for n in _ARRAYS if n in archive.arrays}
             for name in ("low", "high", "values"):
                 header[name] = archive.arrays.get(name)
-            return cls(**arrays, **header)
+            facts: dict[str, Any] = {**arrays, **header}
+            return cls(**facts)
         except archives.TooLargeError as error:
             raise ValueError(f"{archive.name} {error}") from error
         except Exception as error:  # whatever a damaged file leads to
@@ -311,7 +315,8 @@ class Transitions:
         recorder = Recorder(env, policy, hold=hold, seed=seed)
         while recorder.steps < steps:
             recorder.step()
-        return cls(**recorder.arrays(), **recorder.facts)
+        facts: dict[str, Any] = {**recorder.arrays(), **recorder.facts}
+        return cls(**facts)
 
     @classmethod
     def from_frame(cls, frame: Any, **columns: Any) -> Self:
@@ -380,8 +385,6 @@ class Transitions:
 
 def _both(one: Description, other: Description) -> Description:
     """The wider bounds of two recordings, and what either knows."""
-    from dataclasses import replace
-
     return replace(
         one,
         low=tuple(map(min, one.low, other.low)),

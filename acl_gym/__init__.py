@@ -54,6 +54,7 @@ if TYPE_CHECKING:
         evaluate_over_range,
         evaluate_policy_cost,
     )
+    from acl_gym.model_based import PlantLearning, learn_from_plant
     from acl_gym.partitions import Crisp, Discrete, Fuzzy, Partition
     from acl_gym.partitions.automatic import automatic_partition
     from acl_gym.planning.q_iteration import fuzzy_q_iteration
@@ -94,6 +95,7 @@ _PUBLIC = {
     "MaxMinAntSystem": "acl_gym.agents.ant_system",
     "Overshoot": "acl_gym.costs",
     "Partition": "acl_gym.partitions",
+    "PlantLearning": "acl_gym.model_based",
     "PolicyCost": "acl_gym.evaluation",
     "PolicyEvaluation": "acl_gym.callbacks",
     "PolicyPrior": "acl_gym.colony.prior",
@@ -126,6 +128,7 @@ _PUBLIC = {
     "evaluate_policy_cost": "acl_gym.evaluation",
     "fuzzy_q_iteration": "acl_gym.planning.q_iteration",
     "get_num_threads": "acl_gym.utils.threads",
+    "learn_from_plant": "acl_gym.model_based",
     "plant": "acl_gym.envs.plant",
     "set_num_threads": "acl_gym.utils.threads",
     "value_iteration": "acl_gym.planning.value_iteration",
@@ -158,6 +161,7 @@ __all__ = [
     "MaxMinAntSystem",
     "Overshoot",
     "Partition",
+    "PlantLearning",
     "PolicyCost",
     "PolicyEvaluation",
     "PolicyPrior",
@@ -191,6 +195,7 @@ __all__ = [
     "evaluate_policy_cost",
     "fuzzy_q_iteration",
     "get_num_threads",
+    "learn_from_plant",
     "plant",
     "set_num_threads",
     "value_iteration",

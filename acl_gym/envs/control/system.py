@@ -98,6 +98,15 @@ class ControlSystem(ABC):
         return float(getattr(self, name))
 
     @property
+    def task(self) -> dict[str, Any] | None:
+        """What is to be done: `goal`, `tolerance` and `cost` as `acl_gym.plant` takes them.
+
+        A plant that was learned from recordings is given them; None if they cannot be
+        said so.
+        """
+        return None
+
+    @property
     @abstractmethod
     def max_stage_cost(self) -> float:
         """An upper bound on the cost of one step; T times it bounds J_max."""

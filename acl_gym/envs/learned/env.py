@@ -60,7 +60,8 @@ class LearnedVectorEnv(ControlVectorEnv):
             recording, or the least recorded value less a twentieth of the range.
         high: upper end of each.
         initial: where episodes begin: "data", in recorded states; "starts", where
-            recorded runs began; or see `acl_gym.plant`.
+            recorded runs began; "anywhere", half of them in recorded states and half
+            anywhere within the bounds; or see `acl_gym.plant`.
         evaluation_states: rows of states from which policies are evaluated; None draws
             100 initial states once.
         max_episode_steps: T, after which an episode is truncated, >= 1.
@@ -283,8 +284,21 @@ def _initial(
 ) -> Any:
     if not isinstance(initial, str):
         return initial
-    validation.one_of("initial", initial, ("data", "starts"))
+    validation.one_of("initial", initial, ("data", "starts", "anywhere"))
     rows = transitions.starts if initial == "starts" else transitions.states
     found = transitions.description.shown_angles.variables(rows)
     circle = periods_of(transitions.description) > 0.0
-    return np.where(circle, found, np.clip(found, low, high))
+    found = np.where(circle, found, np.clip(found, low, high))
+    return _Anywhere(found, low, high) if initial == "anywhere" else found
+
+
+class _Anywhere:
+    """Draws every other state from some rows, and the others within bounds."""
+
+    def __init__(self, rows: FloatArray, low: FloatArray, high: FloatArray) -> None:
+        self._rows, self._low, self._high = rows, low, high
+
+    def __call__(self, rng: np.random.Generator, count: int) -> FloatArray:
+        drawn = rng.uniform(self._low, self._high, (count, self._low.size))
+        some = self._rows[rng.integers(len(self._rows), size=count)]
+        return np.where((rng.random(count) < 0.5)[:, None], some, drawn)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from acl_gym.envs.control.lookup import signals_of
 from acl_gym.envs.learned.description import described_by
 from acl_gym.utils import validation
-from acl_gym.utils.typing import BoolArray
+from acl_gym.utils.typing import BoolArray, IntArray
 
 
 class _Predicts(Protocol):
@@ -65,17 +65,8 @@ class Recorder:
         self._drawn: Any = None
         self._held = 0
         self.steps = 0
-        self._kept: dict[str, list[NDArray[Any]]] = {
-            name: []
-            for name in (
-                "states",
-                "inputs",
-                "next_states",
-                "rewards",
-                "terminated",
-                "slots",
-            )
-        }
+        # One append a step, so that another thread may read meanwhile.
+        self._kept: list[dict[str, NDArray[Any]]] = []
         self._runs = np.arange(self.num_envs)  # the number of each slot's run
         self._starting = np.zeros(self.num_envs, np.bool_)
         self.observation = self._reset(seed=seed)
@@ -114,32 +105,45 @@ class Recorder:
             "next_states": reached[rows],
             "rewards": np.asarray(rewards, dtype=np.float64)[rows],
             "terminated": np.asarray(terminated, dtype=np.bool_)[rows],
-            "slots": self._runs[rows],
+            "runs": self._runs[rows],
         }
-        for name, array in new.items():
-            self._kept[name].append(array)
+        self._kept.append(new)
         self.steps += rows.size
         ended &= made
         self._starting = np.zeros(self.num_envs, np.bool_)
         self.observation = found
         if ended.any():
-            self._runs[ended] = self._runs.max() + 1 + np.arange(ended.sum())
-            if not self._vector:
-                self.observation = self._reset()
-            elif mode is AutoresetMode.NEXT_STEP:
+            self._number_runs(ended)
+            if mode is AutoresetMode.NEXT_STEP:
                 self._starting = ended
-            elif mode is AutoresetMode.DISABLED:
-                self.observation = self._reset(options={"reset_mask": ended})
+            elif mode is not AutoresetMode.SAME_STEP:
+                self._begin(ended)
         return ended
+
+    def restart(self, slots: BoolArray) -> None:
+        """Reset some slots in the middle of their episodes.
+
+        Args:
+            slots: which, `(num_envs,)`.
+        """
+        self._number_runs(slots)
+        self._begin(slots)
 
     def newest(self) -> dict[str, NDArray[Any]]:
         """What the last step of each slot did, arguments of `Transitions`."""
-        return {name: kept[-1] for name, kept in self._kept.items() if name != "slots"}
+        return {n: array for n, array in self._kept[-1].items() if n != "runs"}
+
+    def newest_runs(self) -> IntArray:
+        """The number of the run that each of the newest steps belongs to."""
+        return self._kept[-1]["runs"]
 
     def arrays(self) -> dict[str, NDArray[Any]]:
         """Everything that was recorded, run after run, arguments of `Transitions`."""
-        joined = {name: np.concatenate(kept) for name, kept in self._kept.items()}
-        runs = joined.pop("slots")
+        kept = list(self._kept)
+        joined = {
+            name: np.concatenate([each[name] for each in kept]) for name in kept[0]
+        }
+        runs = joined.pop("runs")
         order = np.argsort(runs, kind="stable")
         _, numbers = np.unique(runs[order], return_inverse=True)
         return {
@@ -161,6 +165,17 @@ class Recorder:
             )
         shape = self.num_envs, *space.shape
         return self._rng.uniform(space.low, space.high, shape).astype(space.dtype)
+
+    def _number_runs(self, slots: BoolArray) -> None:
+        """Let these slots begin runs with numbers of their own."""
+        self._runs[slots] = self._runs.max() + 1 + np.arange(np.count_nonzero(slots))
+
+    def _begin(self, slots: BoolArray) -> None:
+        """Reset these slots now."""
+        if self._vector and not slots.all():
+            self.observation = self._reset(options={"reset_mask": slots})
+        else:
+            self.observation = self._reset()
 
     def _chosen(self) -> Any:
         if self.policy is None:

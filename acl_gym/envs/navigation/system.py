@@ -211,6 +211,15 @@ class Navigation(BlockSystem):
         )
 
     @property
+    def task(self) -> dict[str, Any]:
+        """Goal and cost, see `ControlSystem.task`."""
+        goal: dict[str, Any] = {"goal": np.zeros(4), "tolerance": self.goal_bounds * 2}
+        if self.goal_rule == "membership":
+            goal = {"goal": self._in_goal, "tolerance": None}
+        cost = _one if self.cost == "time" else (self.state_weight, self.force_weight)
+        return {**goal, "cost": cost}
+
+    @property
     def max_stage_cost(self) -> float:
         """The largest stage cost over the corners of X and the forces."""
         corners = np.array(list(itertools.product((-1.0, 1.0), repeat=4)))
@@ -382,3 +391,8 @@ def _checked_weight(values: Any) -> tuple[Any, ...]:
             f"the 4 numbers >= 0 of its diagonal, got {validation.shown(values)}."
         )
     return tuple(map(tuple, weight.tolist()))
+
+
+def _one(x: FloatArray, u: FloatArray) -> FloatArray:
+    """The cost of a step of cost="time", for states `(4, n)`."""
+    return np.ones(x.shape[1])

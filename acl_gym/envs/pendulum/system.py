@@ -136,6 +136,15 @@ class Pendulum(BlockSystem):
         )
 
     @property
+    def task(self) -> dict[str, Any]:
+        """Goal and cost, see `ControlSystem.task`."""
+        return {
+            "goal": (math.pi, 0.0),
+            "tolerance": self.goal_bounds,
+            "cost": (self.state_weight, self.torque_weight),
+        }
+
+    @property
     def max_stage_cost(self) -> float:
         """The largest stage cost (5.4) over the corners of X and the torques."""
         weight = np.array(self.state_weight)

@@ -95,6 +95,7 @@ class Plant(ControlSystem):
         )
         self._goal = targets.Goal(goal, tolerance, self.low, self.high, self._period)
         self._cost = targets.Cost(cost, self._goal, self.inputs, self.sampling_time)
+        self._task = {"goal": goal, "tolerance": tolerance, "cost": cost}
         self._goal.check(samples)
         self._cost.check(samples)
         self._signals = Signals(
@@ -125,6 +126,11 @@ class Plant(ControlSystem):
     def signals(self) -> Signals:
         """The names of states and inputs, and the inputs of each action."""
         return self._signals
+
+    @property
+    def task(self) -> dict[str, Any]:
+        """Goal, tolerance and cost as they were given."""
+        return dict(self._task)
 
     @property
     def goal_box(self) -> FloatArray | None:

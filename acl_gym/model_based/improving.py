@@ -1,0 +1,121 @@
+"""Letting a colony learn in a model until its policy no longer becomes better."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from acl_gym.agents.base import TabularAgent
+from acl_gym.envs.learned import LearnedVectorEnv
+from acl_gym.evaluation import evaluate_policy_cost
+from acl_gym.utils import validation
+from acl_gym.utils.typing import FloatArray, Predictor
+
+CHUNK = 4_000
+"""Steps of all ants in the model between two evaluations of the policy."""
+
+PATIENCE = 3
+"""Evaluations in a row without a better policy, after which a round ends."""
+
+BETTER = 0.005
+"""The share by which a cost must fall to count as better."""
+
+
+class Improving:
+    """An agent that learns in one model after the other, and its best policy.
+
+    Args:
+        agent: what `learn_from_plant` was given, None excluded.
+        best_file: where the agent is saved when its policy is the best; None: nowhere.
+
+    Attributes:
+        agent: what learns; None before the first model.
+        best: the best policy in the newest model; None before the first.
+        cost: what it costs there.
+    """
+
+    def __init__(
+        self, agent: TabularAgent | Callable[[Any], Any], best_file: Path | None
+    ) -> None:
+        self._make = None if isinstance(agent, TabularAgent) else agent
+        if self._make is not None and not callable(self._make):
+            raise TypeError(
+                "agent must be an agent of this package or a function of the model that "
+                f"makes one, got {validation.shown(agent)}."
+            )
+        self.agent: Any = agent if self._make is None else None
+        self._best_file = best_file
+        self._model: LearnedVectorEnv | None = None
+        self.best: Predictor | None = None
+        self.cost = np.inf
+
+    def restore(
+        self, agent_file: Path, best_file: Path, model: LearnedVectorEnv
+    ) -> None:
+        """Take over an agent and its best policy from files of a run that was killed."""
+        if self.agent is None:
+            self.agent = self._made(model)
+        kind = type(self.agent)
+        self.agent = kind.load(agent_file, env=model)
+        if best_file.exists():
+            self.best = kind.load(best_file).policy
+
+    def improve(
+        self, model: LearnedVectorEnv, states: FloatArray, most_steps: int
+    ) -> int:
+        """Learn in a model.
+
+        Args:
+            model: it may be another one each time.
+            states: from which policies are compared, `(n, n_variables)`.
+            most_steps: after how many steps learning ends in any case.
+
+        Returns:
+            The steps of all ants.
+        """
+        self._enter(model)
+        self.cost = np.inf if self.best is None else self._cost(self.best, states)
+        done, in_vain = 0, 0
+        while done < most_steps and in_vain < PATIENCE:
+            chunk = min(CHUNK, most_steps - done)
+            self.agent.learn(total_timesteps=chunk)
+            done += chunk
+            policy = getattr(self.agent, "policy", None)
+            # A policy of another package changes with its agent; there is no copy.
+            snapshot = policy if isinstance(self.agent, TabularAgent) else self.agent
+            cost = self._cost(snapshot, states)
+            in_vain = 0 if cost < (1.0 - BETTER) * self.cost else in_vain + 1
+            if cost <= self.cost or snapshot is self.agent:
+                self.best, self.cost = snapshot, cost
+                if self._best_file is not None and hasattr(self.agent, "save"):
+                    self.agent.save(self._best_file)
+        return done
+
+    def _enter(self, model: LearnedVectorEnv) -> None:
+        """Let the agent walk in this model from now on, with what it has learned."""
+        if self.agent is None:
+            self.agent = self._made(model)
+        elif isinstance(self.agent, TabularAgent):
+            self.agent.set_env(model)
+            if hasattr(self.agent, "forget"):
+                self.agent.forget()  # paths in a model that is no longer believed
+        elif self._model is not None:
+            # An agent of another package keeps its environment, which changes.
+            self._model.set_system(model.system, model.parameters)
+            model = self._model
+        self._model = model
+
+    def _made(self, model: LearnedVectorEnv) -> Any:
+        made = self._make(model)  # type: ignore[misc]
+        for name in ("learn", "predict"):
+            if not callable(getattr(made, name, None)):
+                raise TypeError(
+                    f"the agent must have {name}, got {validation.shown(made)}."
+                )
+        return made
+
+    def _cost(self, policy: Any, states: FloatArray) -> float:
+        return evaluate_policy_cost(policy, self._model, states).cost  # type: ignore[arg-type]

@@ -1,0 +1,155 @@
+"""A folder in which every interaction is written down as soon as it was made.
+
+A process may be killed at any moment: what the plant did until then is in the file, each
+step once. A line that was not completed is cut off when the run goes on.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acl_gym.envs.learned import Transitions
+from acl_gym.envs.learned.description import described_by
+from acl_gym.utils import validation
+from acl_gym.utils.files import write_atomically
+
+DATA, SETTINGS, STATE = "transitions.csv", "run.json", "state.json"
+AGENT, BEST = "agent.npz", "best.npz"
+
+_VERSION = 1
+
+
+class Journal:
+    """The file of steps of one run, and its settings.
+
+    Args:
+        folder: made if it does not exist.
+        settings: of the run, JSON types; a folder that is there must have the same.
+        env: the plant, which tells what its numbers are.
+        values: the inputs of each action where these are continuous.
+
+    Attributes:
+        transitions: what the file held; None if it is new.
+
+    Raises:
+        ValueError: the folder holds another run.
+        OSError: it cannot be written.
+    """
+
+    def __init__(
+        self,
+        folder: str | os.PathLike[str],
+        settings: dict[str, Any],
+        env: Any,
+        values: NDArray[np.float64] | None,
+    ) -> None:
+        self.folder = validation.path("folder", folder)
+        self.folder.mkdir(parents=True, exist_ok=True)
+        facts = described_by(env)
+        self._size, self._n_inputs = facts.pop("size"), facts.pop("n_inputs")
+        self._facts = facts if values is None else {**facts, "values": values}
+        self._check(settings)
+        self.transitions, self._runs = self._read()
+        self._file = (self.folder / DATA).open("a", newline="")
+        self._writer = csv.writer(self._file)
+        if self._file.tell() == 0:
+            self._writer.writerow(self._columns())
+            self._file.flush()
+
+    def close(self) -> None:
+        """Close the file."""
+        self._file.close()
+
+    def path(self, name: str) -> Path:
+        """A file of the run."""
+        return self.folder / name
+
+    def append(self, steps: dict[str, NDArray[Any]], runs: NDArray[np.int64]) -> None:
+        """Write steps down; when this returns, they outlive the process.
+
+        Args:
+            steps: arguments of `Transitions`, `(n, ...)`.
+            runs: the number of the run that each belongs to, `(n,)`.
+        """
+        table = np.column_stack(
+            [steps["states"], steps["inputs"], steps["next_states"], steps["rewards"]]
+        )
+        for run, row, ended in zip(runs, table, steps["terminated"], strict=True):
+            # repr gives back the same number, to the bit.
+            self._writer.writerow(
+                [int(run) + self._runs, *map(repr, row.tolist()), int(ended)]
+            )
+        self._file.flush()
+
+    def _check(self, settings: dict[str, Any]) -> None:
+        path = self.folder / SETTINGS
+        wanted = {"version": _VERSION, **settings}
+        if not path.exists():
+            if (self.folder / DATA).exists():
+                raise ValueError(
+                    f"{self.folder} holds {DATA}, but no {SETTINGS}; give another folder."
+                )
+            write_atomically(path, (json.dumps(wanted, indent=1) + "\n").encode())
+            return
+        try:
+            found = json.loads(path.read_text())
+            changed = sorted(k for k in wanted if found.get(k) != wanted[k])
+        except (ValueError, AttributeError, OSError) as error:
+            raise ValueError(
+                f"{path} cannot be read: {error}; give another folder."
+            ) from error
+        if changed:
+            name = changed[0]
+            raise ValueError(
+                f"{self.folder} holds another run, with {name}={found.get(name)!r}, got "
+                f"{name}={wanted[name]!r}; give another folder, or the same arguments "
+                "to go on."
+            )
+
+    def _read(self) -> tuple[Transitions | None, int]:
+        """What was written until now, without a line that was not completed."""
+        path = self.folder / DATA
+        if not path.exists():
+            return None, 0
+        content = path.read_bytes()
+        whole = content[: content.rfind(b"\n") + 1]
+        if len(whole) < len(content):
+            write_atomically(path, whole)
+        rows = list(csv.reader(io.StringIO(whole.decode())))
+        if not rows:
+            return None, 0
+        if rows[0] != self._columns():
+            raise ValueError(
+                f"{path} must have the columns {self._columns()}, got {rows[0]}; give "
+                "another folder."
+            )
+        if len(rows) == 1:
+            return None, 0
+        table = np.array(rows[1:], dtype=np.float64)
+        ends = np.cumsum([1, self._size, self._n_inputs, self._size, 1])
+        run, states, inputs, after, rewards, ended = np.split(table, ends, axis=1)
+        order = np.argsort(run[:, 0], kind="stable")
+        found = Transitions(
+            states[order],
+            inputs[order],
+            after[order],
+            rewards[order, 0],
+            ended[order, 0],
+            episodes=run[order, 0].astype(np.int64),
+            **self._facts,
+        )
+        return found, int(run.max()) + 1
+
+    def _columns(self) -> list[str]:
+        states = [f"x{i}" for i in range(self._size)]
+        inputs = [f"u{i}" for i in range(self._n_inputs)]
+        after = [f"next_{name}" for name in states]
+        return ["run", *states, *inputs, *after, "reward", "terminated"]

@@ -1,0 +1,419 @@
+"""One run of `learn_from_plant`: plant, recordings, model and colony, round after round."""
+
+from __future__ import annotations
+
+import json
+import os
+import threading
+import time
+import warnings
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from gymnasium import spaces
+from gymnasium.vector import VectorEnv
+
+from acl_gym.agents.base import TabularAgent
+from acl_gym.agents.returning import ReturningACL
+from acl_gym.envs.control.lookup import system_of
+from acl_gym.envs.learned import (
+    DataWarning,
+    LearnedDynamics,
+    LearnedVectorEnv,
+    Transitions,
+)
+from acl_gym.envs.learned.dynamics import LEAST_STEPS
+from acl_gym.model_based.improving import Improving
+from acl_gym.model_based.journal import AGENT, BEST, STATE, Journal
+from acl_gym.model_based.plant_runner import PlantRunner
+from acl_gym.model_based.result import PlantLearning
+from acl_gym.utils import validation
+from acl_gym.utils.boxes import declared_bounds
+from acl_gym.utils.files import write_atomically
+from acl_gym.utils.typing import FloatArray, Row
+
+FIRST_ROUNDS = (20, 40, 60, 90, 120, 160, 200)
+"""Interactions after which the colony learns, if nothing else is said."""
+
+GROWTH = 1.25
+"""By which factor there are more of them in each later round."""
+
+ANTS = 20
+"""Slots of the model."""
+
+COMPARED = 50
+"""States from which policies are compared in the model."""
+
+VALUES = 5
+"""Values of each continuous input, if none are given."""
+
+Callback = Callable[[PlantLearning, Row], Any] | None
+
+
+class LearningRun:
+    """The state of one run of `learn_from_plant`, whose arguments it takes.
+
+    Attributes:
+        interactions: how many are made altogether.
+    """
+
+    def __init__(
+        self,
+        env: Any,
+        agent: Any,
+        interactions: int,
+        rounds: Any,
+        *,
+        explore: float,
+        hold: int,
+        restart_after: int | None,
+        inputs: Any,
+        task: dict[str, Any],
+        initial: Any,
+        max_episode_steps: int | None,
+        model: dict[str, Any] | None,
+        model_steps: int,
+        data: Transitions | None,
+        folder: str | os.PathLike[str] | None,
+        seed: int | None,
+    ) -> None:
+        self.interactions = validation.integer("interactions", interactions, at_least=1)
+        self._ends = _rounds(rounds, self.interactions)
+        self._model_steps = validation.integer("model_steps", model_steps, at_least=1)
+        explore = validation.number("explore", explore, at_least=0, at_most=1)
+        hold = validation.integer("hold", hold, at_least=1)
+        if restart_after is not None:
+            restart_after = validation.integer(
+                "restart_after", restart_after, at_least=1
+            )
+        if data is not None and not isinstance(data, Transitions):
+            raise TypeError(
+                f"data must be acl_gym.Transitions, got {validation.shown(data)}."
+            )
+        seed = validation.seed(seed)
+        self._task = _task(env, task)
+        self._initial, self._data = initial, data
+        self._arguments = dict(model or {})
+        self._steps = _episode_steps(env, max_episode_steps)
+        values = _inputs(env, inputs)
+        self._journal: Journal | None = None
+        self._before: Transitions | None = None
+        if folder is not None:
+            settings = {
+                "explore": explore,
+                "hold": hold,
+                "restart_after": restart_after,
+                "seed": seed,
+                "inputs": None if values is None else values.tolist(),
+            }
+            self._journal = Journal(folder, settings, env, values)
+            self._before = self._journal.transitions
+        made = 0 if self._before is None else len(self._before)
+        self._runner = PlantRunner(
+            env,
+            inputs=values,
+            explore=explore,
+            hold=hold,
+            restart_after=restart_after,
+            # A run that goes on does not repeat the numbers of its beginning.
+            seed=None if seed is None else seed + made,
+        )
+        self._made_before = made
+        self._improving = Improving(
+            _default_agent(seed) if agent is None else agent,
+            None if self._journal is None else self._journal.path(BEST),
+        )
+        self._model: LearnedVectorEnv | None = None
+        self._history: list[Row] = []
+        self._seconds = 0.0
+        self._rounds_done = self._restored_rounds()
+
+    def close(self) -> None:
+        """Close the file of interactions."""
+        if self._journal is not None:
+            self._journal.close()
+
+    def complete(
+        self,
+        callback: Callback,
+        progress: Callable[[int], Any],
+        *,
+        asynchronous: bool,
+    ) -> PlantLearning:
+        """Make all interactions that are left, and learn from them.
+
+        Args:
+            callback: see `learn_from_plant`.
+            progress: called with the number of new interactions.
+            asynchronous: see there.
+        """
+        if callback is not None and not callable(callback):
+            raise TypeError(
+                "callback must be a function of the learning and a row, got "
+                f"{validation.shown(callback)}."
+            )
+        progress(self._made_before)
+        if asynchronous:
+            self._side_by_side(callback, progress)
+        else:
+            self._in_turn(callback, progress)
+        return self._result()
+
+    def _in_turn(self, callback: Callback, progress: Callable[[int], Any]) -> None:
+        """Plant and colony take turns."""
+        for number, end in enumerate(self._ends):
+            before = self._interactions
+            while self._interactions < end:
+                self._runner.step(self._journal)
+            progress(self._interactions - before)
+            if number < self._rounds_done or self._too_few():
+                continue
+            row = self._learn()
+            self._keep(number + 1)
+            if callback is not None and callback(self._result(), row) is False:
+                return
+        if self._model is None:  # all rounds were done before the run was killed
+            self._learn(0)
+
+    def _side_by_side(self, callback: Callback, progress: Callable[[int], Any]) -> None:
+        """The plant runs in a thread of its own, and nobody waits."""
+        stop, failed = threading.Event(), []
+
+        def run_plant() -> None:
+            try:
+                while self._interactions < self.interactions and not stop.is_set():
+                    self._runner.step(self._journal)
+            except BaseException as error:  # raised again below, in the other thread
+                failed.append(error)
+
+        plant = threading.Thread(target=run_plant, name="plant", daemon=True)
+        plant.start()
+        seen = self._interactions
+        try:
+            while True:
+                done = not plant.is_alive()
+                if failed:
+                    raise failed[0]
+                if self._too_few():
+                    if done:
+                        break
+                    plant.join(0.01)
+                    continue
+                now = self._interactions
+                row = self._learn()
+                progress(now - seen)
+                seen = now
+                self._keep(0)
+                if callback is not None and callback(self._result(), row) is False:
+                    break
+                if done:
+                    break
+        finally:
+            stop.set()
+            plant.join()
+        if self._model is None:
+            self._learn(0)
+
+    @property
+    def _interactions(self) -> int:
+        return self._made_before + self._runner.steps
+
+    def _too_few(self) -> bool:
+        more = 0 if self._data is None else len(self._data)
+        return more + self._interactions < LEAST_STEPS
+
+    def _recorded(self) -> Transitions:
+        """Everything that is known of the plant."""
+        parts = [self._data, self._before]
+        if self._runner.steps:
+            parts.append(self._runner.transitions())
+        there = [part for part in parts if part is not None]
+        if not there:
+            raise ValueError(
+                f"at least {LEAST_STEPS} interactions are needed to learn from, got 0."
+            )
+        joined = there[0]
+        for part in there[1:]:
+            joined = joined + part
+        return joined
+
+    def _learn(self, most_steps: int | None = None) -> Row:
+        """Fit the model to everything recorded, and let the colony go on in it."""
+        began = time.perf_counter()
+        recorded = self._recorded()
+        begin: LearnedDynamics | None = (
+            None if self._model is None else self._model.dynamics
+        )
+        first = self._model is None
+        with warnings.catch_warnings():
+            if len(recorded) < self.interactions:
+                # That there are few steps is the point.
+                warnings.simplefilter("ignore", DataWarning)
+            self._model = self._fitted(recorded, begin)
+        if first and self._rounds_done and self._journal is not None:
+            files = self._journal.path(AGENT), self._journal.path(BEST)
+            if files[0].exists():
+                self._improving.restore(*files, self._model)
+        model: LearnedVectorEnv = self._model
+        states = model.system.sample_states(np.random.default_rng(0), COMPARED)
+        steps = self._improving.improve(
+            model,
+            np.ascontiguousarray(states.T),
+            self._model_steps if most_steps is None else most_steps,
+        )
+        self._runner.policy = self._improving.best
+        self._seconds += time.perf_counter() - began
+        row: Row = {
+            "interactions": self._interactions,
+            "seconds": self._seconds,
+            "model_error": float(np.mean(list(model.dynamics.errors.values()))),
+            "model_cost": float(self._improving.cost),
+            "model_steps": steps,
+        }
+        if steps:
+            self._history.append(row)
+        return row
+
+    def _fitted(
+        self, recorded: Transitions, begin: LearnedDynamics | None
+    ) -> LearnedVectorEnv:
+        arguments: dict[str, Any] = {
+            "max_episode_steps": self._steps,
+            "begin": begin,
+            **self._task,
+            **self._arguments,
+        }
+        if self._initial is None:
+            arguments["initial"] = "anywhere"
+        else:
+            arguments["initial"] = self._initial
+        return LearnedVectorEnv(recorded, ANTS, **arguments)
+
+    def _result(self) -> PlantLearning:
+        improving = self._improving
+        if self._model is None or improving.best is None:
+            raise ValueError(
+                f"at least {LEAST_STEPS} interactions are needed to learn from, got "
+                f"{self._interactions}; ask for more."
+            )
+        return PlantLearning(
+            improving.best,
+            improving.agent,
+            self._model,
+            self._model.transitions,
+            [dict(row) for row in self._history],
+        )
+
+    def _keep(self, rounds_done: int) -> None:
+        """Save the agent, and how far the run has come."""
+        if self._journal is None or not isinstance(self._improving.agent, TabularAgent):
+            return
+        self._improving.agent.save(self._journal.path(AGENT))
+        state = {
+            "rounds": rounds_done,
+            "seconds": self._seconds,
+            "history": self._history,
+        }
+        write_atomically(self._journal.path(STATE), json.dumps(state).encode())
+
+    def _restored_rounds(self) -> int:
+        """How many rounds were done before the run was killed."""
+        if self._journal is None or not self._journal.path(STATE).exists():
+            return 0
+        path = self._journal.path(STATE)
+        try:
+            state = json.loads(path.read_text())
+            self._seconds = float(state["seconds"])
+            self._history = [dict(row) for row in state["history"]]
+            return int(state["rounds"])
+        except (ValueError, KeyError, TypeError) as error:
+            raise ValueError(
+                f"{path} cannot be read: {error}; remove it to learn anew from what was "
+                "recorded."
+            ) from error
+
+
+def _rounds(rounds: Any, interactions: int) -> list[int]:
+    """The numbers of interactions after which the colony learns, the last one being all."""
+    if rounds is None:
+        ends = list(FIRST_ROUNDS)
+        while ends[-1] < interactions:
+            ends.append(int(np.ceil(ends[-1] * GROWTH)))
+    elif isinstance(rounds, int | np.integer) and not isinstance(rounds, bool):
+        count = validation.integer("rounds", rounds, at_least=1, at_most=interactions)
+        ends = [round(interactions * (i + 1) / count) for i in range(count)]
+    else:
+        listed = validation.elements(rounds)
+        ends = [
+            validation.integer("rounds", each, at_least=1) for each in listed or [None]
+        ]
+    return [*sorted({end for end in ends if end < interactions}), interactions]
+
+
+def _task(env: Any, given: dict[str, Any]) -> dict[str, Any]:
+    """Goal, tolerance and cost: those given, else what is known of the environment."""
+    system = system_of(env)
+    known = None if system is None else system.task
+    task = {name: value for name, value in given.items() if value is not None}
+    if known is None:
+        return task
+    if "goal" in task:  # a tolerance belongs to its goal
+        return {**task, "cost": task.get("cost", known["cost"])}
+    return {**known, **task}
+
+
+def _episode_steps(env: Any, given: int | None) -> int:
+    if given is not None:
+        return validation.integer("max_episode_steps", given, at_least=1)
+    spec = getattr(env, "spec", None)
+    limits = (
+        getattr(spec, "max_episode_steps", None),
+        getattr(env, "max_episode_steps", None),
+    )
+    known = next((limit for limit in limits if limit is not None and limit > 0), 300)
+    return int(known)
+
+
+def _inputs(env: Any, inputs: Any) -> FloatArray | None:
+    """What each action sets where actions are continuous; None where they are not."""
+    space = env.single_action_space if isinstance(env, VectorEnv) else env.action_space
+    if isinstance(space, spaces.Discrete):
+        if inputs is not None:
+            raise ValueError(
+                "inputs belong to continuous actions, got them for "
+                f"{validation.shown(space)}; leave them out."
+            )
+        return None
+    if not isinstance(space, spaces.Box) or len(space.shape) != 1:
+        raise TypeError(
+            "a plant needs Discrete actions or a Box of one axis, got "
+            f"{validation.shown(space)}."
+        )
+    if inputs is None:
+        low, high = declared_bounds(space)
+        if not (np.isfinite(low).all() and np.isfinite(high).all()):
+            raise ValueError(
+                "inputs must be given where the Box of actions has no finite bounds, got "
+                f"{validation.shown(space)}."
+            )
+        lines = [np.linspace(*ends, VALUES) for ends in zip(low, high, strict=True)]
+        grid = np.meshgrid(*lines, indexing="ij")
+        return np.stack(grid, axis=-1).reshape(-1, len(lines))
+    array = validation.real_array("inputs", inputs)
+    array = array[:, None] if array.ndim == 1 else array
+    if array.ndim != 2 or array.shape[1] != space.shape[0]:
+        raise ValueError(
+            f"inputs must hold a row of {space.shape[0]} numbers for each action, got "
+            f"shape {array.shape}."
+        )
+    if ((array < space.low) | (array > space.high)).any():
+        raise ValueError(
+            f"inputs must lie within the actions of the environment, {space}, got "
+            f"{validation.shown(inputs)}."
+        )
+    return array
+
+
+def _default_agent(seed: int | None) -> Callable[[LearnedVectorEnv], ReturningACL]:
+    return lambda model: ReturningACL(model, seed=seed)

@@ -17,7 +17,7 @@ from acl_gym.utils.typing import FloatArray, Predictor
 CHUNK = 4_000
 """Steps of all ants in the model between two evaluations of the policy."""
 
-PATIENCE = 3
+PATIENCE = 2
 """Evaluations in a row without a better policy, after which a round ends."""
 
 BETTER = 0.005

@@ -23,7 +23,7 @@ from acl_gym.envs.learned import (
     LearnedVectorEnv,
     Transitions,
 )
-from acl_gym.envs.learned.dynamics import LEAST_STEPS
+from acl_gym.envs.learned.regression import LEAST_STEPS
 from acl_gym.model_based.improving import Improving
 from acl_gym.model_based.journal import AGENT, BEST, STATE, Journal
 from acl_gym.model_based.plant_runner import PlantRunner
@@ -39,7 +39,7 @@ FIRST_ROUNDS = (20, 40, 60, 90, 120, 160, 200)
 GROWTH = 1.25
 """By which factor there are more of them in each later round."""
 
-ANTS = 20
+ANTS = 50
 """Slots of the model."""
 
 COMPARED = 50
@@ -247,9 +247,9 @@ class LearningRun:
         )
         first = self._model is None
         with warnings.catch_warnings():
-            if len(recorded) < self.interactions:
-                # That there are few steps is the point.
-                warnings.simplefilter("ignore", DataWarning)
+            # That there are few steps is the point, and from one start a plant without
+            # noise repeats itself.
+            warnings.simplefilter("ignore", DataWarning)
             self._model = self._fitted(recorded, begin)
         if first and self._rounds_done and self._journal is not None:
             files = self._journal.path(AGENT), self._journal.path(BEST)
@@ -416,4 +416,5 @@ def _inputs(env: Any, inputs: Any) -> FloatArray | None:
 
 
 def _default_agent(seed: int | None) -> Callable[[LearnedVectorEnv], ReturningACL]:
-    return lambda model: ReturningACL(model, seed=seed)
+    # Steps in a model are cheap: fewer walks back make more of them in the same time.
+    return lambda model: ReturningACL(model, walks_back=10, seed=seed)

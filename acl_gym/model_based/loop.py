@@ -30,7 +30,7 @@ def learn_from_plant(
     initial: Any = None,
     max_episode_steps: int | None = None,
     model: dict[str, Any] | None = None,
-    model_steps: int = 40_000,
+    model_steps: int = 20_000,
     data: Transitions | None = None,
     folder: str | os.PathLike[str] | None = None,
     asynchronous: bool = False,

@@ -6,14 +6,13 @@ from typing import Any, Self
 
 import numpy as np
 
-from acl_gym.envs.learned.features import Features
-from acl_gym.envs.learned.regression import Fit, checked_kind, folds_of
+from acl_gym.envs.learned.description import Description
+from acl_gym.envs.learned.features import Features, periods_of, variable_ends
+from acl_gym.envs.learned.regression import LEAST_STEPS, Fit, checked_kind
 from acl_gym.envs.learned.transitions import Transitions
 from acl_gym.utils import validation
 from acl_gym.utils.text import digits
-from acl_gym.utils.typing import FloatArray, IntArray
-
-LEAST_STEPS = 5
+from acl_gym.utils.typing import BoolArray, FloatArray, IntArray
 
 
 class LearnedDynamics:
@@ -69,6 +68,7 @@ class LearnedDynamics:
             np.ascontiguousarray(before.T), np.ascontiguousarray(inputs.T)
         )
         targets = self.features.targets(before, after)
+        usable = ~_held_at_ends(self.description, after)
         self._inputs: FloatArray | None = None
         groups = [np.ones(len(rows), np.bool_)]
         if per_action:
@@ -83,7 +83,7 @@ class LearnedDynamics:
                     rows[group],
                     targets[group],
                     kind,
-                    folds=folds_of(int(group.sum())),
+                    usable=usable[group],
                     n_draws=n_draws,
                     seed=seed,
                     begin=begin._fits[number]
@@ -160,14 +160,12 @@ class LearnedDynamics:
         """
         rows = self.features.rows(variables, inputs)
         if members is None:
-            found = self._of_fits(
-                rows, inputs, lambda fit, mine: fit.regression.mean(rows[mine])
-            )
+            found = self._of_fits(rows, inputs, lambda fit, mine: fit.mean(rows[mine]))
         else:
             found = self._of_fits(
                 rows,
                 inputs,
-                lambda fit, mine: fit.regression.of_members(rows[mine], members[mine]),
+                lambda fit, mine: fit.of_members(rows[mine], members[mine]),
             )
         return np.asarray(variables + self.features.changes(found).T)
 
@@ -183,9 +181,7 @@ class LearnedDynamics:
             inputs: `(n_inputs, n)`.
         """
         rows = self.features.rows(variables, inputs)
-        found = self._of_fits(
-            rows, inputs, lambda fit, mine: fit.certainty.deviation(rows[mine])
-        )
+        found = self._of_fits(rows, inputs, lambda fit, mine: fit.deviation(rows[mine]))
         return np.asarray(found.max(axis=1))
 
     def _of_fits(self, rows: FloatArray, inputs: FloatArray, of: Any) -> FloatArray:
@@ -206,3 +202,14 @@ class LearnedDynamics:
                 f"{inputs.T[left][0].tolist()}; leave per_action out."
             )
         return found
+
+
+def _held_at_ends(description: Description, variables: FloatArray) -> BoolArray:
+    """Which variables are at a known end, `(n, n_variables)`.
+
+    A wall holds them there, or a clip: what the dynamics would have done without it is
+    not known, and the jump would spoil what is learned beside it.
+    """
+    low, high = variable_ends(description)
+    ends = (variables <= low) | (variables >= high)
+    return np.asarray(ends & (periods_of(description) == 0.0))

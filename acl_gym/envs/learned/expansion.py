@@ -8,7 +8,9 @@ that the same states give the same bits on any machine.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 
@@ -20,6 +22,27 @@ LANES = 4
 """Terms that are summed side by side, in an order that does not depend on the machine."""
 
 HALF_PI = 0.5 * np.pi
+
+
+@dataclass(frozen=True)
+class Terms:
+    """The terms of one output, see `Expansion`, of any number.
+
+    Attributes:
+        inverse_lengths: `(n_features,)`.
+        centres: `(n_features, n_bells)`.
+        bells: `(n_members, n_bells)`.
+        directions: `(n_features, n_waves)`.
+        phases: `(n_waves,)`.
+        waves: `(n_members, n_waves)`.
+    """
+
+    inverse_lengths: FloatArray
+    centres: FloatArray
+    bells: FloatArray
+    directions: FloatArray
+    phases: FloatArray
+    waves: FloatArray
 
 
 @dataclass(frozen=True)
@@ -46,6 +69,18 @@ class Expansion:
     directions: FloatArray
     phases: FloatArray
     waves: FloatArray
+
+    @classmethod
+    def of(cls, outputs: Sequence[Terms]) -> Self:
+        """Put outputs side by side; zeros are added where one has fewer terms."""
+        return cls(
+            np.array([each.inverse_lengths for each in outputs]),
+            _stacked([each.centres for each in outputs]),
+            _by_member([each.bells for each in outputs]),
+            _stacked([each.directions for each in outputs]),
+            _stacked([each.phases for each in outputs]),
+            _by_member([each.waves for each in outputs]),
+        )
 
     @property
     def n_members(self) -> int:
@@ -109,11 +144,21 @@ class Certainty:
         return found
 
 
-def padded(array: FloatArray) -> FloatArray:
-    """Zeros added along the last axis, up to a multiple of `LANES`."""
-    more = -array.shape[-1] % LANES
-    widths = [(0, 0)] * (array.ndim - 1) + [(0, more)]
-    return np.ascontiguousarray(np.pad(array, widths))
+def _stacked(arrays: Sequence[FloatArray]) -> FloatArray:
+    """Arrays side by side, zeros added along the last axis up to a multiple of `LANES`."""
+    most = max(array.shape[-1] for array in arrays)
+    most += -most % LANES
+    return np.stack(
+        [
+            np.pad(array, [(0, 0)] * (array.ndim - 1) + [(0, most - array.shape[-1])])
+            for array in arrays
+        ]
+    )
+
+
+def _by_member(arrays: Sequence[FloatArray]) -> FloatArray:
+    """The same for weights, the members first."""
+    return np.ascontiguousarray(_stacked(arrays).transpose(1, 0, 2))
 
 
 @njit(error_model="numpy")

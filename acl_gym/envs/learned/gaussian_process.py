@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve, solve_triangular
 
-from acl_gym.envs.learned.expansion import Certainty, Expansion, padded
+from acl_gym.envs.learned.expansion import Certainty, Terms
 from acl_gym.utils.typing import FloatArray, IntArray
 
 MOST_SEARCHED = 200
 """Points on which the length scales are searched for."""
+
+MOST_TRIED = 60
+"""Steps of that search."""
 
 MOST_POINTS = 2_000
 """Points that the posterior takes into account, evenly spread over the recording."""
@@ -44,62 +48,69 @@ class Scales:
 
 
 def search_scales(
-    rows: FloatArray, targets: FloatArray, begin: list[Scales] | None = None
-) -> list[Scales]:
-    """Find the hyperparameters of each output that make the data most likely.
+    rows: FloatArray, targets: FloatArray, begins: Sequence[Scales]
+) -> Scales:
+    """Find the hyperparameters that make the data of one output the most likely.
 
     Args:
         rows: features, `(n, n_features)`.
-        targets: `(n, n_outputs)`, of about unit size.
-        begin: where to begin the search, such as the result for fewer data.
+        targets: `(n,)`, of about unit size.
+        begins: where to begin searches, of which the best result is taken.
     """
     from sklearn.exceptions import ConvergenceWarning
     from sklearn.gaussian_process import GaussianProcessRegressor
 
     chosen = spread_evenly(len(rows), MOST_SEARCHED)
-    found = []
-    for output in range(targets.shape[1]):
-        first = None if begin is None else begin[output]
+    best, most = begins[0], -np.inf
+    for begin in begins:
         with warnings.catch_warnings():
             # A length at the end of its range means that the feature does not matter.
             warnings.simplefilter("ignore", ConvergenceWarning)
-            fitted = GaussianProcessRegressor(_kernel(first, rows.shape[1])).fit(
-                rows[chosen], targets[chosen, output]
+            fitted = GaussianProcessRegressor(_kernel(begin), optimizer=_climb).fit(
+                rows[chosen], targets[chosen]
             )
-        bell, white = fitted.kernel_.k1, fitted.kernel_.k2
-        lengths = np.broadcast_to(bell.k2.length_scale, rows.shape[1])
-        found.append(
-            Scales(
-                float(bell.k1.constant_value),
-                np.array(lengths, dtype=np.float64),
-                float(white.noise_level),
+        likelihood = float(fitted.log_marginal_likelihood_value_)
+        if likelihood > most:
+            bell, white = fitted.kernel_.k1, fitted.kernel_.k2
+            lengths = np.broadcast_to(bell.k2.length_scale, rows.shape[1])
+            best, most = (
+                Scales(
+                    float(bell.k1.constant_value),
+                    np.array(lengths, dtype=np.float64),
+                    float(white.noise_level),
+                ),
+                likelihood,
             )
-        )
-    return found
+    return best
+
+
+def first_scales(n_features: int) -> Scales:
+    """Where a search begins of which nothing is known."""
+    return Scales(1.0, np.full(n_features, 2.0), 1e-3)
 
 
 class Posterior:
-    """A Gaussian process given all data, or `MOST_POINTS` of them.
+    """A Gaussian process of one output given all data, or `MOST_POINTS` of them.
 
     Args:
         rows: features, `(n, n_features)`.
-        targets: `(n, n_outputs)`.
-        scales: of each output.
+        targets: `(n,)`.
+        scales: its hyperparameters.
+
+    Attributes:
+        kept: the numbers of the rows that are taken into account.
     """
 
-    def __init__(
-        self, rows: FloatArray, targets: FloatArray, scales: list[Scales]
-    ) -> None:
+    def __init__(self, rows: FloatArray, targets: FloatArray, scales: Scales) -> None:
         self.kept = spread_evenly(len(rows), MOST_POINTS)
-        self._rows, self._targets, self._scales = rows, targets, scales
-        kept = rows[self.kept]
-        self._factors = [
-            cho_factor(_covariance(kept, each), lower=True) for each in scales
-        ]
-        self._weights = [
-            cho_solve(factor, targets[self.kept, output])
-            for output, factor in enumerate(self._factors)
-        ]
+        self.scales = scales
+        self.rows, self._targets = rows[self.kept], targets[self.kept]
+        scaled = self.rows / scales.lengths
+        covariance = scales.amplitude * _bells(scaled, scaled)
+        nugget = scales.noise + _JITTER * scales.amplitude
+        covariance[np.diag_indices(len(scaled))] += nugget
+        self._factor = cho_factor(covariance, lower=True)
+        self._weights = cho_solve(self._factor, self._targets)
 
     def errors_left_out(self, folds: IntArray) -> FloatArray:
         """By how much each point is missed by the process that does not know its fold.
@@ -107,24 +118,21 @@ class Posterior:
         With W = K^-1, the errors of a fold are (W_ff)^-1 (W y)_f, without fitting again.
 
         Args:
-            folds: the number of the fold of each point, `(n,)`.
+            folds: the number of the fold of each row, `(n,)`.
 
         Returns:
-            `(n_kept, n_outputs)`, in the order of the points that are kept.
+            `(n_kept,)`, in the order of the points that are kept.
         """
         of_kept = folds[self.kept]
-        errors = np.empty((self.kept.size, len(self._scales)))
-        for output, factor in enumerate(self._factors):
-            inverse = cho_solve(factor, np.eye(self.kept.size))
-            for fold in np.unique(of_kept):
-                rows = np.flatnonzero(of_kept == fold)
-                block = inverse[np.ix_(rows, rows)]
-                errors[rows, output] = np.linalg.solve(
-                    block, self._weights[output][rows]
-                )
+        errors = np.empty(self.kept.size)
+        inverse = cho_solve(self._factor, np.eye(self.kept.size))
+        for fold in np.unique(of_kept):
+            rows = np.flatnonzero(of_kept == fold)
+            block = inverse[np.ix_(rows, rows)]
+            errors[rows] = np.linalg.solve(block, self._weights[rows])
         return errors
 
-    def expansion(self, n_draws: int = 0, seed: int = 0) -> Expansion:
+    def terms(self, n_draws: int, rng: np.random.Generator) -> Terms:
         """The mean, and draws from the posterior.
 
         A draw is one from the prior, a sum of random waves, which the data then correct
@@ -132,73 +140,55 @@ class Posterior:
 
         Args:
             n_draws: how many, >= 0.
-            seed: of the draws.
+            rng: draws them.
         """
-        kept, rng = self._rows[self.kept], np.random.default_rng(seed)
+        each, n_features = self.scales, self.rows.shape[1]
         n_waves = N_WAVES if n_draws else 0
-        bells, waves = [], []
-        directions, phases = [], []
-        for output, each in enumerate(self._scales):
-            weights = [self._weights[output]]
-            of_waves = [np.zeros(n_waves)]
-            direction = rng.standard_normal((kept.shape[1], n_waves))
-            phase = rng.uniform(0.0, 2.0 * np.pi, n_waves)
-            basis = np.cos(kept / each.lengths @ direction + phase)
-            for _ in range(n_draws):
-                size = np.sqrt(2.0 * each.amplitude / n_waves)
-                wave = size * rng.standard_normal(n_waves)
-                noise = np.sqrt(each.noise) * rng.standard_normal(len(kept))
-                missed = self._targets[self.kept, output] - basis @ wave - noise
-                weights.append(cho_solve(self._factors[output], missed))
-                of_waves.append(wave)
-            bells.append(each.amplitude * np.array(weights))
-            waves.append(np.array(of_waves))
-            directions.append(direction)
-            phases.append(phase)
-        inverse = np.array([1.0 / each.lengths for each in self._scales])
-        centres = np.array([(kept * row).T for row in inverse])
-        return Expansion(
-            inverse,
-            padded(centres),
-            padded(np.array(bells).transpose(1, 0, 2)),
-            padded(np.array(directions)),
-            padded(np.array(phases)),
-            padded(np.array(waves).transpose(1, 0, 2)),
+        directions = rng.standard_normal((n_features, n_waves))
+        phases = rng.uniform(0.0, 2.0 * np.pi, n_waves)
+        basis = np.cos(self.rows / each.lengths @ directions + phases)
+        bells, waves = [self._weights], [np.zeros(n_waves)]
+        for _ in range(n_draws):
+            size = np.sqrt(2.0 * each.amplitude / n_waves)
+            wave = size * rng.standard_normal(n_waves)
+            noise = np.sqrt(each.noise) * rng.standard_normal(len(self.rows))
+            missed = self._targets - basis @ wave - noise
+            bells.append(cho_solve(self._factor, missed))
+            waves.append(wave)
+        return Terms(
+            1.0 / each.lengths,
+            (self.rows / each.lengths).T,
+            each.amplitude * np.array(bells),
+            directions,
+            phases,
+            np.array(waves),
         )
 
-    def certainty(self) -> Certainty:
-        """What is known where."""
-        return certainty_of(self._rows, self._scales)
 
-
-def certainty_of(rows: FloatArray, scales: list[Scales]) -> Certainty:
-    """What processes with these scales know, given points `(n, n_features)`."""
-    rows = rows[spread_evenly(len(rows), MOST_POINTS)]
-    most = min(MOST_TELLING, len(rows))
+def certainty_of(rows: Sequence[FloatArray], scales: Sequence[Scales]) -> Certainty:
+    """What processes with these scales know, given the rows of each output."""
     points, whitening = [], []
-    for each in scales:
-        scaled = rows / each.lengths
-        chosen = _most_telling(scaled, each.noise / each.amplitude, most)
-        telling = scaled[chosen]
+    for known, each in zip(rows, scales, strict=True):
+        scaled = known[spread_evenly(len(known), MOST_POINTS)] / each.lengths
+        noise = each.noise / each.amplitude
+        most = min(MOST_TELLING, len(scaled))
+        telling = scaled[_most_telling(scaled, noise, most)]
         covariance = _bells(telling, telling)
-        covariance[np.diag_indices(most)] += each.noise / each.amplitude + _JITTER
+        covariance[np.diag_indices(most)] += noise + _JITTER
         factor = np.linalg.cholesky(covariance)
-        points.append(telling.T)
-        whitening.append(solve_triangular(factor, np.eye(most), lower=True).T)
+        inverse = solve_triangular(factor, np.eye(most), lower=True)
+        more = MOST_TELLING - most  # points that explain nothing
+        points.append(np.pad(telling.T, [(0, 0), (0, more)]))
+        whitening.append(np.pad(inverse.T, (0, more)))
     return Certainty(
         np.array([1.0 / each.lengths for each in scales]),
-        padded(np.array(points)),
-        padded(_padded_square(np.array(whitening))),
+        np.array(points),
+        np.array(whitening),
         np.sqrt([each.amplitude for each in scales]),
     )
 
 
 _JITTER = 1e-9
-
-
-def _padded_square(matrices: FloatArray) -> FloatArray:
-    """Rows of zeros added, as many as `padded` adds columns."""
-    return padded(matrices.transpose(0, 2, 1)).transpose(0, 2, 1)
 
 
 def _most_telling(scaled: FloatArray, noise: float, most: int) -> IntArray:
@@ -218,28 +208,34 @@ def _most_telling(scaled: FloatArray, noise: float, most: int) -> IntArray:
     return chosen
 
 
-def _covariance(rows: FloatArray, scales: Scales) -> FloatArray:
-    scaled = rows / scales.lengths
-    covariance = scales.amplitude * _bells(scaled, scaled)
-    covariance[np.diag_indices(len(rows))] += scales.noise + _JITTER * scales.amplitude
-    return covariance
-
-
 def _bells(one: FloatArray, other: FloatArray) -> FloatArray:
     """exp(-|a - b|^2 / 2) of all pairs."""
     squares = (one**2).sum(axis=1)[:, None] + (other**2).sum(axis=1)
     return np.asarray(np.exp(np.minimum(one @ other.T - 0.5 * squares, 0.0)))
 
 
-def _kernel(begin: Scales | None, n_features: int) -> Any:
+def _kernel(begin: Scales) -> Any:
     from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
 
-    if begin is None:
-        begin = Scales(1.0, np.full(n_features, 2.0), 1e-3)
     clip = np.clip
     return ConstantKernel(clip(begin.amplitude, *_AMPLITUDES), _AMPLITUDES) * RBF(
         clip(begin.lengths, *_LENGTHS), _LENGTHS
     ) + WhiteKernel(clip(begin.noise, *_NOISES), _NOISES)
+
+
+def _climb(likelihood: Any, begin: FloatArray, bounds: FloatArray) -> Any:
+    """Search as scikit-learn does, but not for ever."""
+    from scipy.optimize import minimize
+
+    found = minimize(
+        likelihood,
+        begin,
+        method="L-BFGS-B",
+        jac=True,
+        bounds=bounds,
+        options={"maxiter": MOST_TRIED},
+    )
+    return found.x, found.fun
 
 
 def spread_evenly(count: int, most: int) -> IntArray:

@@ -7,9 +7,8 @@ from typing import Any, Self
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from acl_gym.envs.learned.dynamics import LEAST_STEPS
 from acl_gym.envs.learned.features import Features
-from acl_gym.envs.learned.regression import Fit, folds_of
+from acl_gym.envs.learned.regression import LEAST_STEPS, Fit, folds_of
 from acl_gym.envs.learned.transitions import Transitions
 from acl_gym.utils.typing import BoolArray, FloatArray
 
@@ -59,12 +58,11 @@ class LearnedCost:
         fits = []
         for states in (after, before):
             rows = self._features.rows(np.ascontiguousarray(states.T), inputs)
-            folds = folds_of(len(rows))
-            fits.append(Fit(rows, targets, regressor, folds=folds))
+            fits.append(Fit(rows, targets, regressor))
         errors = [float(fit.regression.errors[0]) for fit in fits]
         best = int(np.argmin(errors))
         self.error, self.of_next_state = errors[best], best == 0
-        self._regression = fits[best].regression
+        self._fit = fits[best]
 
     def __deepcopy__(self, memo: Any) -> Self:
         """Itself: it does not change."""
@@ -75,7 +73,7 @@ class LearnedCost:
     ) -> FloatArray:
         """The costs `(n,)` of steps from `before` to `after`, `(n_variables, n)`."""
         states = after if self.of_next_state else before
-        found = self._regression.mean(self._features.rows(states, inputs))
+        found = self._fit.mean(self._features.rows(states, inputs))
         return np.asarray(self._mean + self._scale * found[:, 0])
 
 

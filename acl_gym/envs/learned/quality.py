@@ -10,7 +10,7 @@ from acl_gym.utils.typing import FloatArray
 FEW = 10
 """Steps for each variable and input, below which a recording is called short."""
 
-OFTEN_TWICE = 0.05
+OFTEN_TWICE = 0.25
 """The share of rows that may be there twice; a plant at rest repeats itself."""
 
 UNITS = {

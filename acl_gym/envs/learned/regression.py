@@ -8,16 +8,30 @@ from typing import Any
 
 import numpy as np
 
-from acl_gym.envs.learned.expansion import Certainty, Expansion, padded
+from acl_gym.envs.learned.expansion import Certainty, Expansion, Terms
 from acl_gym.envs.learned.gaussian_process import (
     MOST_POINTS,
     Posterior,
     Scales,
     certainty_of,
+    first_scales,
     search_scales,
 )
 from acl_gym.utils import validation
-from acl_gym.utils.typing import FloatArray, IntArray
+from acl_gym.utils.compiling import njit
+from acl_gym.utils.typing import BoolArray, FloatArray, IntArray
+
+LEAST_STEPS = 5
+"""Steps without which nothing is fitted."""
+
+AGAIN = 1.5
+"""How many times as many data make a new search for scales worth while."""
+
+LINEAR_RIDGE = 1e-3
+"""Steps' worth of evidence for a line without slope."""
+
+GOOD = 0.05
+"""The error, relative to the deviation, below which no other kind is tried."""
 
 N_FOLDS = 5
 BLOCK = 10
@@ -63,10 +77,10 @@ class Regression(ABC):
 class SumOfTerms(Regression):
     """A Gaussian process or random features, evaluated by this package's kernel."""
 
-    def __init__(self, name: str, errors: FloatArray, expansion: Expansion) -> None:
-        self.name, self.errors = name, errors
-        self._expansion = expansion
-        self.n_members = expansion.n_members
+    def __init__(self, name: str, errors: list[float], outputs: list[Terms]) -> None:
+        self.name, self.errors = name, np.array(errors)
+        self._expansion = Expansion.of(outputs)
+        self.n_members = self._expansion.n_members
 
     def mean(self, rows: FloatArray) -> FloatArray:
         """See `Regression`."""
@@ -84,57 +98,99 @@ class OfLibrary(Regression):
     each.
     """
 
-    def __init__(
-        self,
-        name: str,
-        make: Callable[[], Any],
-        rows: FloatArray,
-        targets: FloatArray,
-        folds: IntArray,
-    ) -> None:
+    def __init__(self, name: str, make: Callable[[], Any], data: list[Output]) -> None:
         self.name = name
-        outputs = range(targets.shape[1])
-        missed = np.empty(targets.shape)
-        self._members = [[_fitted(make(), rows, targets[:, o]) for o in outputs]]
-        for fold in np.unique(folds):
-            out = folds == fold
-            member = [_fitted(make(), rows[~out], targets[~out, o]) for o in outputs]
-            missed[out] = self._of(member, rows[out]) - targets[out]
-            self._members.append(member)
-        self.errors = _relative(missed, targets)
-        self.n_members = len(self._members)
-
-    @staticmethod
-    def _of(member: list[Any], rows: FloatArray) -> FloatArray:
-        columns = [
-            np.asarray(each.predict(rows), np.float64).ravel() for each in member
-        ]
-        return np.stack(columns, axis=1)
+        self._members = [
+            [each.estimator(make, each.every)] for each in data
+        ]  # of each output
+        errors = []
+        for members, each in zip(self._members, data, strict=True):
+            missed = np.empty(len(each.rows))
+            for fold in range(N_FOLDS):
+                out = each.folds == fold
+                members.append(each.estimator(make, ~out))
+                if out.any():
+                    missed[out] = (
+                        members[-1].predict(each.rows[out]) - each.targets[out]
+                    )
+            errors.append(each.relative(missed))
+        self.errors = np.array(errors)
+        self.n_members = 1 + N_FOLDS
 
     def mean(self, rows: FloatArray) -> FloatArray:
         """See `Regression`."""
-        return self._of(self._members[0], rows)
+        return self._of(0, rows)
 
     def of_members(self, rows: FloatArray, members: IntArray) -> FloatArray:
         """See `Regression`."""
-        found = np.empty((len(rows), len(self._members[0])))
+        found = np.empty((len(rows), len(self._members)))
         for member in np.unique(members):
             mine = members == member
-            found[mine] = self._of(self._members[member], rows[mine])
+            found[mine] = self._of(int(member), rows[mine])
         return found
+
+    def _of(self, member: int, rows: FloatArray) -> FloatArray:
+        columns = [
+            np.asarray(each[member].predict(rows), np.float64).ravel()
+            for each in self._members
+        ]
+        return np.stack(columns, axis=1)
+
+
+class Output:
+    """What is known of one output.
+
+    Most outputs are nearly linear, and outside the data a line is a better guess than
+    the mean. So a line is fitted first, and a regression to what it leaves.
+
+    Args:
+        rows: features, `(n, n_features)`.
+        targets: `(n,)`, of about unit size.
+        folds: the number of the fold of each row, `(n,)`.
+
+    Attributes:
+        line: weight of each feature, and last what is added, `(n_features + 1,)`.
+        scale: deviation of what the line leaves.
+        targets: what it leaves, divided by that.
+    """
+
+    def __init__(self, rows: FloatArray, targets: FloatArray, folds: IntArray) -> None:
+        self.rows, self.folds = rows, folds
+        self.every = np.ones(len(rows), np.bool_)
+        self._deviation = float(targets.std()) or 1.0
+        self.line, left = _line(rows, targets)
+        self.scale = max(float(left.std()), 1e-6)
+        self.targets = left / self.scale
+
+    def estimator(self, make: Callable[[], Any], rows: BoolArray) -> Any:
+        """One of a library, fitted to some rows."""
+        made = make()
+        made.fit(self.rows[rows], self.targets[rows])
+        return made
+
+    def relative(self, missed: FloatArray) -> float:
+        """The root mean square of errors, in units of the deviation of the output."""
+        return float(np.sqrt(np.mean(missed**2))) * self.scale / self._deviation
 
 
 class Fit:
-    """A regression, what it knows where, and the scales with which a next fit begins.
+    """A regression, and what it knows where.
 
     Args:
         rows: features, `(n, n_features)`.
         targets: `(n, n_outputs)`, of about unit size.
         kind: one of `KINDS`, "auto", or an object with `fit` and `predict`.
+        usable: which targets are to be fitted, `(n, n_outputs)`; None: all.
         n_draws: draws from the posterior beside the mean.
         seed: of the draws.
-        begin: the fit of fewer data, to begin with.
-        folds: the number of the fold of each row, `(n,)`.
+        begin: the fit of fewer data. Scales are searched for and kinds compared anew
+            only where there are `AGAIN` times as many data as at the last time.
+
+    Attributes:
+        regression: what predicts.
+        tried: the mean error of each kind that was tried.
+        scales: of each output.
+        searched_at: how many data there were when these were searched for.
     """
 
     def __init__(
@@ -143,46 +199,109 @@ class Fit:
         targets: FloatArray,
         kind: Any,
         *,
-        folds: IntArray,
+        usable: BoolArray | None = None,
         n_draws: int = 0,
         seed: int = 0,
         begin: Fit | None = None,
     ) -> None:
         from threadpoolctl import threadpool_limits
 
+        folds = folds_of(len(rows))
+        outputs = []
+        for number in range(targets.shape[1]):
+            good = np.ones(len(rows), np.bool_)
+            if usable is not None and usable[:, number].sum() >= LEAST_STEPS:
+                good = usable[:, number]
+            outputs.append(Output(rows[good], targets[good, number], folds[good]))
         # Threads of their own would wait for each other on a busy machine, and add up
         # in another order.
         with threadpool_limits(1):
-            self._fit(rows, targets, kind, folds, n_draws, seed, begin)
+            self._choose(outputs, kind, n_draws, seed, begin)
 
-    def _fit(
+    def _choose(
         self,
-        rows: FloatArray,
-        targets: FloatArray,
+        outputs: list[Output],
         kind: Any,
-        folds: IntArray,
         n_draws: int,
         seed: int,
         begin: Fit | None,
     ) -> None:
+        self.regression: Regression
         self.scales: list[Scales]
-        same = begin is not None and begin.scales[0].lengths.size == rows.shape[1]
-        self.scales = search_scales(
-            rows, targets, begin.scales if begin is not None and same else None
+        self.searched_at: int
+        count, n_features = outputs[0].every.size, outputs[0].rows.shape[1]
+        if begin is not None and begin.scales[0].lengths.size != n_features:
+            begin = None
+        if begin is not None and count < AGAIN * begin.searched_at:
+            self.scales, self.searched_at = begin.scales, begin.searched_at
+            kinds = [begin.regression.name if isinstance(kind, str) else kind]
+        else:
+            self.searched_at = count
+            self.scales = [
+                search_scales(
+                    each.rows,
+                    each.targets,
+                    [first_scales(n_features)]
+                    if begin is None
+                    else [first_scales(n_features), begin.scales[number]],
+                )
+                for number, each in enumerate(outputs)
+            ]
+            kinds = _candidates(kind, count)
+        self._lines = np.array([each.line for each in outputs])
+        self._scale = np.array([each.scale for each in outputs])
+        self._certainty: Certainty = certainty_of(
+            [each.rows for each in outputs], self.scales
         )
-        self.certainty: Certainty = certainty_of(rows, self.scales)
-        tried = []
-        for name in _candidates(kind, len(rows)):
-            if name == "gaussian process":
-                tried.append(_process(rows, targets, self.scales, folds, n_draws, seed))
-            elif name == "random features":
-                tried.append(_waves(rows, targets, self.scales, folds, n_draws, seed))
-            else:
-                make = _maker(name)
-                tried.append(OfLibrary(_named(name), make, rows, targets, folds))
-        scores = [float(np.mean(np.minimum(each.errors, 2.0))) for each in tried]
-        self.tried = dict(zip((each.name for each in tried), scores, strict=True))
-        self.regression = tried[int(np.argmin(scores))]
+        self.tried: dict[str, float] = {}
+        least = np.inf
+        for each in kinds:
+            found = _fitted(each, outputs, self.scales, n_draws, seed)
+            error = float(np.mean(np.minimum(found.errors, 2.0)))
+            self.tried[found.name] = error
+            if error < least or least == np.inf:
+                self.regression, least = found, error
+            if least < GOOD:
+                break  # no other kind could be worth its time
+
+    def mean(self, rows: FloatArray) -> FloatArray:
+        """Predict `(n, n_outputs)` from features `(n, n_features)`."""
+        return self._with_lines(rows, self.regression.mean(rows))
+
+    def of_members(self, rows: FloatArray, members: IntArray) -> FloatArray:
+        """The same from the member of each row, see `Regression.of_members`."""
+        return self._with_lines(rows, self.regression.of_members(rows, members))
+
+    def deviation(self, rows: FloatArray) -> FloatArray:
+        """What is not known of each output, `(n, n_outputs)`."""
+        return np.asarray(self._certainty.deviation(rows) * self._scale)
+
+    def _with_lines(self, rows: FloatArray, left: FloatArray) -> FloatArray:
+        _add_lines(rows, self._lines, self._scale, left)
+        return left
+
+
+def _line(rows: FloatArray, targets: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Weights of a linear fit, and what it leaves of the targets."""
+    wide = np.concatenate([rows, np.ones((len(rows), 1))], axis=1)
+    # Features that say the same twice share their weight.
+    normal = wide.T @ wide + LINEAR_RIDGE * np.eye(wide.shape[1])
+    line = np.linalg.solve(normal, wide.T @ targets)
+    return line, targets - wide @ line
+
+
+@njit(error_model="numpy")
+def _add_lines(
+    rows: FloatArray, lines: FloatArray, scale: FloatArray, left: FloatArray
+) -> None:
+    """Add the lines; not a matrix product, whose bits depend on the number of rows."""
+    last = rows.shape[1]
+    for i in range(len(rows)):
+        for o in range(len(lines)):
+            total = lines[o, last] + scale[o] * left[i, o]
+            for f in range(last):
+                total += lines[o, f] * rows[i, f]
+            left[i, o] = total
 
 
 def folds_of(count: int) -> IntArray:
@@ -202,10 +321,7 @@ def checked_kind(kind: Any) -> Any:
     """
     if isinstance(kind, str):
         return validation.one_of("regressor", kind, ("auto", *KINDS))
-    if not (
-        callable(getattr(kind, "fit", None))
-        and callable(getattr(kind, "predict", None))
-    ):
+    if not all(callable(getattr(kind, name, None)) for name in ("fit", "predict")):
         raise TypeError(
             "regressor must be a name or an object with fit(X, y) and predict(X), got "
             f"{validation.shown(kind)}."
@@ -216,16 +332,23 @@ def checked_kind(kind: Any) -> Any:
 def _candidates(kind: Any, count: int) -> list[Any]:
     if not isinstance(kind, str) or kind != "auto":
         return [kind]
-    found = ["gaussian process", "nearest neighbours"]
+    found = ["gaussian process"]
     if count > MOST_POINTS:
-        found.insert(1, "random features")
+        found.append("random features")
     if count >= ENOUGH_FOR_TREES:
         found.append("gradient boosting")
-    return found
+    return [*found, "nearest neighbours"]
 
 
-def _named(kind: Any) -> str:
-    return kind if isinstance(kind, str) else type(kind).__name__
+def _fitted(
+    kind: Any, outputs: list[Output], scales: list[Scales], n_draws: int, seed: int
+) -> Regression:
+    if kind == "gaussian process":
+        return _process(outputs, scales, n_draws, seed)
+    if kind == "random features":
+        return _waves(outputs, scales, n_draws, seed)
+    name = kind if isinstance(kind, str) else type(kind).__name__
+    return OfLibrary(name, _maker(kind), outputs)
 
 
 def _maker(kind: Any) -> Callable[[], Any]:
@@ -245,66 +368,53 @@ def _maker(kind: Any) -> Callable[[], Any]:
     return lambda: clone(kind, safe=False)
 
 
-def _fitted(estimator: Any, rows: FloatArray, targets: FloatArray) -> Any:
-    estimator.fit(rows, targets)
-    return estimator
-
-
 def _process(
-    rows: FloatArray,
-    targets: FloatArray,
-    scales: list[Scales],
-    folds: IntArray,
-    n_draws: int,
-    seed: int,
+    outputs: list[Output], scales: list[Scales], n_draws: int, seed: int
 ) -> Regression:
-    posterior = Posterior(rows, targets, scales)
-    errors = _relative(posterior.errors_left_out(folds), targets[posterior.kept])
-    return SumOfTerms(KINDS[0], errors, posterior.expansion(n_draws, seed))
+    errors, terms, rng = [], [], np.random.default_rng(seed)
+    for each, own in zip(outputs, scales, strict=True):
+        posterior = Posterior(each.rows, each.targets, own)
+        errors.append(each.relative(posterior.errors_left_out(each.folds)))
+        terms.append(posterior.terms(n_draws, rng))
+    return SumOfTerms(KINDS[0], errors, terms)
 
 
 def _waves(
-    rows: FloatArray,
-    targets: FloatArray,
-    scales: list[Scales],
-    folds: IntArray,
-    n_draws: int,
-    seed: int,
+    outputs: list[Output], scales: list[Scales], n_draws: int, seed: int
 ) -> Regression:
     """Random features of the scales that were found, with ridge regression."""
     from sklearn.kernel_approximation import RBFSampler
 
-    directions, phases, waves, missed = [], [], [], np.empty(targets.shape)
-    rng = np.random.default_rng(seed)
-    for output, each in enumerate(scales):
+    errors, terms, rng = [], [], np.random.default_rng(seed)
+    for each, own in zip(outputs, scales, strict=True):
         # For exp(-gamma |a - b|^2) with lengths taken out beforehand.
         sampler = RBFSampler(gamma=0.5, n_components=N_RANDOM, random_state=seed)
-        features = sampler.fit_transform(rows / each.lengths)
+        features = sampler.fit_transform(each.rows / own.lengths)
         # A weight has the prior variance `amplitude`, the features being normalised.
-        ridge = each.noise / each.amplitude + 1e-9
-        target = targets[:, output]
-        for fold in np.unique(folds):
-            out = folds == fold
-            mean, _ = _ridge(features[~out], target[~out], ridge)
-            missed[out, output] = features[out] @ mean - target[out]
-        mean, factor = _ridge(features, target, ridge)
+        ridge = own.noise / own.amplitude + 1e-9
+        missed = np.empty(len(features))
+        for fold in np.unique(each.folds):
+            out = each.folds == fold
+            mean, _ = _ridge(features[~out], each.targets[~out], ridge)
+            missed[out] = features[out] @ mean - each.targets[out]
+        mean, factor = _ridge(features, each.targets, ridge)
         weights = [mean]
         for _ in range(n_draws):
             draw = np.linalg.solve(factor.T, rng.standard_normal(N_RANDOM))
-            weights.append(mean + np.sqrt(each.noise) * draw)
-        directions.append(sampler.random_weights_)
-        phases.append(sampler.random_offset_)
-        waves.append(np.sqrt(2.0 / N_RANDOM) * np.array(weights))
-    n_outputs, n_features = len(scales), rows.shape[1]
-    expansion = Expansion(
-        np.array([1.0 / each.lengths for each in scales]),
-        np.empty((n_outputs, n_features, 0)),
-        np.empty((n_draws + 1, n_outputs, 0)),
-        padded(np.array(directions)),
-        padded(np.array(phases)),
-        padded(np.array(waves).transpose(1, 0, 2)),
-    )
-    return SumOfTerms(KINDS[1], _relative(missed, targets), expansion)
+            weights.append(mean + np.sqrt(own.noise) * draw)
+        n_features = each.rows.shape[1]
+        terms.append(
+            Terms(
+                1.0 / own.lengths,
+                np.empty((n_features, 0)),
+                np.empty((n_draws + 1, 0)),
+                sampler.random_weights_,
+                sampler.random_offset_,
+                np.sqrt(2.0 / N_RANDOM) * np.array(weights),
+            )
+        )
+        errors.append(each.relative(missed))
+    return SumOfTerms(KINDS[1], errors, terms)
 
 
 def _ridge(
@@ -315,14 +425,5 @@ def _ridge(
 
     normal = features.T @ features
     normal[np.diag_indices(len(normal))] += ridge
-    factor = np.linalg.cholesky(normal)
-    return np.asarray(cho_solve((factor, True), features.T @ target)), np.asarray(
-        factor
-    )
-
-
-def _relative(missed: FloatArray, targets: FloatArray) -> FloatArray:
-    deviation = targets.std(axis=0)
-    return np.asarray(
-        np.sqrt((missed**2).mean(axis=0)) / np.where(deviation > 0.0, deviation, 1.0)
-    )
+    factor = np.asarray(np.linalg.cholesky(normal))
+    return np.asarray(cho_solve((factor, True), features.T @ target)), factor

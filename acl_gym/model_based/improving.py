@@ -14,8 +14,12 @@ from acl_gym.evaluation import evaluate_policy_cost
 from acl_gym.utils import validation
 from acl_gym.utils.typing import FloatArray, Predictor
 
-CHUNK = 4_000
-"""Steps of all ants in the model between two evaluations of the policy."""
+LEAST_CHUNK = 4_000
+"""Steps of all ants in the model between two evaluations of the policy; more where the
+table has more pairs."""
+
+CHUNKS = 5
+"""Evaluations in a round, unless the number of steps is given."""
 
 PATIENCE = 2
 """Evaluations in a row without a better policy, after which a round ends."""
@@ -64,23 +68,25 @@ class Improving:
             self.best = kind.load(best_file).policy
 
     def improve(
-        self, model: LearnedVectorEnv, states: FloatArray, most_steps: int
+        self, model: LearnedVectorEnv, states: FloatArray, most_steps: int | None
     ) -> int:
         """Learn in a model.
 
         Args:
             model: it may be another one each time.
             states: from which policies are compared, `(n, n_variables)`.
-            most_steps: after how many steps learning ends in any case.
+            most_steps: after how many steps learning ends in any case; None: after
+                `CHUNKS` evaluations.
 
         Returns:
             The steps of all ants.
         """
         self._enter(model)
         self.cost = np.inf if self.best is None else self._cost(self.best, states)
-        done, in_vain = 0, 0
-        while done < most_steps and in_vain < PATIENCE:
-            chunk = min(CHUNK, most_steps - done)
+        done, in_vain, chunk = 0, 0, self._chunk()
+        most = CHUNKS * chunk if most_steps is None else most_steps
+        while done < most and in_vain < PATIENCE:
+            chunk = min(chunk, most - done)
             self.agent.learn(total_timesteps=chunk)
             done += chunk
             policy = getattr(self.agent, "policy", None)
@@ -107,6 +113,11 @@ class Improving:
             self._model.set_system(model.system, model.parameters)
             model = self._model
         self._model = model
+
+    def _chunk(self) -> int:
+        """Enough steps to come to each pair once, on the average."""
+        pairs = getattr(self.agent, "table", np.empty(0)).size
+        return max(LEAST_CHUNK, int(pairs))
 
     def _made(self, model: LearnedVectorEnv) -> Any:
         made = self._make(model)  # type: ignore[misc]

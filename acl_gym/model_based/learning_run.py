@@ -36,7 +36,7 @@ from acl_gym.utils.typing import FloatArray, Row
 FIRST_ROUNDS = (20, 40, 60, 90, 120, 160, 200)
 """Interactions after which the colony learns, if nothing else is said."""
 
-GROWTH = 1.25
+GROWTH = 1.5
 """By which factor there are more of them in each later round."""
 
 ANTS = 50
@@ -73,14 +73,16 @@ class LearningRun:
         initial: Any,
         max_episode_steps: int | None,
         model: dict[str, Any] | None,
-        model_steps: int,
+        model_steps: int | None,
         data: Transitions | None,
         folder: str | os.PathLike[str] | None,
         seed: int | None,
     ) -> None:
         self.interactions = validation.integer("interactions", interactions, at_least=1)
         self._ends = _rounds(rounds, self.interactions)
-        self._model_steps = validation.integer("model_steps", model_steps, at_least=1)
+        if model_steps is not None:
+            model_steps = validation.integer("model_steps", model_steps, at_least=1)
+        self._model_steps = model_steps
         explore = validation.number("explore", explore, at_least=0, at_most=1)
         hold = validation.integer("hold", hold, at_least=1)
         if restart_after is not None:

@@ -30,7 +30,7 @@ def learn_from_plant(
     initial: Any = None,
     max_episode_steps: int | None = None,
     model: dict[str, Any] | None = None,
-    model_steps: int = 20_000,
+    model_steps: int | None = None,
     data: Transitions | None = None,
     folder: str | os.PathLike[str] | None = None,
     asynchronous: bool = False,
@@ -62,7 +62,7 @@ def learn_from_plant(
         interactions: steps of the plant, of all slots together, >= 1.
         rounds: after how many interactions the colony learns: a number of rounds of
             equal length, or the numbers of interactions. None takes
-            20, 40, 60, 90, 120, 160, 200, and then a quarter more each time.
+            20, 40, 60, 90, 120, 160, 200, and then half as many more each time.
         explore: share of steps with random actions, in [0, 1]; in the first round all
             are random.
         hold: for how many steps a random action is held, >= 1.
@@ -79,7 +79,8 @@ def learn_from_plant(
         max_episode_steps: T in the model; None takes the limit of `env`, or 300.
         model: further arguments of `LearnedVectorEnv`, such as `regressor`, `pessimism`
             or `uncertain`.
-        model_steps: the most steps of all ants in the model in a round, >= 1. A round
+        model_steps: the most steps of all ants in the model in a round, >= 1. None takes
+            20,000, or five for each pair of a cell and an action if that is more. A round
             ends earlier if the policy no longer becomes better.
         data: what was recorded of this plant before.
         folder: where every interaction is written down as soon as it was made, and the

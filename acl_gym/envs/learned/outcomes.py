@@ -21,7 +21,8 @@ class LearnedCost:
 
     Some environments reward the state that a step begins in, others the one that it
     leads to. Both are tried, and the one with the smaller error in cross-validation is
-    taken.
+    taken. Most costs are quadratic, so the squares of variables and inputs are among the
+    features.
 
     Args:
         transitions: with rewards.
@@ -55,9 +56,13 @@ class LearnedCost:
             transitions.description, before, transitions.inputs, after
         )
         inputs = np.ascontiguousarray(transitions.inputs.T)
+        self._numbered = transitions.description.numbered
+        self._centre = before.mean(axis=0)
+        self._per_unit = _per_unit(before)
+        self._per_input = _per_unit(transitions.inputs)
         fits = []
         for states in (after, before):
-            rows = self._features.rows(np.ascontiguousarray(states.T), inputs)
+            rows = self._rows(np.ascontiguousarray(states.T), inputs)
             fits.append(Fit(rows, targets, regressor))
         errors = [float(fit.regression.errors[0]) for fit in fits]
         best = int(np.argmin(errors))
@@ -73,8 +78,17 @@ class LearnedCost:
     ) -> FloatArray:
         """The costs `(n,)` of steps from `before` to `after`, `(n_variables, n)`."""
         states = after if self.of_next_state else before
-        found = self._fit.mean(self._features.rows(states, inputs))
+        found = self._fit.mean(self._rows(states, inputs))
         return np.asarray(self._mean + self._scale * found[:, 0])
+
+    def _rows(self, states: FloatArray, inputs: FloatArray) -> FloatArray:
+        """Features, circular variables as they are, and all squares."""
+        plain = (states.T - self._centre) * self._per_unit
+        turned = plain[:, self._features.period > 0.0]
+        parts = [self._features.rows(states, inputs), turned, plain**2]
+        if not self._numbered:
+            parts.append((inputs.T * self._per_input) ** 2)
+        return np.concatenate(parts, axis=1)
 
 
 class LearnedGoal:
@@ -137,6 +151,12 @@ class LearnedGoal:
     def _rows(self, x: FloatArray) -> FloatArray:
         """The features of states; what the inputs are does not matter."""
         return self._features.rows(x, np.zeros((self._n_inputs, x.shape[1])))
+
+
+def _per_unit(columns: FloatArray) -> FloatArray:
+    """One over the deviation of each column, 1 where it does not change."""
+    deviation = columns.std(axis=0)
+    return np.asarray(1.0 / np.where(deviation > 0.0, deviation, 1.0))
 
 
 def can_be_learned(transitions: Transitions) -> bool:

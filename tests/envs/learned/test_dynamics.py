@@ -1,0 +1,211 @@
+"""Dynamics learned from recordings."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from sklearn.linear_model import Ridge
+
+from acl_gym import Transitions
+from acl_gym.envs.learned import LearnedDynamics
+from acl_gym.envs.learned.regression import KINDS, Fit, folds_of
+from tests.envs.learned.recordings import line, pendulum
+
+
+def predicted(dynamics: LearnedDynamics, data: Transitions, **how: Any) -> Any:
+    angles = data.description.shown_angles
+    x = np.ascontiguousarray(angles.variables(data.states).T)
+    return dynamics.next_variables(x, np.ascontiguousarray(data.inputs.T), **how).T
+
+
+def missed(dynamics: LearnedDynamics, data: Transitions) -> Any:
+    angles = data.description.shown_angles
+    found = predicted(dynamics, data) - angles.variables(data.next_states)
+    found[:, 0] = (found[:, 0] + np.pi) % (2 * np.pi) - np.pi
+    return np.sqrt((found**2).mean(axis=0))
+
+
+def other(steps: int = 300) -> Transitions:
+    env = gym.make("acl_gym/Pendulum-v0", max_episode_steps=10)
+    return Transitions.record(env, steps, hold=3, seed=9)
+
+
+def test_sixty_steps_tell_the_dynamics_of_the_pendulum() -> None:
+    """A step of the pendulum changes the angle by up to 0.9, the velocity by 3."""
+    dynamics = LearnedDynamics(pendulum())
+    assert dynamics.regressor == "gaussian process"
+    assert all(error < 0.02 for error in dynamics.errors.values())
+    angle, velocity = missed(dynamics, other())
+    assert angle < 0.01
+    assert velocity < 0.1
+    assert "gaussian process; errors: angle theta" in repr(dynamics)
+
+
+def test_what_a_limit_holds_is_not_learned_from() -> None:
+    """A tank that overflows at 1: full, its level no longer tells what flows in."""
+    rng = np.random.default_rng(0)
+    x, u = rng.uniform(0, 1, 200), rng.uniform(0, 0.5, 200)
+    after = np.minimum(x + u * np.sqrt(x + 0.1), 1.0)
+    assert (after == 1.0).sum() > 20
+    free = after < 1.0
+    errors = []
+    for high in ([1.0], None):
+        dynamics = LearnedDynamics(Transitions(x, u, after, low=[0.0], high=high))
+        found = dynamics.next_variables(x[None], u[None])[0]
+        errors.append(np.abs(found - after)[free].max())
+    knowing, unknowing = errors
+    assert knowing < 1e-3
+    assert 5 * knowing < unknowing
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_kind_learns_a_line(kind: str) -> None:
+    data = Transitions(**line(400))
+    dynamics = LearnedDynamics(data, kind)
+    assert dynamics.regressor == kind
+    assert dynamics.errors["x[0]"] < 0.1
+    x, u = np.array([[0.3, -0.6]]), np.array([[1.0, 0.0]])
+    np.testing.assert_allclose(
+        dynamics.next_variables(x, u), 0.9 * x + 0.5 * u, atol=0.02
+    )
+
+
+def test_any_regressor_of_the_library_will_do() -> None:
+    dynamics = LearnedDynamics(Transitions(**line()), Ridge(alpha=1e-6))
+    assert dynamics.regressor == "Ridge"
+    assert dynamics.errors["x[0]"] < 1e-2
+    assert dynamics.n_members == 6
+
+
+class Constant:
+    """Of no library, but with its two methods."""
+
+    def fit(self, rows: Any, targets: Any) -> None:
+        self.value = float(np.mean(targets))
+
+    def predict(self, rows: Any) -> Any:
+        return np.full(len(rows), self.value)
+
+
+def test_an_object_with_fit_and_predict_will_do() -> None:
+    assert LearnedDynamics(Transitions(**line()), Constant()).regressor == "Constant"
+
+
+def test_the_kind_with_the_smallest_error_is_taken() -> None:
+    """A jump is no work for a smooth process, but for trees."""
+    rng = np.random.default_rng(0)
+    x = rng.uniform(-1, 1, (400, 2))
+    side = np.sign(x[:, 0] - 0.1) * np.sign(x[:, 1] + 0.2)
+    data = Transitions(x, rng.choice([-1.0, 1.0], 400), x + side[:, None], angles=())
+    dynamics = LearnedDynamics(data)
+    assert len(dynamics.tried) == 3
+    assert dynamics.regressor == min(dynamics.tried, key=dynamics.tried.__getitem__)
+    assert dynamics.regressor == "gradient boosting"
+
+
+def test_one_regression_for_each_action() -> None:
+    data = pendulum(120)
+    dynamics = LearnedDynamics(data, per_action=True)
+    assert missed(dynamics, other())[1] < 0.5
+    with pytest.raises(ValueError, match=r"the inputs of its data only, got \[0\.5\]"):
+        dynamics.next_variables(np.zeros((2, 1)), np.full((1, 1), 0.5))
+    few = data[(data.inputs[:, 0] != 0.8) | (np.arange(120) < 12)]
+    with pytest.raises(ValueError, match=r"per_action needs 5 steps or more"):
+        LearnedDynamics(few, per_action=True)
+
+
+def test_numbers_of_actions_have_no_order() -> None:
+    rng = np.random.default_rng(0)
+    x, u = rng.uniform(-1, 1, 60), rng.integers(0, 3, 60)
+    effect = np.array([0.5, -1.0, 0.2])
+    data = Transitions(
+        x, u, x + effect[u], numbered=True, values=[[0], [1], [2]], low=[-9], high=[9]
+    )
+    dynamics = LearnedDynamics(data)
+    found = dynamics.next_variables(np.zeros((1, 3)), np.array([[0.0, 1.0, 2.0]]))
+    np.testing.assert_allclose(found[0], effect, atol=0.01)
+
+
+def test_what_is_not_known_is_shown() -> None:
+    """Hanging was recorded; upright was not."""
+    data = pendulum(200)
+    low = data[np.cos(data.states[:, 0]) > 0.3]
+    dynamics = LearnedDynamics(low)
+    angles = np.array([0.0, np.pi])
+    near, far = dynamics.spread(np.stack([angles, np.zeros(2)]), np.zeros((1, 2)))
+    assert far > 5 * near
+    errors = np.abs(predicted(dynamics, other()) - other().next_states)
+    errors[:, 0] = np.minimum(errors[:, 0], 2 * np.pi - errors[:, 0])
+    spread = dynamics.spread(
+        np.ascontiguousarray(other().states.T), np.ascontiguousarray(other().inputs.T)
+    )
+    free = np.abs(other().next_states[:, 1]) < 9.0
+    sure = spread <= np.median(spread)
+    # Where the model is surer than on the average it is better, by a factor.
+    assert 2 * errors[sure & free, 1].mean() < errors[~sure & free, 1].mean()
+
+
+def test_other_functions_differ_where_little_is_known() -> None:
+    dynamics = LearnedDynamics(pendulum(), n_draws=20)
+    assert dynamics.n_members == 21
+    x = np.array([[3.0], [0.0]]).repeat(21, axis=1)
+    found = dynamics.next_variables(x, np.zeros((1, 21)), np.arange(21))
+    np.testing.assert_array_equal(
+        found[:, :1], dynamics.next_variables(x[:, :1], np.zeros((1, 1)))
+    )
+    assert 0 < found[1].std() < 0.5
+
+
+def test_the_same_data_give_the_same_bits() -> None:
+    one, two = LearnedDynamics(pendulum()), LearnedDynamics(pendulum())
+    np.testing.assert_array_equal(predicted(one, other()), predicted(two, other()))
+
+
+def test_a_search_begins_with_what_was_found() -> None:
+    first = LearnedDynamics(pendulum())
+    more = LearnedDynamics(pendulum(70), begin=first)
+    assert more._fits[0].searched_at == 60
+    many = LearnedDynamics(pendulum(120), begin=first)
+    assert many._fits[0].searched_at == 120
+    assert missed(many, other())[1] < 0.1
+
+
+def test_constant_columns_do_no_harm() -> None:
+    data = {**line(), "inputs": np.zeros((40, 2))}
+    found = LearnedDynamics(Transitions(**data)).next_variables(
+        np.zeros((1, 1)), np.zeros((2, 1))
+    )
+    assert np.isfinite(found).all()
+
+
+def test_folds_keep_neighbours_together() -> None:
+    assert folds_of(100)[:20].tolist() == [0] * 10 + [1] * 10
+    assert set(folds_of(12)) == set(range(5))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "error", "message"),
+    [
+        ({"regressor": "neural"}, ValueError, "regressor must be one of 'auto'"),
+        ({"regressor": 3}, TypeError, "a name or an object with fit"),
+        ({"n_draws": -1}, ValueError, "n_draws must"),
+    ],
+)
+def test_bad_arguments_get_one_clear_error(
+    arguments: dict[str, Any], error: type[Exception], message: str
+) -> None:
+    with pytest.raises(error, match=message):
+        LearnedDynamics(Transitions(**line()), **arguments)
+
+
+def test_four_steps_are_too_few() -> None:
+    with pytest.raises(ValueError, match="a model needs 5 steps or more, got 4"):
+        LearnedDynamics(Transitions(**line(4)))
+
+
+def test_a_fit_of_one_row_repeated_is_finite() -> None:
+    rows, targets = np.ones((8, 2)), np.ones((8, 1))
+    assert np.isfinite(Fit(rows, targets, "auto").mean(rows)).all()

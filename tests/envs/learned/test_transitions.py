@@ -1,0 +1,308 @@
+"""Recorded transitions: checked, joined, chosen from, saved and read again."""
+
+from __future__ import annotations
+
+import io
+import json
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from gymnasium.vector import AutoresetMode, SyncVectorEnv
+
+from acl_gym import Transitions
+from tests.envs.learned.recordings import line, pendulum
+
+
+def same(one: Transitions, other: Transitions) -> bool:
+    return one.description == other.description and all(
+        np.array_equal(getattr(one, name), getattr(other, name))
+        for name in (
+            "states",
+            "inputs",
+            "next_states",
+            "rewards",
+            "terminated",
+            "episodes",
+        )
+    )
+
+
+def test_a_run_is_recorded_as_it_was() -> None:
+    data = pendulum()
+    assert len(data) == 60
+    env = gym.make("acl_gym/Pendulum-v0")
+    torques = env.unwrapped.system.torques  # type: ignore[attr-defined]
+    assert data.rewards is not None
+    for x, u, y, reward in zip(
+        data.states, data.inputs, data.next_states, data.rewards, strict=True
+    ):
+        env.reset(options={"state": x})
+        found, gave, *_ = env.step(torques.index(u[0]))
+        np.testing.assert_array_equal(found, y)
+        assert gave == reward
+
+
+def test_what_the_environment_tells_is_kept() -> None:
+    data = pendulum()
+    assert data.state_names[0].startswith("angle theta")
+    assert data.input_names == ("torque u, N m",)
+    assert data.sampling_time == 0.1
+    assert data.description.circular == (0,)
+    assert data.description.values == ((-0.8,), (0.0,), (0.8,))
+    assert "60 steps in 6 runs" in repr(data)
+
+
+def test_runs_are_numbered_and_their_first_states_are_starts() -> None:
+    data = pendulum()
+    assert data.episodes.tolist() == [run for run in range(6) for _ in range(10)]
+    np.testing.assert_array_equal(data.starts, data.states[::10])
+    inside = data.episodes[1:] == data.episodes[:-1]
+    np.testing.assert_array_equal(
+        data.states[1:][inside], data.next_states[:-1][inside]
+    )
+
+
+@pytest.mark.parametrize("mode", list(AutoresetMode))
+def test_a_vector_environment_is_recorded_in_every_mode_of_autoreset(
+    mode: AutoresetMode,
+) -> None:
+    """No step leads over a reset: CartPole starts within 0.05 of upright."""
+    env = SyncVectorEnv([lambda: gym.make("CartPole-v1")] * 3, autoreset_mode=mode)
+    data = Transitions.record(env, 200, seed=1)
+    assert 200 <= len(data) <= 202
+    ends = np.asarray(data.terminated)
+    # A pole that falls moves by less than this in a step, and starts upright.
+    assert np.abs(data.next_states - data.states)[:, 2].max() < 0.1
+    assert (np.abs(data.next_states[ends, 2]) > 0.2).all()
+    assert len(data.starts) >= ends.sum()
+    assert (np.abs(data.starts) <= 0.05).all()
+    assert data.description.numbered
+
+
+@pytest.mark.parametrize("mode", list(AutoresetMode))
+def test_a_native_environment_is_recorded_in_every_mode_of_autoreset(
+    mode: AutoresetMode,
+) -> None:
+    env = gym.make_vec(
+        "acl_gym/Pendulum-v0", num_envs=3, max_episode_steps=7, autoreset_mode=mode
+    )
+    data = Transitions.record(env, 90, seed=1)
+    assert np.bincount(data.episodes).max() == 7
+    single = gym.make_vec("acl_gym/Pendulum-v0", num_envs=len(data))
+    single.reset(options={"state": data.states})
+    torques = list(single.unwrapped.system.torques)  # type: ignore[attr-defined]
+    found, *_ = single.step(np.array([torques.index(u) for u in data.inputs[:, 0]]))
+    np.testing.assert_array_equal(found, data.next_states)
+
+
+def test_a_policy_may_choose() -> None:
+    env = gym.make("acl_gym/Pendulum-v0")
+    data = Transitions.record(env, 20, lambda seen: np.full(len(seen), 2), seed=0)
+    assert (data.inputs == 0.8).all()
+
+
+def test_the_same_seed_records_the_same_bits() -> None:
+    env = gym.make("acl_gym/Pendulum-v0", max_episode_steps=10)
+    assert same(pendulum(), Transitions.record(env, 60, hold=3, seed=0))
+
+
+def test_random_actions_are_held() -> None:
+    inputs = pendulum().inputs[:, 0].reshape(-1, 3)
+    assert (inputs == inputs[:, :1]).all()
+
+
+def test_cosine_and_sine_are_found() -> None:
+    data = Transitions.record(gym.make("Pendulum-v1"), 50, seed=0)
+    assert data.description.angles == ((0, 1),)
+    assert data.inputs.shape == (50, 1)
+    assert data.description.values is None
+    assert Transitions(**line(), angles=()).description.angles == ()
+
+
+def test_circular_variables_are_brought_back() -> None:
+    turned = Transitions([[7.0], [-4.0]], [0.0, 0.0], [[7.1], [-4.1]], circular=[0])
+    np.testing.assert_allclose(turned.states[:, 0], [7 - 2 * np.pi, 2 * np.pi - 4])
+    ends = Transitions(
+        [[370.0]], [0.0], [[-10.0]], circular=[0], low=[0.0], high=[360.0]
+    )
+    assert (ends.states[0, 0], ends.next_states[0, 0]) == (10.0, 350.0)
+
+
+def test_files_hold_everything(tmp_path: Path) -> None:
+    data = pendulum()
+    path = data.save(tmp_path / "run")
+    assert path == tmp_path / "run.npz"
+    assert same(data, Transitions.load(path))
+    bare = Transitions(**line())
+    buffer = io.BytesIO()
+    bare.save(buffer)
+    buffer.seek(0)
+    found = Transitions.load(buffer)
+    assert found.rewards is None
+    assert found.terminated is None
+    np.testing.assert_array_equal(found.states, bare.states)
+
+
+def test_files_of_strangers_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "run.npz"
+    pendulum().save(path)
+    content = path.read_bytes()
+    path.write_bytes(content[:-100])
+    with pytest.raises(
+        ValueError, match="is not a file of transitions saved by acl-gym"
+    ):
+        Transitions.load(path)
+    with zipfile.ZipFile(path, "w") as file:
+        header = {"format": "acl-gym transitions", "version": 1}
+        packed = io.BytesIO()
+        np.save(packed, np.frombuffer(json.dumps(header).encode(), np.uint8))
+        file.writestr("header.npy", packed.getvalue())
+    with pytest.raises(ValueError, match="is not a complete file of transitions"):
+        Transitions.load(path)
+    with pytest.raises(FileNotFoundError):
+        Transitions.load(tmp_path / "none.npz")
+
+
+def test_a_file_with_nan_is_refused(tmp_path: Path) -> None:
+    data = Transitions(**line())
+    spoiled = data.states.copy()
+    spoiled[3] = np.nan
+    data._arrays["states"] = spoiled
+    data.save(tmp_path / "run")
+    with pytest.raises(ValueError, match="states must be finite"):
+        Transitions.load(tmp_path / "run")
+
+
+def test_an_agent_is_no_recording(tmp_path: Path) -> None:
+    from acl_gym import ReturningACL
+
+    env = gym.make_vec("acl_gym/Pendulum-v0", num_envs=2)
+    ReturningACL(env, seed=0).save(tmp_path / "agent")
+    with pytest.raises(ValueError, match="format 'acl-gym transitions'"):
+        Transitions.load(tmp_path / "agent")
+
+
+def test_recordings_of_one_plant_are_joined() -> None:
+    data = pendulum()
+    both = data + data[:20]
+    assert len(both) == 80
+    assert (np.diff(both.episodes) >= 0).all()
+    assert both.episodes[60] == data.episodes[-1] + 1
+    np.testing.assert_array_equal(both.rewards[60:], data.rewards[:20])  # type: ignore[index]
+    bare = Transitions(**line())
+    known = Transitions(**line(), rewards=np.zeros(40))
+    assert (bare + known).rewards is None
+
+
+def test_recordings_of_different_plants_are_not() -> None:
+    one = Transitions(**line(), state_names=["level"])
+    other = Transitions(**line(), state_names=["height"])
+    with pytest.raises(ValueError, match="of the same plant, got state_names"):
+        one + other
+    slow = Transitions(**line(), sampling_time=1.0)
+    fast = Transitions(**line(), sampling_time=0.1)
+    with pytest.raises(ValueError, match=r"sampling_time 1 s and 0\.1 s"):
+        slow + fast
+    with pytest.raises(TypeError):
+        one + 1  # type: ignore[operator]
+
+
+def test_steps_are_chosen_by_slices_and_masks() -> None:
+    data = pendulum()
+    assert same(data[10:20], data[(data.episodes == 1)])
+    with pytest.raises(ValueError, match="at least one step"):
+        data[60:]
+    with pytest.raises(TypeError, match="a slice or a mask"):
+        data[3]
+    with pytest.raises(ValueError, match=r"shape \(60,\)"):
+        data[np.array([True])]
+
+
+def test_arrays_cannot_be_changed() -> None:
+    with pytest.raises(ValueError, match="read-only"):
+        pendulum().states[0] = 0.0
+
+
+NAN = np.where(np.arange(40)[:, None] == 7, np.nan, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("changed", "message"),
+    [
+        ({"states": NAN}, r"states must be finite, got \[nan\] in row 7"),
+        ({"inputs": np.full((40, 1), np.inf)}, r"inputs must be finite"),
+        ({"inputs": np.zeros(39)}, r"inputs must have a row for each step, shape \(40"),
+        ({"next_states": np.zeros((40, 2))}, "the 1 variables of states, got 2"),
+        ({"states": np.zeros((40, 1, 1))}, "states must have a row for each step"),
+        ({"states": [["a"]] * 40}, "states must be an array of real numbers"),
+        ({"rewards": np.zeros(3)}, r"rewards must have shape \(40,\)"),
+        ({"rewards": np.full(40, np.nan)}, "rewards must be finite"),
+        ({"terminated": np.full(40, 2)}, "terminated must be 40 booleans"),
+        ({"episodes": np.arange(40)[::-1]}, "episodes must be 40 integers that do not"),
+        ({"state_names": ["a", "b"]}, "state_names must be 1 strings"),
+        ({"circular": ["theta"]}, "circular must hold names or numbers"),
+        ({"circular": [0], "low": [0.0]}, "must both be given, or neither"),
+        ({"low": [1.0], "high": [1.0]}, "low must be below high"),
+        ({"low": [np.nan]}, "low must hold a number or None"),
+        ({"sampling_time": 0.0}, "sampling_time must lie in"),
+        ({"values": [[1.0, 2.0]]}, "values must hold a row of 1 inputs"),
+        ({"angles": [(0, 1)]}, "angles must be pairs of different numbers"),
+    ],
+)
+def test_bad_arguments_get_one_clear_error(
+    changed: dict[str, Any], message: str
+) -> None:
+    with pytest.raises(ValueError, match=message):
+        Transitions(**{**line(), **changed})
+
+
+def test_environments_without_vectors_are_refused() -> None:
+    with pytest.raises(TypeError, match="observations that are a Box of one axis"):
+        Transitions.record(gym.make("FrozenLake-v1"), 10)
+    env = SyncVectorEnv([lambda: gym.make("Taxi-v4")])
+    with pytest.raises(TypeError, match="observations that are a Box of one axis"):
+        Transitions.record(env, 10)
+
+
+@pytest.mark.parametrize(
+    ("changed", "words"),
+    [
+        ({"inputs": np.zeros((40, 1))}, ["the input u[0] is always 0"]),
+        (
+            {"states": np.ones((40, 1)), "next_states": np.ones((40, 1))},
+            ["the variable x[0] is always 1"],
+        ),
+    ],
+)
+def test_doubts_are_told(changed: dict[str, Any], words: list[str]) -> None:
+    found = Transitions(**{**line(), **changed}).doubts()
+    for each in words:
+        assert any(each in doubt for doubt in found), found
+
+
+def test_good_data_is_not_doubted() -> None:
+    assert pendulum().doubts() == []
+    assert Transitions(**line()).doubts() == []
+
+
+def test_few_steps_and_copies_are_doubted() -> None:
+    assert "only 10 steps" in Transitions(**line(10)).doubts()[0]
+    data = pendulum()
+    assert "rows are there twice" in (data + data).doubts()[0]
+
+
+def test_mixed_units_are_noticed() -> None:
+    """An angle in degrees beside its rate in radians per second."""
+    rng = np.random.default_rng(0)
+    rate, angle = rng.uniform(-2, 2, 100), rng.uniform(-100, 100, 100)
+    states = np.stack([angle, rate], axis=1)
+    after = np.stack([angle + np.degrees(rate * 0.1), rate], axis=1)
+    u = rng.choice([-1.0, 1.0], 100)
+    found = Transitions(states, u, after, sampling_time=0.1).doubts()
+    assert any("degrees instead of radians" in doubt for doubt in found), found
+    states[:, 0], after[:, 0] = np.radians(states[:, 0]), np.radians(after[:, 0])
+    assert Transitions(states, u, after, sampling_time=0.1).doubts() == []

@@ -11,7 +11,7 @@ import io
 import json
 import os
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,15 +58,12 @@ class Journal:
         self._facts = facts if values is None else {**facts, "values": values}
         self._check(settings)
         self.transitions, self._runs = self._read()
-        self._file = (self.folder / DATA).open("a", newline="")
-        self._writer = csv.writer(self._file)
-        if self._file.tell() == 0:
-            self._writer.writerow(self._columns())
-            self._file.flush()
+        self._file: IO[str] | None = None  # opened with the first step
 
     def close(self) -> None:
         """Close the file."""
-        self._file.close()
+        if self._file is not None:
+            self._file.close()
 
     def path(self, name: str) -> Path:
         """A file of the run."""
@@ -82,11 +79,15 @@ class Journal:
         table = np.column_stack(
             [steps["states"], steps["inputs"], steps["next_states"], steps["rewards"]]
         )
+        if self._file is None:
+            self._file = (self.folder / DATA).open("a", newline="")
+        writer = csv.writer(self._file)
+        if self._file.tell() == 0:
+            writer.writerow(self._columns())
         for run, row, ended in zip(runs, table, steps["terminated"], strict=True):
             # repr gives back the same number, to the bit.
-            self._writer.writerow(
-                [int(run) + self._runs, *map(repr, row.tolist()), int(ended)]
-            )
+            values = map(repr, row.tolist())
+            writer.writerow([int(run) + self._runs, *values, int(ended)])
         self._file.flush()
 
     def _check(self, settings: dict[str, Any]) -> None:

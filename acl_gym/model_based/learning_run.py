@@ -93,6 +93,11 @@ class LearningRun:
             raise TypeError(
                 f"data must be acl_gym.Transitions, got {validation.shown(data)}."
             )
+        if self.interactions + (0 if data is None else len(data)) < LEAST_STEPS:
+            raise ValueError(
+                f"interactions must be {LEAST_STEPS} or more to learn from, got "
+                f"{self.interactions}."
+            )
         seed = validation.seed(seed)
         self._task = _task(env, task)
         self._initial, self._data = initial, data

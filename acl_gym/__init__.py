@@ -43,7 +43,9 @@ if TYPE_CHECKING:
     from acl_gym.deposits import Deposit, FunctionDeposit, InverseCost, Rank, Return
     from acl_gym.envs.graph.cities import TravellingSalesmanInstance
     from acl_gym.envs.plant import plant
+    from acl_gym.envs.wrappers.inner_loop import InnerLoop
     from acl_gym.envs.wrappers.scaling import ScaledObservation, ScaledVectorObservation
+    from acl_gym.envs.wrappers.shield import Shield
     from acl_gym.envs.wrappers.waiting import WaitingVectorEnv
     from acl_gym.envs.wrappers.workers import WorkersVectorEnv
     from acl_gym.evaluation import PolicyCost, evaluate_policy_cost
@@ -78,6 +80,7 @@ _PUBLIC = {
     "FunctionDeposit": "acl_gym.deposits",
     "Fuzzy": "acl_gym.partitions",
     "Harmonic": "acl_gym.schedules",
+    "InnerLoop": "acl_gym.envs.wrappers",
     "InverseCost": "acl_gym.deposits",
     "Linear": "acl_gym.schedules",
     "MaxMinAntSystem": "acl_gym.agents.ant_system",
@@ -97,6 +100,7 @@ _PUBLIC = {
     "ScaledVectorObservation": "acl_gym.envs.wrappers",
     "Schedule": "acl_gym.schedules",
     "SettlingTime": "acl_gym.costs",
+    "Shield": "acl_gym.envs.wrappers",
     "SoftPolicy": "acl_gym.policies",
     "StageCosts": "acl_gym.costs",
     "Steps": "acl_gym.costs",
@@ -135,6 +139,7 @@ __all__ = [
     "FunctionDeposit",
     "Fuzzy",
     "Harmonic",
+    "InnerLoop",
     "InverseCost",
     "Linear",
     "MaxMinAntSystem",
@@ -154,6 +159,7 @@ __all__ = [
     "ScaledVectorObservation",
     "Schedule",
     "SettlingTime",
+    "Shield",
     "SoftPolicy",
     "StageCosts",
     "Steps",

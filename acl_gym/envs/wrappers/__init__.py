@@ -1,5 +1,10 @@
 """Wrappers around environments, of this package or of others."""
 
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
 from acl_gym.envs.wrappers.scaling import (
     ScaledObservation,
     ScaledVectorObservation,
@@ -7,9 +12,31 @@ from acl_gym.envs.wrappers.scaling import (
 )
 from acl_gym.envs.wrappers.waiting import WaitingVectorEnv
 
+if TYPE_CHECKING:
+    from acl_gym.envs.wrappers.inner_loop import InnerLoop
+    from acl_gym.envs.wrappers.shield import Shield
+    from acl_gym.envs.wrappers.state_feedback import StateFeedback
+
+# Imported on first use: they know the systems of this package and load compiled kernels,
+# which new worker processes, that import this folder, need not wait for.
+_LAZY = {
+    "InnerLoop": "acl_gym.envs.wrappers.inner_loop",
+    "Shield": "acl_gym.envs.wrappers.shield",
+    "StateFeedback": "acl_gym.envs.wrappers.state_feedback",
+}
+
 __all__ = [
+    "InnerLoop",
     "ScaledObservation",
     "ScaledVectorObservation",
     "Scaling",
+    "Shield",
+    "StateFeedback",
     "WaitingVectorEnv",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    if name in _LAZY:
+        return getattr(import_module(_LAZY[name]), name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -32,14 +32,15 @@ import json
 import statistics
 import time
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from gymnasium import spaces
 from gymnasium.vector import VectorWrapper
-from matplotlib.patches import Patch
+from matplotlib.lines import Line2D
+from matplotlib.ticker import EngFormatter
 from tqdm.auto import tqdm
 
 from acl_gym import InnerLoop, ReturningACL, Shield, evaluate_policy_cost, plant
@@ -319,7 +320,7 @@ TASKS = {
         controller=WAY,
         cautious=[0.5, 0.75, 1.0],
         daring=[0.5, 1.0, 1.5, 2.0],
-        steps=60_000,
+        steps=40_000,
     ),
 }
 
@@ -356,7 +357,9 @@ def run(task: Task, kind: str, seed: int) -> Row:
     return {
         "seed": seed,
         **found,
-        "interventions": None if interventions is None else 1_000 * interventions / found["steps"],
+        "interventions": None
+        if interventions is None
+        else 1_000 * interventions / found["steps"],
         "seconds": seconds,
         **judged(task, kind, colony, seed),
         "exploring": found_costs(watch),
@@ -408,11 +411,13 @@ class Follow:
         return nearest_actions(wanted, self._inputs), None
 
 
-def study(tasks: Iterable[str], kinds: Sequence[str], seeds: range) -> list[Row]:
+def study(
+    tasks: Iterable[str], kinds: Sequence[str], seeds: range, steps: int | None = None
+) -> list[Row]:
     """A row for each task and arrangement, and one for the baseline alone."""
     rows = []
     for name in tasks:
-        task = TASKS[name]
+        task = replace(TASKS[name], steps=steps or TASKS[name].steps)
         alone = judged(task, "free", Follow(task), 0)
         rows.append({"task": name, "kind": "baseline alone", **alone, "runs": []})
         for kind in tqdm(kinds, desc=name, leave=False):
@@ -464,3 +469,117 @@ def shown(value: float | None) -> str:
     if value is None:
         return ""
     return f"{value:,.0f}" if abs(value) >= 100 else f"{value:.3g}"
+
+
+LOOKS: dict[str, Row] = {
+    "free": {"color": BLACK},
+    "shield": {"color": BLUE, "linestyle": ":"},
+    "shield, model": {"color": BLUE},
+    "shield, model, masks": {"color": BLUE, "linestyle": "--"},
+    "inner loop": {"color": GREEN},
+    "inner loop, shield, model": {"color": ORANGE},
+}
+
+
+@in_style()
+def draw(rows: Sequence[Row], path: Path) -> None:
+    """Draw cost and violations on the way, medians over the seeds."""
+    tasks = list(dict.fromkeys(row["task"] for row in rows))
+    figure = new_figure(2.3 * len(tasks) + 0.5, dpi=150)
+    grid = figure.subplots(len(tasks), 2, squeeze=False)
+    for line, name in zip(grid, tasks, strict=True):
+        when = np.linspace(0.0, TASKS[name].steps, 101)
+        for row in rows:
+            if row["task"] != name or not row["runs"]:
+                continue
+            each = [one["exploring"] for one in row["runs"]]
+            cost = np.median([one["costs"] for one in each], axis=0)
+            outside = np.median([np.cumsum(one["violations"]) for one in each], axis=0)
+            line[0].plot(when[1:], cost, **LOOKS[row["kind"]])
+            line[1].plot(when, [0.0, *outside], **LOOKS[row["kind"]])
+        line[0].set(yscale="log", ylabel=f"{name}\ncost of a step")
+        line[1].set(ylabel="steps outside so far")
+        line[1].set_yscale("symlog", linthresh=10.0)
+        line[1].set_ylim(bottom=-0.5)
+        for ax in line:
+            ax.set(xlim=(0, when[-1]), xlabel="interactions")
+            ax.xaxis.set_major_formatter(EngFormatter(sep=""))
+    handles = [Line2D([], [], **look) for look in LOOKS.values()]
+    figure.legend(handles, list(LOOKS), ncols=3, loc="outside upper center")
+    figure.savefig(path)
+
+
+def _some(allowed: Sequence[str], separator: str) -> Callable[[str], list[str]]:
+    def names(text: str) -> list[str]:
+        given = [name.strip() for name in text.split(separator)]
+        for name in given:
+            if name not in allowed:
+                raise argparse.ArgumentTypeError(
+                    f"{name!r} is not one of {'; '.join(allowed)}"
+                )
+        return given
+
+    return names
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run and print; returns the exit code."""
+    parser = argparse.ArgumentParser(
+        description=__doc__.replace("%", "%%"),
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument(
+        "--tasks",
+        type=_some(list(TASKS), ","),
+        default=list(TASKS),
+        help=f"some of {', '.join(TASKS)} (default: both)",
+    )
+    parser.add_argument(
+        "--kinds",
+        type=_some(list(LOOKS), ";"),
+        default=list(LOOKS),
+        help=f"some of {'; '.join(LOOKS)}, between semicolons (default: all)",
+    )
+    parser.add_argument(
+        "--seeds",
+        type=at_least_one,
+        default=5,
+        help="runs of each, with successive seeds (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--steps",
+        type=at_least_one,
+        help="interactions of a run (default: "
+        + ", ".join(f"{task.steps:,} for {name}" for name, task in TASKS.items())
+        + ")",
+    )
+    parser.add_argument(
+        "--from-json",
+        type=Path,
+        nargs="+",
+        metavar="FILE",
+        help="show what --json has printed, one file after the other",
+    )
+    parser.add_argument("--figure", type=Path, metavar="PNG", help="draw the curves")
+    parser.add_argument("--json", action="store_true", help="print JSON, no table")
+    options = parser.parse_args(arguments)
+    if options.from_json is not None:
+        read = [json.loads(path.read_text())["rows"] for path in options.from_json]
+        # The baseline alone is in every file.
+        kept = {(row["task"], row["kind"]): row for part in read for row in part}
+        rows = list(kept.values())
+    else:
+        seeds = range(options.seeds)
+        rows = study(options.tasks, options.kinds, seeds, options.steps)
+    if options.figure is not None:
+        draw(rows, options.figure)
+    if options.json:
+        print(json.dumps({"rows": rows}))
+    else:
+        print(as_markdown(rows))
+    return 0
+
+
+if __name__ == "__main__":
+    replace_unprintable_letters()
+    raise SystemExit(main())

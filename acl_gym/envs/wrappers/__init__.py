@@ -14,6 +14,7 @@ from acl_gym.envs.wrappers.waiting import WaitingVectorEnv
 
 if TYPE_CHECKING:
     from acl_gym.envs.wrappers.inner_loop import InnerLoop
+    from acl_gym.envs.wrappers.pid import PID
     from acl_gym.envs.wrappers.shield import Shield
     from acl_gym.envs.wrappers.state_feedback import StateFeedback
 
@@ -21,11 +22,13 @@ if TYPE_CHECKING:
 # which new worker processes, that import this folder, need not wait for.
 _LAZY = {
     "InnerLoop": "acl_gym.envs.wrappers.inner_loop",
+    "PID": "acl_gym.envs.wrappers.pid",
     "Shield": "acl_gym.envs.wrappers.shield",
     "StateFeedback": "acl_gym.envs.wrappers.state_feedback",
 }
 
 __all__ = [
+    "PID",
     "InnerLoop",
     "ScaledObservation",
     "ScaledVectorObservation",

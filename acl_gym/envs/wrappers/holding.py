@@ -25,7 +25,7 @@ def held(
     observation: Any,
     idle: IdleSlots,
     period: int,
-) -> StepResult:
+) -> tuple[Any, Any, Any, Any, dict[str, Any], BoolArray]:
     """Make several steps of an environment whose finished slots wait, as if it were one.
 
     Rewards are summed. A slot whose episode ends on the way waits for the others. After
@@ -40,13 +40,13 @@ def held(
         period: how many steps, >= 1.
 
     Returns:
-        What a step of a vector environment returns.
+        What a step of a vector environment returns, and the slots that were started anew.
 
     Raises:
         ResetNeeded: autoreset is disabled, and a slot has finished.
     """
     idle.require_reset()
-    resting = idle.mask.copy()
+    resting = idle.mask
     rewards = np.zeros(resting.size)
     terminated, truncated = np.zeros_like(resting), np.zeros_like(resting)
     infos: dict[str, Any] = {}
@@ -61,18 +61,15 @@ def held(
         done |= ended | late
         infos = merged_infos(infos, told)
     finished = terminated | truncated
-    idle.finish(finished)
-    if idle.waits:
-        return observation, rewards, terminated, truncated, infos
-    if idle.mode is AutoresetMode.NEXT_STEP and resting.any():
-        observation, begun = _started(env, resting)
-        infos = merged_infos(infos, begun)
-    elif idle.mode is AutoresetMode.SAME_STEP and finished.any():
-        last = {name: infos.pop(name) for name in OF_THE_END if name in infos}
-        final = final_infos(observation, finished, last)
-        observation, begun = _started(env, finished)
+    started = idle.finish(finished)
+    if started.any():
+        final: dict[str, Any] = {}
+        if idle.mode is AutoresetMode.SAME_STEP:
+            last = {name: infos.pop(name) for name in OF_THE_END if name in infos}
+            final = final_infos(observation, finished, last)
+        observation, begun = _started(env, started)
         infos = {**merged_infos(infos, begun), **final}
-    return observation, rewards, terminated, truncated, infos
+    return observation, rewards, terminated, truncated, infos, started
 
 
 def _started(env: VectorEnv[Any, Any, Any], slots: BoolArray) -> tuple[Any, Any]:

@@ -43,25 +43,29 @@ class IdleSlots:
         """Whether finished slots can be made to wait."""
         return self.can_be_asked or self._always
 
-    def begin(self, options: Any) -> None:
-        """Note a reset that was made with these options."""
+    def begin(self, options: Any) -> BoolArray:
+        """Note a reset that was made with these options; return the slots it started."""
         options = options or {}
         asked = self.can_be_asked and "finished" in options
         started = options.get("reset_mask")
         if started is None:
             self.waits = self._always or asked
-            self.mask = np.zeros_like(self.mask)
+            started = np.ones_like(self.mask)
         else:
             self.waits |= asked
-            self.mask = self.mask & ~started
+        self.mask = self.mask & ~started
         self._begun = True
+        return np.asarray(started)
 
-    def finish(self, done: BoolArray) -> None:
-        """Note a step in which these slots have finished."""
+    def finish(self, done: BoolArray) -> BoolArray:
+        """Note a step in which these slots have finished; return those it started anew."""
         if self.waits or self.mode is AutoresetMode.DISABLED:
             self.mask = self.mask | done
-        elif self.mode is AutoresetMode.NEXT_STEP:
-            self.mask = done.copy()
+            return np.zeros_like(done)
+        if self.mode is AutoresetMode.SAME_STEP:
+            return done
+        started, self.mask = self.mask, done.copy()
+        return started
 
     def require_begun(self) -> None:
         """Refuse a step before the first reset.

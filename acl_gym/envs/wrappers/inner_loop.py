@@ -19,7 +19,7 @@ from acl_gym.envs.control.signals import Signals
 from acl_gym.envs.wrappers.holding import StepResult, held
 from acl_gym.envs.wrappers.idle import IdleSlots
 from acl_gym.utils import validation
-from acl_gym.utils.typing import FloatArray
+from acl_gym.utils.typing import BoolArray, FloatArray
 from acl_gym.utils.vector_envs import require_vector_env
 
 Controller = Callable[[NDArray[Any], FloatArray], ArrayLike]
@@ -46,7 +46,11 @@ class InnerLoop(VectorWrapper[Any, Any, Any, Any]):
             all slots, which it must not change. It returns the inputs of each: numbers of
             actions, physical inputs, which stand for the nearest action, or rows of a
             `Box`, see `acl_gym.envs.control.actuator.Actuator`. It is asked in each step
-            of the plant, also for slots that are idle. `StateFeedback` is one.
+            of the plant, also for slots that are idle. `StateFeedback` is one. One that
+            remembers something, such as an integral of the error for each slot, has a
+            method `restart(slots)`, which is called with the `(num_envs,)` bools of the
+            slots in which an episode begins. What it remembers is hidden from the learner,
+            unless it is among the observations.
         choices: the rows of parameters among which the learner chooses,
             `(n_choices, p)`, or `(n_choices,)` for a single parameter; finite.
         period: for how many steps of the plant a choice is held, >= 1. With more than 1,
@@ -144,7 +148,7 @@ class InnerLoop(VectorWrapper[Any, Any, Any, Any]):
             "reset", self.env.reset(seed=seed, options=passed), 2
         )
         self._see(observations)
-        self._idle.begin(options)
+        self._restart(self._idle.begin(options))
         return observations, _without_masks(received.infos(infos, self.num_envs))
 
     def step(self, actions: ArrayLike) -> StepResult:
@@ -167,15 +171,28 @@ class InnerLoop(VectorWrapper[Any, Any, Any, Any]):
         self._idle.require_begun()
         chosen = checked_actions(actions, self.num_envs, len(self.choices))
         parameters = validation.read_only(self.choices[chosen])
+        result: StepResult
         if self.period == 1:
-            return self._advance(parameters)
-        return held(
-            lambda: self._advance(parameters),
-            self.env,
-            self._seen.copy(),
-            self._idle,
-            self.period,
-        )
+            result = self._advance(parameters)
+            started = self._idle.finish(result[2] | result[3])
+        else:
+            *parts, started = held(
+                lambda: self._advance(parameters),
+                self.env,
+                self._seen.copy(),
+                self._idle,
+                self.period,
+            )
+            result = tuple(parts)
+            self._see(result[0])
+        self._restart(started)
+        return (*result[:4], _without_masks(result[4]))
+
+    def _restart(self, slots: BoolArray) -> None:
+        """Let a controller that remembers something forget it in slots that begin anew."""
+        restart = getattr(self.controller, "restart", None)
+        if restart is not None and slots.any():
+            restart(slots.copy())
 
     def _advance(self, parameters: FloatArray) -> StepResult:
         """One step of the plant."""
@@ -191,7 +208,7 @@ class InnerLoop(VectorWrapper[Any, Any, Any, Any]):
             received.rewards(rewards, n),
             received.flags("terminated", terminated, n),
             received.flags("truncated", truncated, n),
-            _without_masks(received.infos(infos, n)),
+            received.infos(infos, n),
         )
 
     def _see(self, observations: Any) -> None:

@@ -99,7 +99,8 @@ class Actuator:
             return self._real(what, given, count)
         array = validation.as_array(given)
         if array is None or array.dtype.kind != "f":
-            return self._numbers(what, given if array is None else array, count)
+            hint = "; physical inputs are to be floats"
+            return self._numbers(what, given, count, hint)
         if self._inputs is None:
             raise ValueError(
                 f"{what} must be the numbers of actions, integers, because the inputs of "
@@ -110,19 +111,22 @@ class Actuator:
         wanted = _rows(what, array, count, (n_inputs,))
         return nearest_actions(wanted, self._inputs) + self.first_action
 
-    def _numbers(self, name: str, given: Any, count: int | None = None) -> IntArray:
+    def _numbers(
+        self, name: str, given: Any, count: int | None = None, hint: str = ""
+    ) -> IntArray:
         """Numbers of actions, as they are counted outside."""
         count, first = self._count if count is None else count, self.first_action
         array = validation.as_array(given)
         if array is not None and first and array.dtype.kind in "iu":
-            given = array.astype(np.int64) - first
+            array = array.astype(np.int64) - first
         try:
-            return checked_actions(given, count, self.n_actions or 0) + first
+            numbers = given if array is None else array
+            return checked_actions(numbers, count, self.n_actions or 0) + first
         except (TypeError, ValueError) as error:
             last = first + (self.n_actions or 0) - 1
             raise type(error)(
                 f"{name} must be {count} integers in {first}..{last}, the numbers of "
-                f"actions, one a slot, got {validation.shown(array)}."
+                f"actions, one a slot, got {validation.shown(given)}{hint}."
             ) from None
 
     def _real(self, name: str, given: Any, count: int) -> NDArray[Any]:

@@ -208,7 +208,7 @@ class InnerLoop(VectorWrapper[Any, Any, Any, Any]):
             received.rewards(rewards, n),
             received.flags("terminated", terminated, n),
             received.flags("truncated", truncated, n),
-            received.infos(infos, n),
+            dict(received.infos(infos, n)),
         )
 
     def _see(self, observations: Any) -> None:

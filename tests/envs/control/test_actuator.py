@@ -110,12 +110,7 @@ def test_rows_of_a_box_are_taken_as_they_are() -> None:
         ("acl_gym/Pendulum-v0", [[0.0, 0.0]] * 2, ValueError, r"shape \(2, 1\)"),
         ("acl_gym/Pendulum-v0", [[0.0]] * 3, ValueError, r"shape \(2, 1\)"),
         ("acl_gym/Pendulum-v0", [[0.0], [0.0, 1.0]], TypeError, "2 integers"),
-        (
-            "acl_gym/GridSearch1D-v0",
-            [0.0, 1.0],
-            ValueError,
-            "the inputs of the actions",
-        ),
+        (Numbered, [5.0, 6.0], ValueError, "the inputs of the actions are not known"),
         (Numbered, [4, 5], ValueError, "2 integers in 5..7"),
         (Numbered, [5, 8], ValueError, "2 integers in 5..7"),
         (Boxed, [[0, 0], [0, 3]], ValueError, r"\[-2, 2\], got 3 in slot 1; saturate"),

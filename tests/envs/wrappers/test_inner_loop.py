@@ -26,6 +26,7 @@ from acl_gym.agents.same_task import is_same_task
 from acl_gym.envs.control.lookup import signals_of
 from acl_gym.envs.wrappers import StateFeedback
 from acl_gym.envs.wrappers.holding import merged_infos
+from tests.envs.obedient import ObedientSalesmanVectorEnv
 from tests.envs.vector_helpers import MODES, arrays_in, assert_same_step, mask_of
 
 HOLD = StateFeedback(set_point=[math.pi, 0.0], circular=[0], low=-0.8, high=0.8)
@@ -44,17 +45,19 @@ def loop(slots: int, period: int = 1, **keywords: Any) -> InnerLoop:
     return InnerLoop(pendulums(slots, **keywords), HOLD, GAINS, period=period)
 
 
+ONE: Any = gym.make("acl_gym/Pendulum-v0", max_episode_steps=-1, **EASY)
+
+
 def one_by_one(
     state: np.ndarray, choice: int, steps: int, period: int
 ) -> tuple[np.ndarray, float, bool, bool, int]:
     """A choice in one pendulum, from its definition; `steps` so far in the episode."""
-    env: Any = gym.make("acl_gym/Pendulum-v0", max_episode_steps=-1, **EASY)
-    env.reset(options={"state": state})
+    ONE.reset(options={"state": state})
     total, terminated, truncated = 0.0, False, False
     for _ in range(period):
         torque = HOLD(state[None], [GAINS[choice]])[0, 0]
         action = int(np.argmin(np.abs(np.array([-0.8, 0.0, 0.8]) - torque)))
-        state, reward, terminated, _, _ = env.step(action)
+        state, reward, terminated, _, _ = ONE.step(action)
         total, steps = total + reward, steps + 1
         truncated = steps >= LIMIT
         if terminated or truncated:
@@ -309,17 +312,20 @@ def test_real_inputs_of_a_box() -> None:
 
 
 def test_masks_of_the_inputs_are_not_those_of_the_choices(mode: str) -> None:
-    grid = gym.make_vec(
-        "acl_gym/GridSearch2D-v0", 2, autoreset_mode=mode, max_episode_steps=2
+    tours = ObedientSalesmanVectorEnv(
+        2, coordinates=np.eye(3)[:, :2].tolist(), autoreset_mode=mode
     )
-    env = InnerLoop(grid, lambda x, p: p[:, 0].astype(int), [0, 1])
+    env = InnerLoop(tours, lambda seen, chosen: chosen[:, 0].astype(int), [0, 1])
     assert env.reset(seed=0)[1] == {}
-    for _ in range(2):
-        infos = env.step([0, 1])[4]
+    ends = 0
+    for _ in range(3):
+        *_, terminated, _, infos = env.step([0, 1])
         assert not {"action_mask", "_action_mask"} & {
             *infos,
-            *infos.get("final_info", {}),
+            *infos.get("final_info", ()),
         }
+        ends += terminated.any()
+    assert ends == 1
 
 
 def test_what_choices_mean_is_known_to_policies() -> None:

@@ -22,7 +22,8 @@ Two tasks, in each of which a simple controller is known that does the job, but 
 Prints for each the violations on the way (steps outside the safe set in 1,000, and in how
 many of 1,000 episodes there was one), the cost of a step on the way in the first tenth of the
 interactions and in all, how often the shield stepped in, and at the end the cost of the
-greedy policy, with its violations, under the same arrangement: medians over the seeds.
+greedy policy, with its violations, under the same arrangement and without the shield: medians
+over the seeds.
 """
 
 from __future__ import annotations
@@ -362,6 +363,7 @@ def run(task: Task, kind: str, seed: int) -> Row:
         else 1_000 * interventions / found["steps"],
         "seconds": seconds,
         **judged(task, kind, colony, seed),
+        **without_shield(task, kind, colony, seed),
         "exploring": found_costs(watch),
     }
 
@@ -397,6 +399,14 @@ def judged(task: Task, kind: str, policy: Any, seed: int) -> Row:
         "final_violations": found["violations"],
         "final_episodes": found["episodes"],
     }
+
+
+def without_shield(task: Task, kind: str, policy: Any, seed: int) -> Row:
+    """What becomes of a policy that learned under a shield once it is taken away."""
+    if not kind.startswith("shield"):
+        return {"bare_cost": None, "bare_episodes": None}
+    found = judged(task, "free", policy, seed)
+    return {"bare_cost": found["final_cost"], "bare_episodes": found["final_episodes"]}
 
 
 class Follow:
@@ -438,30 +448,38 @@ def medians(runs: Sequence[Row]) -> Row:
 
 
 COLUMNS = {
-    "episodes": "episodes with a violation, of 1,000",
-    "violations": "steps outside, of 1,000",
-    "interventions": "replaced, of 1,000",
+    "episodes": "violated, of 1,000 episodes",
+    "violations": "outside, of 1,000 steps",
+    "interventions": "replaced, of 1,000 actions",
     "cost_first_tenth": "cost of a step, first tenth",
     "cost": "cost of a step, all",
-    "final_cost": "policy cost at the end",
+    "final_cost": "policy cost",
     "worst": "worst",
-    "final_episodes": "episodes with a violation then, of 1,000",
+    "final_episodes": "violated",
+    "bare_cost": "without its shield: policy cost",
+    "bare_episodes": "violated",
     "seconds": "seconds",
 }
 
 
 def as_markdown(rows: Sequence[Row]) -> str:
-    """The table."""
-    lines = [
-        f"| task | arrangement | {' | '.join(COLUMNS.values())} |",
-        f"| --- | --- |{' ---: |' * len(COLUMNS)}",
-    ]
-    for row in rows:
-        costs = [one["final_cost"] for one in row["runs"]]
-        full = {**row, "worst": max(costs) if costs else None}
-        cells = [shown(full.get(key)) for key in COLUMNS]
-        lines.append(f"| {row['task']} | {row['kind']} | {' | '.join(cells)} |")
-    return "\n".join(lines)
+    """A table for each task."""
+    tables = []
+    for task in dict.fromkeys(row["task"] for row in rows):
+        lines = [
+            f"{task}:",
+            "",
+            f"| arrangement | {' | '.join(COLUMNS.values())} |",
+            f"| --- |{' ---: |' * len(COLUMNS)}",
+        ]
+        for row in rows:
+            if row["task"] == task:
+                costs = [one["final_cost"] for one in row["runs"]]
+                full = {**row, "worst": max(costs) if costs else None}
+                cells = [shown(full.get(key)) for key in COLUMNS]
+                lines.append(f"| {row['kind']} | {' | '.join(cells)} |")
+        tables.append("\n".join(lines))
+    return "\n\n".join(tables)
 
 
 def shown(value: float | None) -> str:

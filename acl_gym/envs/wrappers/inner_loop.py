@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -49,8 +50,9 @@ class InnerLoop(VectorWrapper[Any, Any, Any, Any]):
             of the plant, also for slots that are idle. `StateFeedback` is one. One that
             remembers something, such as an integral of the error for each slot, has a
             method `restart(slots)`, which is called with the `(num_envs,)` bools of the
-            slots in which an episode begins. What it remembers is hidden from the learner,
-            unless it is among the observations.
+            slots in which an episode begins; it is copied, so that each inner loop has its
+            own memory. What it remembers is hidden from the learner, unless it is among
+            the observations. `PID` is one of these.
         choices: the rows of parameters among which the learner chooses,
             `(n_choices, p)`, or `(n_choices,)` for a single parameter; finite.
         period: for how many steps of the plant a choice is held, >= 1. With more than 1,
@@ -108,6 +110,8 @@ class InnerLoop(VectorWrapper[Any, Any, Any, Any]):
                 f"(n_choices, p) or (n_choices,), got {np.shape(choices)}."
             )
         self.controller = controller
+        if hasattr(controller, "restart"):
+            self.controller = copy.deepcopy(controller)
         self.choices = validation.read_only(rows)
         self.period = validation.integer("period", period, at_least=1, at_most=10**9)
         self._idle = IdleSlots(env)

@@ -111,8 +111,8 @@ def test_what_is_remembered_begins_anew_with_each_episode(
     made = gym.make_vec(
         "acl_gym/Pendulum-v0", 3, max_episode_steps=7, autoreset_mode=mode
     )
-    clock = Clock()
-    env = InnerLoop(made, clock, [0.0], period=period)
+    env = InnerLoop(made, Clock(), [0.0], period=period)
+    clock: Any = env.controller
     env.reset(seed=0)
     ends = 0
     for _ in range(40):
@@ -136,6 +136,19 @@ def test_a_slot_that_restarts_leaves_the_others_alone() -> None:
     ours, theirs = (each([[0.1], [0.2], [0.3]]) for each in both)
     assert ours[[0, 2]].tobytes() == theirs[[0, 2]].tobytes()
     assert ours[1] != theirs[1]
+
+
+def test_two_inner_loops_do_not_share_what_is_remembered() -> None:
+    """As an evaluation on the way, in an environment of its own."""
+    controller = PID(0, 0.1, set_point=1.0)
+    envs = [InnerLoop(levels(2), controller, [[0.5, 1.0, 0.0]]) for _ in range(3)]
+    for env in envs:
+        env.reset(options={"state": [0.0, 0.5]})
+        for _ in range(5):
+            env.step([0, 0])
+    envs[0].reset()
+    ours, theirs = (env.step([0, 0]) for env in envs[1:])
+    np.testing.assert_array_equal(ours[0], theirs[0])
 
 
 def test_equal_settings_are_equal() -> None:

@@ -50,3 +50,16 @@ def signals_of(env: Any) -> Signals | None:
     if getattr(env, f"{single}observation_space") != system.observation_space:
         return replace(system.signals, observations=())
     return system.signals
+
+
+def actions_are_replaced(env: Any) -> bool:
+    """Whether a wrapper carries out other actions than those that it is given.
+
+    Then the system alone is not what a policy of `env` acts on. Wrappers say so by an
+    attribute `replaces_actions`, as `InnerLoop` and `Shield` do.
+    """
+    while isinstance(env, VectorWrapper):
+        if getattr(env, "replaces_actions", False):
+            return True
+        env = env.env
+    return False

@@ -86,6 +86,8 @@ class InnerLoop(VectorWrapper[Any, Any, Any, Any]):
         The action masks of `env` concern the inputs and are not passed on.
     """
 
+    replaces_actions = True
+
     def __init__(
         self,
         env: VectorEnv[Any, Any, Any],

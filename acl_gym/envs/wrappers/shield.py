@@ -89,6 +89,8 @@ class Shield(VectorWrapper[Any, Any, Any, Any]):
         ([True, False], [0, 2])
     """
 
+    replaces_actions = True
+
     def __init__(
         self,
         env: VectorEnv[Any, Any, Any],

@@ -16,16 +16,21 @@ from hypothesis import strategies as st
 
 from acl_gym import (
     ACL,
+    Fuzzy,
     InnerLoop,
     QLearning,
     ReturningACL,
+    Shield,
     WaitingVectorEnv,
     evaluate_policy_cost,
+    fuzzy_q_iteration,
 )
 from acl_gym.agents.same_task import is_same_task
 from acl_gym.envs.control.lookup import signals_of
 from acl_gym.envs.wrappers import StateFeedback
 from acl_gym.envs.wrappers.holding import merged_infos
+from acl_gym.plotting.subject import subject_of
+from acl_gym.plotting.trajectories import run
 from tests.envs.obedient import ObedientSalesmanVectorEnv
 from tests.envs.vector_helpers import MODES, arrays_in, assert_same_step, mask_of
 
@@ -337,6 +342,30 @@ def test_what_choices_mean_is_known_to_policies() -> None:
     assert signals.observations == signals_of(env.env).observations  # type: ignore[union-attr]
     colony = ReturningACL(env, seed=0).learn(trials=1)
     assert colony.policy.signals == signals
+
+
+def test_what_knows_the_plant_only_does_not_take_choices_for_inputs() -> None:
+    """A trajectory is run behind the wrapper, and the model of the plant is refused."""
+
+    class First:
+        def predict(self, observation: Any, **_: Any) -> Any:
+            return np.zeros(len(observation), int), None
+
+    pushing = InnerLoop(pendulums(1), lambda seen, chosen: chosen, [0.8, 0.0, 0.0])
+    for env in (
+        pushing,
+        Shield(pendulums(1), lambda seen: np.full(len(seen), 0.8), never),
+    ):
+        path = run(subject_of(First(), env), None, 1, 0)
+        plain = pendulums(1)
+        plain.reset(options={"state": path.states[:1]})
+        np.testing.assert_array_equal(path.states[1:], plain.step([2])[0])
+        with pytest.raises(TypeError, match="a wrapper that replaces them"):
+            fuzzy_q_iteration(env, Fuzzy.from_box(env.single_observation_space, (3, 3)))
+
+
+def never(seen: np.ndarray) -> np.ndarray:
+    return np.zeros(len(seen), bool)
 
 
 def test_two_of_them_pose_the_same_task() -> None:

@@ -46,7 +46,9 @@ class Shield(VectorWrapper[Any, Any, Any, Any]):
     - `"violation"`: whether the next state is outside the safe set.
 
     Where slots are reset in the step that ends their episode, these stand beside the
-    first observations of the next one, and still tell of the last step.
+    first observations of the next one, and still tell of the last step. Around a shield, an
+    `InnerLoop` that holds its choices passes on what the last step of each told; the
+    counters count all steps.
 
     Args:
         env: a vector environment with array observations, and `Discrete` or `Box`

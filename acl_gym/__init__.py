@@ -45,7 +45,9 @@ if TYPE_CHECKING:
     from acl_gym.envs.learned import LearnedVectorEnv, Transitions
     from acl_gym.envs.plant import plant
     from acl_gym.envs.wrappers.changing import ChangingVectorEnv, Drift, Jump
+    from acl_gym.envs.wrappers.inner_loop import InnerLoop
     from acl_gym.envs.wrappers.scaling import ScaledObservation, ScaledVectorObservation
+    from acl_gym.envs.wrappers.shield import Shield
     from acl_gym.envs.wrappers.waiting import WaitingVectorEnv
     from acl_gym.envs.wrappers.workers import WorkersVectorEnv
     from acl_gym.evaluation import (
@@ -88,6 +90,7 @@ _PUBLIC = {
     "FunctionDeposit": "acl_gym.deposits",
     "Fuzzy": "acl_gym.partitions",
     "Harmonic": "acl_gym.schedules",
+    "InnerLoop": "acl_gym.envs.wrappers",
     "InverseCost": "acl_gym.deposits",
     "Jump": "acl_gym.envs.wrappers.changing",
     "LearnedVectorEnv": "acl_gym.envs.learned",
@@ -111,6 +114,7 @@ _PUBLIC = {
     "ScaledVectorObservation": "acl_gym.envs.wrappers",
     "Schedule": "acl_gym.schedules",
     "SettlingTime": "acl_gym.costs",
+    "Shield": "acl_gym.envs.wrappers",
     "SoftPolicy": "acl_gym.policies",
     "StageCosts": "acl_gym.costs",
     "Steps": "acl_gym.costs",
@@ -154,6 +158,7 @@ __all__ = [
     "FunctionDeposit",
     "Fuzzy",
     "Harmonic",
+    "InnerLoop",
     "InverseCost",
     "Jump",
     "LearnedVectorEnv",
@@ -177,6 +182,7 @@ __all__ = [
     "ScaledVectorObservation",
     "Schedule",
     "SettlingTime",
+    "Shield",
     "SoftPolicy",
     "StageCosts",
     "Steps",

@@ -139,3 +139,15 @@ def test_prior_knowledge() -> None:
     before = {row["knowledge"]: row["before"] for row in rows}
     assert before["good"] < before["wrong"]
     assert all(row["runs"][0]["interactions"][-1] >= 6_000 for row in rows)
+
+
+def test_safe_learning() -> None:
+    """The inner loop does no harm from the first step on; nor does the shield."""
+    arguments = ["--tasks", "hold", "--kinds", "free;shield, model;inner loop"]
+    rows = output_of("safe_learning.py", *arguments, "--seeds", "1", "--steps", "600")
+    found = {row["kind"]: row for row in rows["rows"]}
+    assert found["free"]["violations"] > 0
+    for kind in ("shield, model", "inner loop"):
+        assert found[kind]["violations"] == found[kind]["final_violations"] == 0
+        assert found[kind]["cost"] < found["free"]["cost"]
+    assert found["shield, model"]["interventions"] > 0

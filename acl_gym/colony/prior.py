@@ -15,6 +15,7 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import ArrayLike, NDArray
 
+from acl_gym.envs.control.actuator import nearest_actions
 from acl_gym.envs.control.environments import ControlVectorEnv
 from acl_gym.envs.control.lookup import signals_of
 from acl_gym.partitions import Partition
@@ -220,5 +221,4 @@ def _nearest(inputs: NDArray[Any], env: Any) -> IntArray:
             f"rule must return {available.shape[1]} inputs for each state, "
             f"{', '.join(signals.inputs)}, got {wanted.shape[1]}."
         )
-    distance = np.square(wanted[:, None, :] - available).sum(axis=2)
-    return np.asarray(distance.argmin(axis=1))
+    return nearest_actions(wanted, available)

@@ -14,6 +14,7 @@ from gymnasium.vector import VectorEnv
 
 from acl_gym.colony.greedy import ALL, LOOP, best_value
 from acl_gym.envs.control.environments import ControlVectorEnv
+from acl_gym.envs.control.lookup import actions_are_replaced
 from acl_gym.partitions import Partition, checked_partition, locate_all
 from acl_gym.planning.sweeps import checked_settings, sweep_until_converged
 from acl_gym.policies import TablePolicy
@@ -76,7 +77,8 @@ def fuzzy_q_iteration(
         progress_bar: show a progress bar.
 
     Raises:
-        TypeError: `env` is of another package, or random, or does not show its state.
+        TypeError: `env` is of another package, or random, does not show its state, or has
+            a wrapper that replaces actions.
         ValueError: a parameter is out of range.
     """
     base = getattr(env, "unwrapped", env)
@@ -84,6 +86,11 @@ def fuzzy_q_iteration(
         raise TypeError(
             "env must be a deterministic vector environment of acl_gym, which can "
             f"start from any state, got {type(base).__name__}."
+        )
+    if actions_are_replaced(env):
+        raise TypeError(
+            "env must carry out the actions that it is given, got a wrapper that replaces "
+            f"them, {validation.shown(env)}; iterate on what it wraps."
         )
     if not base.system.fully_observed:
         raise TypeError(

@@ -13,7 +13,11 @@ from numpy.typing import NDArray
 
 from acl_gym.agents.base import TabularAgent
 from acl_gym.envs.control.environments import ControlVectorEnv
-from acl_gym.envs.control.lookup import signals_of, system_of
+from acl_gym.envs.control.lookup import (
+    actions_are_replaced,
+    signals_of,
+    system_of,
+)
 from acl_gym.envs.control.signals import Signals
 from acl_gym.envs.control.system import ControlSystem
 from acl_gym.envs.grid_search.system import GridSearch
@@ -176,9 +180,16 @@ class Subject:
         return np.concatenate(values)
 
     def vector_env(self) -> ControlVectorEnv | None:
-        """The native vector environment of this package, unwrapped, or None."""
+        """The native vector environment of this package, unwrapped, or None.
+
+        It is None also where a wrapper replaces actions, so that policies are run in it.
+        """
         base = None if self.env is None else self.env.unwrapped
-        same = isinstance(base, ControlVectorEnv) and self.system is not None
+        same = (
+            isinstance(base, ControlVectorEnv)
+            and self.system is not None
+            and not actions_are_replaced(self.env)
+        )
         return base if same else None
 
 

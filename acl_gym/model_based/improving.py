@@ -24,6 +24,10 @@ CHUNKS = 5
 PATIENCE = 2
 """Evaluations in a row without a better policy, after which a round ends."""
 
+ALIKE = 0.1
+"""Two models may differ by this share of the deviation of a step's change, and what ants
+remember of the older one is still good enough."""
+
 BETTER = 0.005
 """The share by which a cost must fall to count as better."""
 
@@ -106,7 +110,8 @@ class Improving:
             self.agent = self._made(model)
         elif isinstance(self.agent, TabularAgent):
             self.agent.set_env(model)
-            if hasattr(self.agent, "forget"):
+            believed = self._model is not None and _agree(self._model, model)
+            if hasattr(self.agent, "forget") and not believed:
                 self.agent.forget()  # paths in a model that is no longer believed
         elif self._model is not None:
             # An agent of another package keeps its environment, which changes.
@@ -130,3 +135,14 @@ class Improving:
 
     def _cost(self, policy: Any, states: FloatArray) -> float:
         return evaluate_policy_cost(policy, self._model, states).cost  # type: ignore[arg-type]
+
+
+def _agree(one: LearnedVectorEnv, other: LearnedVectorEnv) -> bool:
+    """Whether two models predict about the same for what was recorded."""
+    data = other.transitions
+    x = np.ascontiguousarray(data.description.shown_angles.variables(data.states).T)
+    u = np.ascontiguousarray(data.inputs.T)
+    found = [env.dynamics.next_variables(x, u) for env in (one, other)]
+    scale = other.dynamics.features.change_scale[:, None]
+    missed = np.sqrt(np.mean(((found[0] - found[1]) / scale) ** 2, axis=1))
+    return bool(missed.max() < ALIKE)

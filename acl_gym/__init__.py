@@ -42,6 +42,7 @@ if TYPE_CHECKING:
     )
     from acl_gym.deposits import Deposit, FunctionDeposit, InverseCost, Rank, Return
     from acl_gym.envs.graph.cities import TravellingSalesmanInstance
+    from acl_gym.envs.learned import LearnedVectorEnv, Transitions
     from acl_gym.envs.plant import plant
     from acl_gym.envs.wrappers.changing import ChangingVectorEnv, Drift, Jump
     from acl_gym.envs.wrappers.scaling import ScaledObservation, ScaledVectorObservation
@@ -88,6 +89,7 @@ _PUBLIC = {
     "Harmonic": "acl_gym.schedules",
     "InverseCost": "acl_gym.deposits",
     "Jump": "acl_gym.envs.wrappers.changing",
+    "LearnedVectorEnv": "acl_gym.envs.learned",
     "Linear": "acl_gym.schedules",
     "MaxMinAntSystem": "acl_gym.agents.ant_system",
     "Overshoot": "acl_gym.costs",
@@ -112,6 +114,7 @@ _PUBLIC = {
     "Steps": "acl_gym.costs",
     "Sum": "acl_gym.costs",
     "TensorBoardLog": "acl_gym.callbacks",
+    "Transitions": "acl_gym.envs.learned",
     "TravellingSalesmanInstance": "acl_gym.envs.graph.cities",
     "UpdateRule": "acl_gym.colony.update_rule",
     "VectorEnvAdapter": "acl_gym.sb3.adapter",
@@ -150,6 +153,7 @@ __all__ = [
     "Harmonic",
     "InverseCost",
     "Jump",
+    "LearnedVectorEnv",
     "Linear",
     "MaxMinAntSystem",
     "Overshoot",
@@ -174,6 +178,7 @@ __all__ = [
     "Steps",
     "Sum",
     "TensorBoardLog",
+    "Transitions",
     "TravellingSalesmanInstance",
     "UpdateRule",
     "VectorEnvAdapter",

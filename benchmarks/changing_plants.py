@@ -7,6 +7,10 @@ goes on in one of several ways:
 - `whole memory`: `ReturningACL` with its defaults, which remembers all it has seen;
 - `small memory`: the same with `memory_size=2_000`, so that it forgets all the time;
 - `forget`: `forget()` is called at the change: it keeps its levels, but no memory;
+- `model`: the steps of the newest 300 interactions make a model (`LearnedVectorEnv`), in
+  which the colony goes on for 5,000 steps; the policy, a fifth of whose actions are random,
+  then gathers more. Eight rounds in 2,000 interactions, after which nothing is learned any
+  more. Only where the plant jumps;
 - `restart`: a new `ReturningACL`, which is what one does who retunes after each change;
 - `ACL`: the colony of the thesis, 250 ants on 40 x 41 fuzzy cells, whose pheromone decays;
 - `ACL, restart`: a new one.
@@ -27,7 +31,7 @@ import statistics
 import tempfile
 import time
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -42,11 +46,14 @@ from acl_gym import (
     Drift,
     Fuzzy,
     Jump,
+    LearnedVectorEnv,
     ReturningACL,
+    Transitions,
     evaluate_policy_cost,
     plant,
 )
 from acl_gym.agents.acl import PheromoneBoundWarning
+from acl_gym.evaluation import with_slots_for
 from acl_gym.plotting.style import BLUE, GREEN, ORANGE, in_style, new_figure
 from acl_gym.utils.text import replace_unprintable_letters
 
@@ -126,6 +133,7 @@ class Method:
         ants: of the agent.
         anew: a new agent is made at the change.
         forgets: `forget()` is called at the change.
+        in_model: it goes on in a model of what was seen last, see `go_on_in_a_model`.
         before: interactions in the plant as it was.
         after: interactions that are watched.
         every: interactions between two evaluations.
@@ -135,6 +143,7 @@ class Method:
     ants: int = 5
     anew: bool = False
     forgets: bool = False
+    in_model: bool = False
     before: int = 10_000
     after: int = 10_000
     every: int = 300
@@ -145,6 +154,7 @@ METHODS = {
     "whole memory": Method(returning),
     "small memory": Method(returning_small),
     "forget": Method(returning, forgets=True),
+    "model": Method(returning, in_model=True),
     "restart": Method(returning, anew=True),
     "ACL": Method(acl, **MANY),
     "ACL, restart": Method(acl, anew=True, **MANY),
@@ -185,23 +195,85 @@ class Before:
         return agent, env
 
 
+def go_on(method: Method, agent: Any, env: Any, seed: int) -> Iterator[int]:
+    """Learn in the plant; after each piece the interactions since the change."""
+    first, made = agent.num_timesteps, 0
+    while made < method.after:
+        due = first + (made // method.every + 1) * method.every
+        agent.learn(total_timesteps=due - agent.num_timesteps)
+        made = agent.num_timesteps - first
+        yield made
+
+
+class Exploring:
+    """The policy of an agent, a fifth of whose actions are random."""
+
+    def __init__(self, agent: Any, seed: int) -> None:
+        self._agent, self._rng = agent, np.random.default_rng(seed)
+
+    def predict(self, observation: Any) -> Any:
+        """An action for each observation."""
+        actions, count = self._agent.predict(observation)[0], len(observation)
+        others = self._rng.integers(len(SETTINGS["inputs"]), size=count)
+        return np.where(self._rng.random(count) < 0.2, others, actions)
+
+
+ROUNDS = (100, 200, 300, 500, 700, 1_000, 1_500, 2_000)
+WINDOW, IN_MODEL = 300, 5_000
+
+
+def go_on_in_a_model(method: Method, agent: Any, env: Any, seed: int) -> Iterator[int]:
+    """Learn in a model of the newest steps; after each round the interactions made.
+
+    It does not know of the change: at first the window holds steps of before.
+    """
+    exploring = Exploring(agent, seed)
+    window = Transitions.record(make_env(method.ants), WINDOW, exploring, seed=seed)
+    known = {name: SETTINGS[name] for name in ("goal", "tolerance", "cost")}
+    made, begin = 0, None
+    for due in ROUNDS:
+        new = Transitions.record(env, due - made, exploring, seed=seed + due)
+        window, made = (window + new)[-WINDOW:], made + len(new)
+        model = LearnedVectorEnv(
+            window, 20, initial=None, regressor="gaussian process", begin=begin, **known
+        )
+        begin = model.dynamics
+        agent.set_env(model)
+        agent.forget()  # what was done in the model before
+        agent.learn(total_timesteps=IN_MODEL)
+        yield made
+    yield method.after
+
+
+class Judge:
+    """Evaluates policies in a plant that changes, as it is at the time."""
+
+    def __init__(self, env: ChangingVectorEnv) -> None:
+        self._env = env
+        self._values: dict[str, float] = {}
+        self._now: Any = None
+
+    def cost(self, agent: Any) -> float:
+        """The policy cost now; an environment is made only when the plant has changed."""
+        if self._values != self._env.values:
+            self._values = self._env.values
+            self._now = with_slots_for(self._env.now())
+        return evaluate_policy_cost(agent, self._now).cost
+
+
 def run(before: Before, name: str, change: str, best: float, seed: int) -> Row:
     """Go on, or start anew, in the plant that changes, and evaluate at intervals."""
     method = METHODS[name]
     agent, env = before.agent(method, seed, CHANGES[change])
-    first = agent.num_timesteps
-    interactions, costs, seconds = (
-        [0],
-        [evaluate_policy_cost(agent, env.now()).cost],
-        0.0,
-    )
-    while interactions[-1] < method.after:
-        due = first + (interactions[-1] // method.every + 1) * method.every
-        began = time.process_time()
-        agent.learn(total_timesteps=due - agent.num_timesteps)
+    rounds = go_on_in_a_model if method.in_model else go_on
+    judge = Judge(env)
+    interactions, costs, seconds = [0], [judge.cost(agent)], 0.0
+    began = time.process_time()
+    for made in rounds(method, agent, env, seed):
         seconds += time.process_time() - began
-        interactions.append(agent.num_timesteps - first)
-        costs.append(evaluate_policy_cost(agent, env.now()).cost)
+        interactions.append(made)
+        costs.append(judge.cost(agent))
+        began = time.process_time()
     good = np.array(costs) <= (1 + WITHIN) * best
     span = np.linspace(0, method.after, 1001)
     return {
@@ -231,14 +303,17 @@ def study(changes: Sequence[str], methods: Sequence[str], seeds: range) -> list[
             rows += [
                 run(before, method, name, best, seed)
                 for method in methods
+                if not (METHODS[method].in_model and change.drifts)
                 for seed in seeds
             ]
     return rows
 
 
-def summary(rows: Sequence[Row], change: str, method: str) -> Row:
+def summary(rows: Sequence[Row], change: str, method: str) -> Row | None:
     """Medians over the seeds; a run that is never near is so later than all others."""
     runs = [r for r in rows if (r["change"], r["method"]) == (change, method)]
+    if not runs:
+        return None
     near = [np.inf if r["near"] is None else r["near"] for r in runs]
     return {
         "best": runs[0]["best"],
@@ -261,6 +336,8 @@ def as_markdown(rows: Sequence[Row]) -> str:
     for change in _in_order(CHANGES, rows, "change"):
         for method in _in_order(METHODS, rows, "method"):
             each = summary(rows, change, method)
+            if each is None:
+                continue
             near = "never" if each["near"] == np.inf else f"{each['near']:,.0f}"
             lines.append(
                 f"| {change} | {each['best']:.1f} | {method} | {each['first']:.1f} | "
@@ -274,6 +351,7 @@ LOOKS: dict[str, Row] = {
     "whole memory": {"color": BLUE, "marker": "o"},
     "small memory": {"color": ORANGE, "marker": "s"},
     "forget": {"color": GREEN, "marker": "^"},
+    "model": {"color": "#E69F00", "marker": "*"},
     "restart": {"color": "0.3", "marker": "x"},
     "ACL": {"color": "#CC79A7", "marker": "D"},
     "ACL, restart": {"color": "0.6", "marker": "+"},
@@ -289,8 +367,10 @@ def draw(rows: Sequence[Row], path: Path) -> None:
     upper, lower = figure.subplots(2, 1, sharex=True)
     places = np.arange(len(changes))
     for i, method in enumerate(methods):
-        found = [summary(rows, change, method) for change in changes]
-        at = places + 0.12 * (i - (len(methods) - 1) / 2)
+        every = [summary(rows, change, method) for change in changes]
+        found = [each for each in every if each is not None]
+        at = np.array([p for p, e in zip(places, every, strict=True) if e is not None])
+        at = at + 0.12 * (i - (len(methods) - 1) / 2)
         looks = {**LOOKS[method], "linestyle": "none", "markersize": 5}
         upper.plot(at, [each["extra"] for each in found], **looks)
         near = [each["near"] for each in found]

@@ -58,7 +58,8 @@ class PlantParameters:
             [self.names.index(name) for name in self.uncertain], dtype=np.int64
         )
         ends = np.array(list(self.uncertain.values()), dtype=np.float64).reshape(-1, 2)
-        self.low, self.high = np.ascontiguousarray(ends.T)
+        self.low: FloatArray = np.ascontiguousarray(ends[:, 0])
+        self.high: FloatArray = np.ascontiguousarray(ends[:, 1])
 
     @property
     def count(self) -> int:

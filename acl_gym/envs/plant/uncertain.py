@@ -107,6 +107,10 @@ class PlantParameters:
             values[i] = validation.read_only(value) if drawn.ndim == 2 else float(value)
         return parameter_tuple(self.names)(*values)
 
+    def for_kernel(self, own: FloatArray) -> tuple[Any, ...]:
+        """The further arguments of `kernels.Advance`; `own` are a slot's own, `(m, n)`."""
+        return (self.nominal, self.drawn, own) if self.names else ()
+
     def check_rows(self, rows: FloatArray) -> None:
         """Check values of the uncertain ones, `(n, m)`, that somebody gives.
 

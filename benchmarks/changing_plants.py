@@ -374,6 +374,9 @@ LOOKS: dict[str, Row] = {
 }
 
 
+AT_ONCE, NEVER = 200.0, 5e6  # where the lower panel shows them
+
+
 @in_style()
 def draw(rows: Sequence[Row], path: Path) -> None:
     """Draw extra cost and interactions until near over the changes, a panel for each."""
@@ -389,17 +392,24 @@ def draw(rows: Sequence[Row], path: Path) -> None:
         at = at + 0.12 * (i - (len(methods) - 1) / 2)
         looks = {**LOOKS[method], "linestyle": "none", "markersize": 5}
         upper.plot(at, [each["extra"] for each in found], **looks)
-        near = [each["near"] for each in found]
-        lower.plot(at, np.maximum(near, 100), **looks)
+        near = np.array([each["near"] for each in found])
+        lower.plot(at, np.clip(near, AT_ONCE, NEVER), **looks)
     upper.set(yscale="log", ylabel="extra policy cost")
     lower.set(
         yscale="log",
         ylabel="interactions until\nwithin 25% of J*",
         xticks=places,
         xlim=(-0.6, len(changes) - 0.4),
+        ylim=(AT_ONCE / 1.6, NEVER * 1.6),
     )
+    lower.set_yticks(
+        [AT_ONCE, 1e3, 1e4, 1e5, 1e6, NEVER],
+        ["at once", "1,000", "10,000", "100,000", "1,000,000", "never"],
+    )
+    lower.minorticks_off()
     lower.set_xticklabels(changes, rotation=60, ha="right")
     for ax in (upper, lower):
+        ax.grid(axis="x", visible=False)
         for place in places[1:]:
             ax.axvline(place - 0.5, color="0.9", lw=0.6)
     handles = [

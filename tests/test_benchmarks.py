@@ -151,3 +151,29 @@ def test_safe_learning() -> None:
         assert found[kind]["violations"] == found[kind]["final_violations"] == 0
         assert found[kind]["cost"] < found["free"]["cost"]
     assert found["shield, model"]["interventions"] > 0
+
+
+def test_uncertain_plants() -> None:
+    """One run of each kind where the range matters most: the mass."""
+    small = ("--seeds", "1", "--interactions", "3000", "--draws", "4")
+    found = output_of(
+        "uncertain_plants.py", "--cases", "mass", "--widths", "40", *small
+    )
+    assert found["best"][0]["corner"] == pytest.approx({"mass": 0.14})
+    assert found["best"][0]["hardest"] > found["best"][0]["nominal"] > 38
+    learned = {row["learned_on"]: row for row in found["rows"]}
+    assert list(learned) == ["nominal", "range", "hardest"]
+    for row in learned.values():
+        assert row["worst"] >= max(row["nominal"], row["mean"])
+    assert learned["hardest"]["worst"] < learned["nominal"]["worst"]
+
+
+def test_changing_plants() -> None:
+    """A small change: what was learned is still good, and a new colony knows nothing."""
+    arguments = ["--changes", "mass x 0.8", "--methods", "forget", "restart"]
+    rows = output_of("changing_plants.py", *arguments, "--seeds", "1")["rows"]
+    kept, anew = rows
+    assert (kept["method"], anew["method"]) == ("forget", "restart")
+    assert kept["costs"][0] < 1.5 * kept["best"] < anew["costs"][0]
+    assert kept["extra"] < anew["extra"]
+    assert all(row["interactions"][-1] >= 10_000 for row in rows)

@@ -122,7 +122,7 @@ class Announcer(Listener):
 
 def _is_ours(event: Any) -> bool:
     kernel = event.data.get("dispatcher")
-    return getattr(kernel, "__module__", "").startswith("acl_gym")
+    return (getattr(kernel, "__module__", None) or "").startswith("acl_gym")
 
 
 announcer = Announcer()

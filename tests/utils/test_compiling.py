@@ -161,3 +161,11 @@ def test_an_installation_that_may_not_be_written_works(tmp_path: Path) -> None:
         check=True,
     )
     assert done.stderr.count("NUMBA_CACHE_DIR") == 1
+
+
+def test_a_function_of_no_module_is_compiled() -> None:
+    """As one that a program defines in `exec`; it is not one of this package."""
+    names: dict[str, Any] = {}
+    exec("import numba\n@numba.njit\ndef twice(x):\n    return 2 * x", names)
+    assert names["twice"].__module__ is None
+    assert names["twice"](3) == 6

@@ -86,10 +86,8 @@ class Equations:
         if isinstance(self._dynamics, Dispatcher):
             if self._compiled is None:
                 self._compiled = self._compile(states, inputs)
-            return self._compiled(
-                *(states, actions, inputs, step, substeps),
-                *(parameters.nominal, parameters.drawn, own),
-            )
+            more = parameters.for_kernel(own)
+            return self._compiled(states, actions, inputs, step, substeps, *more)
         f, u = _bound(self._dynamics, parameters, own), inputs.T[:, actions]
         u.setflags(write=False)
         # What is not finite is an error of its own; no need to warn of it as well.
@@ -120,11 +118,11 @@ class Equations:
         put = kernels.put_sequence
         if isinstance(given, tuple):
             put = kernels.put_tuple
-        dynamics = kernels.with_parameters(self._dynamics, known.names)
+        parts = kernels.with_parameters(self._dynamics, known.names)
         if self._discrete_time:
-            return kernels.advance_map(dynamics, len(states), put)
+            return kernels.advance_map(parts, len(states), put)
         writes = _may_write(self._dynamics, p)
-        return kernels.advance_ode(dynamics, len(states), put, writes)
+        return kernels.advance_ode(parts, len(states), put, writes)
 
     def _check_compiled(
         self, samples: FloatArray, inputs: FloatArray, drawn: FloatArray
@@ -164,7 +162,7 @@ class Equations:
             actions = np.zeros(1, dtype=np.int64)
             self._compiled(
                 *(samples[:, :1].copy(), actions, inputs, 0.0, 1),
-                *(known.nominal, known.drawn, drawn[:, :1].copy()),
+                *known.for_kernel(drawn[:, :1].copy()),
             )
         except NumbaError as error:
             raise ValueError(f"{expects}; it failed: {_first_line(error)}") from error

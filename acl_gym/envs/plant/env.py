@@ -11,8 +11,8 @@ from gymnasium.wrappers import TimeLimit
 from acl_gym.envs.control.environments import ControlVectorEnv
 from acl_gym.envs.control.single import ControlEnv
 from acl_gym.envs.plant.system import Plant
-from acl_gym.envs.plant.uncertain import PlantParameters
 from acl_gym.utils import validation
+from acl_gym.utils.typing import FloatArray, IntArray
 
 _PAINTER = "acl_gym.envs.plant.painter:PlantPainter"
 
@@ -30,8 +30,20 @@ class PlantVectorEnv(ControlVectorEnv):
     system_type = Plant
     painter = _PAINTER
 
+    @property
+    def system(self) -> Plant:
+        """The parameters and dynamics of the plant."""
+        found: Any = self._system
+        return found  # type: ignore[no-any-return]
+
+    def _checked_states(self, given: Any, slots: IntArray) -> FloatArray:
+        array = validation.as_array(given)
+        if array is not None and array.ndim == 1 and self.system.low.size == 1:
+            given = array[:, None]  # so that parameters can be left out here too
+        return super()._checked_states(given, slots)
+
     def _arguments_with(self, values: dict[str, Any]) -> dict[str, Any]:
-        known: PlantParameters = self.system.parameters  # type: ignore[attr-defined]
+        known = self.system.parameters
         for name in values:
             known.value_of(name)  # which must exist
         named = dict(zip(known.names, known.nominal.tolist(), strict=True))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cache, lru_cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numba
 import numpy as np
@@ -14,42 +14,78 @@ from acl_gym.envs.plant.uncertain import parameter_tuple
 from acl_gym.utils.compiling import njit
 from acl_gym.utils.typing import BoolArray, FloatArray, IntArray
 
-Advance = Callable[
-    [FloatArray, IntArray, FloatArray, float, int, FloatArray, IntArray, FloatArray],
-    int,
-]
+Advance = Callable[..., int]
 """Advances `states` `(state_size, n)` in place by `substeps` steps of `step` seconds with
-the inputs `inputs[actions]` and the parameters `nominal` `(k,)`, of which those at the
-indices `drawn` `(m,)` are a slot's own, `own` `(m, n)`; returns a slot whose next state is
-not finite, which keeps its state, or -1."""
+the inputs `inputs[actions]`; returns a slot whose next state is not finite, which keeps its
+state, or -1. Where there are parameters, three more arguments hold their nominal values
+`(k,)`, which of them are a slot's own `(m,)`, and these `(m, n)`."""
+
+
+class Parts(NamedTuple):
+    """The compiled functions of which a kernel is made.
+
+    Attributes:
+        dynamics: f(x, u, p), where p holds the parameters `(k,)`.
+        begin: takes the further arguments of `Advance`; returns p.
+        load: takes p, a slot and the further arguments; writes the slot's parameters.
+    """
+
+    dynamics: Any
+    begin: Any
+    load: Any
 
 
 @lru_cache(maxsize=64)  # so that the kernels below, which depend on it, are shared too
-def with_parameters(dynamics: Any, names: tuple[str, ...]) -> Any:
-    """A compiled f(x, u, values) around a compiled f(x, u), or f(x, u, p) with names.
+def with_parameters(dynamics: Any, names: tuple[str, ...]) -> Parts:
+    """The parts of a kernel around a compiled f(x, u), or f(x, u, p) with names.
 
     They are not cached on disk, where nothing could tell the types of two processes
-    apart.
+    apart. Without parameters nothing is handed over, which would take time.
 
     Args:
         dynamics: compiled by Numba.
-        names: of the parameters; `values` of the function returned holds theirs in this
-            order, `(k,)`.
+        names: of the parameters, in the order of their values.
     """
     if not names:
-
-        @numba.njit
-        def without(x: FloatArray, u: FloatArray, values: FloatArray) -> Any:
-            return dynamics(x, u)
-
-        return without
+        return Parts(_without(dynamics), _begin_without, _load_nothing)
     made, tuple_of = parameter_tuple(names), _first_entries(len(names))
 
     @numba.njit
-    def by_name(x: FloatArray, u: FloatArray, values: FloatArray) -> Any:
-        return dynamics(x, u, made(*tuple_of(values)))
+    def by_name(x: FloatArray, u: FloatArray, p: FloatArray) -> Any:
+        return dynamics(x, u, made(*tuple_of(p)))
 
-    return by_name
+    return Parts(by_name, _begin, _load)
+
+
+def _without(dynamics: Any) -> Any:
+    @numba.njit
+    def without(x: FloatArray, u: FloatArray, p: FloatArray) -> Any:
+        return dynamics(x, u)
+
+    return without
+
+
+@njit
+def _begin_without() -> FloatArray:
+    return np.empty(0)
+
+
+@njit
+def _load_nothing(p: FloatArray, slot: int) -> None:
+    pass
+
+
+@njit
+def _begin(nominal: FloatArray, drawn: IntArray, own: FloatArray) -> FloatArray:
+    return nominal.copy()
+
+
+@njit
+def _load(
+    p: FloatArray, slot: int, nominal: FloatArray, drawn: IntArray, own: FloatArray
+) -> None:
+    for i in range(drawn.size):
+        p[drawn[i]] = own[i, slot]
 
 
 @cache
@@ -93,17 +129,18 @@ def put_sequence(values: Any, out: FloatArray) -> None:
 
 
 @lru_cache(maxsize=64)  # copies of an environment share what was compiled
-def advance_ode(dynamics: Any, size: int, put: Any, writes: bool) -> Advance:
+def advance_ode(parts: Parts, size: int, put: Any, writes: bool) -> Advance:
     """Fourth-order Runge-Kutta around a compiled x' = f(x, u), the input held constant.
 
     Args:
-        dynamics: of `with_parameters`; takes the state `(size,)`, the input
+        parts: of `with_parameters`; its dynamics takes the state `(size,)`, the input
             `(n_inputs,)` and the parameters `(k,)` of one slot.
         size: the number of state variables.
         put: `put_tuple` or `put_sequence`, for what `dynamics` returns.
         writes: whether `dynamics` may write to its arguments. It then gets fresh copies
             in each call, which take a sixth of the time of a simple plant.
     """
+    dynamics, begin, load = parts
 
     @njit(error_model="numpy")
     def advance(
@@ -112,23 +149,20 @@ def advance_ode(dynamics: Any, size: int, put: Any, writes: bool) -> Advance:
         inputs: FloatArray,
         step: float,
         substeps: int,
-        nominal: FloatArray,
-        drawn: IntArray,
-        own: FloatArray,
+        *own: Any,
     ) -> int:
         x, y = np.empty(size), np.empty(size)
         k1, k2, k3, k4 = np.empty(size), np.empty(size), np.empty(size), np.empty(size)
         n_inputs = inputs.shape[1]
         copied = np.empty(n_inputs)
-        p = nominal.copy()
+        p = begin(*own)
         bad = -1
         for slot in range(actions.size):
             action = actions[slot]
             u = copied if writes else inputs[action]
             for i in range(size):
                 x[i] = states[i, slot]
-            for i in range(drawn.size):
-                p[drawn[i]] = own[i, slot]
+            load(p, slot, *own)
             for _ in range(substeps):
                 if writes:
                     for i in range(size):
@@ -172,8 +206,9 @@ def advance_ode(dynamics: Any, size: int, put: Any, writes: bool) -> Advance:
 
 
 @lru_cache(maxsize=64)
-def advance_map(dynamics: Any, size: int, put: Any) -> Advance:
+def advance_map(parts: Parts, size: int, put: Any) -> Advance:
     """One step of a compiled map x(t+1) = f(x, u); see `advance_ode`."""
+    dynamics, begin, load = parts
 
     @njit(error_model="numpy")
     def advance(
@@ -182,19 +217,16 @@ def advance_map(dynamics: Any, size: int, put: Any) -> Advance:
         inputs: FloatArray,
         step: float,
         substeps: int,
-        nominal: FloatArray,
-        drawn: IntArray,
-        own: FloatArray,
+        *own: Any,
     ) -> int:
         x, y = np.empty(size), np.empty(size)
         u = np.empty(inputs.shape[1])
-        p = nominal.copy()
+        p = begin(*own)
         bad = -1
         for slot in range(actions.size):
             for i in range(size):
                 x[i] = states[i, slot]
-            for i in range(drawn.size):
-                p[drawn[i]] = own[i, slot]
+            load(p, slot, *own)
             for i in range(u.size):
                 u[i] = inputs[actions[slot], i]
             put(dynamics(x, u, p), y)

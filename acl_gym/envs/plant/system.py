@@ -20,6 +20,7 @@ from acl_gym.envs.plant.uncertain import PlantParameters
 from acl_gym.utils import validation
 from acl_gym.utils.typing import BoolArray, FloatArray, IntArray
 
+_NOTHING = np.empty((0, 0))
 _EVALUATED = 100  # states, as many as the pendulum has
 
 
@@ -240,7 +241,9 @@ class Plant(ControlSystem):
 
     def observe(self, states: FloatArray) -> FloatArray:
         """Return the variables without the parameters, a new array `(n, variables)`."""
-        return super().observe(states[: self.low.size])
+        return super().observe(
+            states if self.fully_observed else states[: self.low.size]
+        )
 
     def advance(
         self,
@@ -256,8 +259,10 @@ class Plant(ControlSystem):
             SlotError: a next state or a cost is not finite.
         """
         step = self.sampling_time / self.substeps
-        size = self.low.size
-        states, own = states[:size], states[size:]
+        own = _NOTHING
+        if not self.fully_observed:
+            size = self.low.size
+            states, own = states[:size], states[size:]
         bad = self._equations.advance(
             states, actions, self.inputs, step, self.substeps, own
         )

@@ -58,7 +58,8 @@ class PlantParameters:
             [self.names.index(name) for name in self.uncertain], dtype=np.int64
         )
         ends = np.array(list(self.uncertain.values()), dtype=np.float64).reshape(-1, 2)
-        self.low, self.high = np.ascontiguousarray(ends.T)
+        self.low: FloatArray = np.ascontiguousarray(ends[:, 0])
+        self.high: FloatArray = np.ascontiguousarray(ends[:, 1])
 
     @property
     def count(self) -> int:
@@ -105,6 +106,10 @@ class PlantParameters:
             value = drawn[row]
             values[i] = validation.read_only(value) if drawn.ndim == 2 else float(value)
         return parameter_tuple(self.names)(*values)
+
+    def for_kernel(self, own: FloatArray) -> tuple[Any, ...]:
+        """The further arguments of `kernels.Advance`; `own` are a slot's own, `(m, n)`."""
+        return (self.nominal, self.drawn, own) if self.names else ()
 
     def check_rows(self, rows: FloatArray) -> None:
         """Check values of the uncertain ones, `(n, m)`, that somebody gives.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from bisect import bisect_right
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
@@ -17,7 +17,7 @@ from acl_gym.envs.control.system import ControlSystem
 from acl_gym.envs.plant.system import Plant
 from acl_gym.utils import validation
 
-_MOST_STAGES = 10_000
+_MOST_STAGES = 2_000
 """How often the parameters may change in all; each time there is a system of its own."""
 
 
@@ -159,8 +159,8 @@ class ChangingVectorEnv(VectorWrapper[Any, Any, Any, Any]):
     Raises:
         TypeError: `env` is of another package, a schedule is none, or there is no such
             parameter.
-        ValueError: changes of one parameter overlap, a value is not valid, or a change
-            would change what can be observed or done.
+        ValueError: changes of one parameter overlap, a value is not valid, a change
+            would change what can be observed or done, or `env` changes already.
     """
 
     def __init__(
@@ -176,6 +176,11 @@ class ChangingVectorEnv(VectorWrapper[Any, Any, Any, Any]):
                 "env must be a vector environment of acl_gym, whose parameters are "
                 f"known, got {validation.shown(env)}; make one with gym.make_vec or "
                 "acl_gym.plant."
+            )
+        if any(isinstance(each, ChangingVectorEnv) for each in _wrappers(env)):
+            raise ValueError(
+                "env must not change already, got a ChangingVectorEnv inside; give all "
+                "schedules to one."
             )
         super().__init__(env)
         self._base = base
@@ -222,11 +227,11 @@ class ChangingVectorEnv(VectorWrapper[Any, Any, Any, Any]):
 
     def step(self, actions: ArrayLike) -> tuple[Any, Any, Any, Any, dict[str, Any]]:
         """Apply one action to each slot, with the parameters of now."""
-        if self._steps >= self._next:
-            self._enter_stage()
         walking = self._base.num_walking
         given = self.env.step(actions)
         self._steps += walking
+        if self._steps >= self._next:
+            self._enter_stage()
         return given
 
     def now(self) -> ControlVectorEnv:
@@ -276,6 +281,13 @@ class ChangingVectorEnv(VectorWrapper[Any, Any, Any, Any]):
                 f"{max(time, 0):,} steps: {error}"
             ) from error
         return stage
+
+
+def _wrappers(env: Any) -> Iterator[VectorWrapper[Any, Any, Any, Any]]:
+    """The wrappers around an environment, from the outside in."""
+    while isinstance(env, VectorWrapper):
+        yield env
+        env = env.env
 
 
 def _certain(system: ControlSystem, name: str) -> float:

@@ -193,6 +193,30 @@ def test_states_with_and_without_parameters() -> None:
             env.reset(options={"state": state})
 
 
+def decay(x: Any, u: Any, p: Any) -> Any:
+    return [-p.rate * x[0] + u[0]]
+
+
+def test_states_of_one_variable() -> None:
+    env = acl_gym.plant(
+        decay,
+        low=[-1.0],
+        high=[1.0],
+        inputs=[0.0],
+        sampling_time=0.1,
+        goal=None,
+        uncertain={"rate": (1.0, 3.0)},
+        max_episode_steps=5,
+        num_envs=2,
+    )
+    env.reset(options={"state": [0.5, -0.5]})
+    assert env.states.tolist() == [[0.5, 2.0], [-0.5, 2.0]]
+    env.reset(options={"state": [[0.5, 1.0], [-0.5, 3.0]]})
+    mask = np.array([True, False])
+    env.reset(options={"state": [0.25, np.nan], "reset_mask": mask})
+    assert env.states.tolist() == [[0.25, 2.0], [-0.5, 3.0]]
+
+
 def initial_with_parameters(rng: np.random.Generator, count: int) -> Any:
     return [[1.0, 0.0, 0.08 + 0.01 * rng.random(), 0.01] for _ in range(count)]
 

@@ -119,6 +119,11 @@ class Plant(ControlSystem):
         return self._goal.box
 
     @property
+    def has_goal(self) -> bool:
+        """Whether an episode may end in success."""
+        return self._goal.centre is not None or self._goal.function is not None
+
+    @property
     def max_stage_cost(self) -> float:
         """A bound on the cost of one step; for a cost of your own, an estimate.
 

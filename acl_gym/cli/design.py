@@ -1,0 +1,306 @@
+"""`acl-gym design`: a controller and a report from a file that describes a plant."""
+
+from __future__ import annotations
+
+import shlex
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from importlib.resources import as_file, files
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from acl_gym.cli.common import DebugOption, JsonOption, check_name, console, print_json
+from acl_gym.cli.errors import (
+    BadArgumentError,
+    Command,
+    InterruptedRunError,
+    bad_arguments,
+    report,
+)
+from acl_gym.cli.interrupts import Interruption
+
+if TYPE_CHECKING:
+    from acl_gym.design import Design
+    from acl_gym.design.learning import Progress
+
+EXAMPLES = {
+    "pendulum": "swing up a pendulum on a weak motor; seconds",
+    "dc_motor": "turn the shaft of a geared motor to an angle, with friction; seconds",
+    "two_tanks": "bring the second of two coupled tanks to a level; seconds",
+    "cart_pole": "swing up a pole on a cart, four variables; most of a minute",
+}
+
+PROGRESS_SECONDS = 5.0
+"""Between two lines of progress where there is no terminal."""
+
+HELP = """Design a controller for a plant of yours, and say how good it is.
+
+PLANT.py is a Python file that calls acl_gym.plant(...) and keeps what it returns in a
+name, such as env = acl_gym.plant(...); or defines make(num_envs), which returns it. The
+file is run. A colony of ants then learns the plant until the goal is reached from 95% of
+the starts and the cost no longer falls, or the time is up.
+
+The folder gets policy.h, the controller as C without any library; policy.npz, the same
+for NumPy; report.html, one page with the policy, trajectories from a typical and the
+worst start, and success, cost, settling time and overshoot over 1,000 random starts;
+summary.json with the same figures; and the pictures as PNG.
+
+The exit code is 1 if the goal is not reached from 95% of the starts; the folder is
+written all the same, with what to try. Ctrl-C keeps the best controller so far.
+
+\b
+Examples:
+  acl-gym design --show pendulum > my_plant.py    a file to begin with
+  acl-gym design my_plant.py --out my_controller
+  acl-gym design my_plant.py --seconds 300 --seed 1
+  acl-gym design --example cart_pole
+"""
+
+
+class DesignCommand(Command):
+    """Its help shows a complete file."""
+
+    def format_help(self, ctx: Any, formatter: Any) -> None:
+        """Write the help."""
+        names = [f"  {name:10} {words}" for name, words in EXAMPLES.items()]
+        blocks = ["\n".join(["Plants for --example and --show:", *names])]
+        indented = [f"  {line}".rstrip() for line in example("pendulum").splitlines()]
+        blocks += ["A complete file, pendulum.py:"]
+        blocks += "\n".join(indented).split("\n\n")
+        self.epilog = "\n\n".join(f"\b\n{block.strip(chr(10))}" for block in blocks)
+        super().format_help(ctx, formatter)
+
+
+def example(name: str) -> str:
+    """The text of an example."""
+    return _example_file(name).read_text(encoding="utf-8")
+
+
+def design(
+    plant: Annotated[
+        Path | None,
+        typer.Argument(
+            metavar="PLANT.py",
+            help="The file that describes the plant.",
+            show_default=False,
+        ),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="DIR",
+            help="The folder that is written; files of the same names are replaced.  "
+            "[default: a new folder named after the file]",
+            show_default=False,
+        ),
+    ] = None,
+    seed: Annotated[
+        int,
+        typer.Option(
+            min=0, metavar="N", help="Seed; the same seed gives the same controller."
+        ),
+    ] = 0,
+    seconds: Annotated[
+        float | None,
+        typer.Option(
+            metavar="S",
+            help="The most seconds for learning.  [default: 60; with --steps none]",
+            show_default=False,
+        ),
+    ] = None,
+    steps: Annotated[
+        int | None,
+        typer.Option(
+            min=1,
+            metavar="N",
+            help="Learn for so many interactions with the model, whether or not the "
+            "policy still improves: what repeats a design exactly.",
+            show_default=False,
+        ),
+    ] = None,
+    example_name: Annotated[
+        str | None,
+        typer.Option(
+            "--example",
+            metavar="NAME",
+            help="Take a plant that is shipped, see below, in place of a file.",
+            show_default=False,
+        ),
+    ] = None,
+    show: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME",
+            help="Print the file of an example, and do nothing else.",
+            show_default=False,
+        ),
+    ] = None,
+    quiet: Annotated[bool, typer.Option("--quiet", help="Print no progress.")] = False,
+    as_json: JsonOption = False,
+    debug: DebugOption = False,
+) -> None:
+    """Design; see `HELP`."""
+    if show is not None:
+        typer.echo(example(check_name("--show", show, EXAMPLES)), nl=False)
+        return
+    if (plant is None) == (example_name is None):
+        raise BadArgumentError(
+            "give either a file that describes a plant, PLANT.py, or --example NAME; "
+            "`acl-gym design --show pendulum` prints a file to begin with."
+        )
+    if seconds is not None and not 0.0 < seconds < float("inf"):
+        raise BadArgumentError(f"--seconds must be a number > 0, got {seconds:g}.")
+    if seconds is None and steps is None:
+        from acl_gym.design.run import SECONDS
+
+        seconds = SECONDS
+    shown = [str(plant)]
+    if plant is None:
+        name = check_name("--example", str(example_name), EXAMPLES)
+        shown, plant = ["--example", name], Path(f"{name}.py")
+        with as_file(_example_file(name)) as file:
+            _run(file, plant.stem, shown, out, seed, seconds, steps, quiet, as_json)
+    else:
+        _run(plant, plant.stem, shown, out, seed, seconds, steps, quiet, as_json)
+
+
+def _run(
+    file: Path,
+    stem: str,
+    shown: list[str],
+    out: Path | None,
+    seed: int,
+    seconds: float | None,
+    steps: int | None,
+    quiet: bool,
+    as_json: bool,
+) -> None:
+    from acl_gym.design.plants import load_plant
+    from acl_gym.design.run import checked_folder, design_for
+
+    with bad_arguments():
+        env = load_plant(file)
+        folder = checked_folder(_free_folder(stem) if out is None else out)
+    command = shlex.join(["acl-gym", "design", *shown, "--out", str(folder)])
+    with Interruption() as interruption, _progress(not quiet) as (tell, say):
+        try:
+            made = design_for(
+                env,
+                folder,
+                source=file,
+                seed=seed,
+                seconds=seconds,
+                steps=steps,
+                command=command,
+                stop=lambda: interruption.wanted,
+                tell=tell,
+                say=say,
+            )
+        except KeyboardInterrupt:
+            if not interruption.wanted:
+                raise
+            raise InterruptedRunError(
+                "interrupted before there was a policy; nothing is saved.",
+                interruption.exit_code,
+            ) from None
+    if as_json:
+        print_json(made.summary)
+    else:
+        _print(made)
+    if interruption.wanted:
+        raise InterruptedRunError(
+            f"interrupted; the best controller so far is in {folder}.",
+            interruption.exit_code,
+        )
+    if not made.succeeded:
+        report(
+            "acl-gym",
+            f"the goal is reached from {made.measures.success_rate:.1%} of the starts, "
+            f"less than 95%. What to try: {' '.join(made.advice)}",
+        )
+        raise typer.Exit(1)
+
+
+@contextmanager
+def _progress(
+    wanted: bool,
+) -> Iterator[tuple[Callable[[Progress], None], Callable[[str], None]]]:
+    """Functions that show progress on stderr: in place on a terminal, else in lines."""
+    if not wanted:
+        yield (lambda progress: None), (lambda words: None)
+        return
+    if sys.stderr.isatty():
+        with console(stderr=True).status("") as status:
+            yield (lambda progress: status.update(_in_words(progress))), status.update
+        return
+    last = time.monotonic()
+
+    def tell(progress: Progress) -> None:
+        nonlocal last
+        if time.monotonic() - last >= PROGRESS_SECONDS:
+            last = time.monotonic()
+            report("acl-gym", _in_words(progress))
+
+    yield tell, (lambda words: None)
+
+
+def _in_words(progress: Progress) -> str:
+    return (
+        f"learning, {progress.seconds:.0f} s, {progress.interactions:,} interactions: "
+        f"goal reached from {progress.success_rate:.0%} of the starts, cost "
+        f"{progress.cost:.4g}; best {progress.best_success_rate:.0%}, "
+        f"{progress.best_cost:.4g}"
+    )
+
+
+def _print(made: Design) -> None:
+    from rich.table import Table
+
+    measures = made.measures
+    table = Table(box=None, pad_edge=False, header_style="bold")
+    for head in ("", "median", "mean", "95% below", "worst"):
+        table.add_column(head, justify="right" if head else "left")
+    named = {
+        "cost": measures.cost,
+        "time to the goal, s": measures.time_to_goal,
+        "settling time, s": measures.settling_time,
+        **{f"overshoot of {n}": each for n, each in measures.overshoot.items()},
+    }
+    for name, spread in named.items():
+        if spread is not None:
+            values = spread.median, spread.mean, spread.high, spread.worst
+            table.add_row(name, *(f"{value:.4g}" for value in values))
+    screen = console()
+    lines = [
+        f"The goal is reached from {measures.success_rate:.1%} of {measures.starts:,} "
+        f"random starts; {measures.settled_rate:.1%} stay there.",
+        f"Learned from {made.learned.interactions:,} interactions in "
+        f"{made.learned.seconds:.1f} s; {made.summary['seconds']:.1f} s in all.",
+    ]
+    for line in lines:
+        screen.print(line, markup=False, highlight=False, soft_wrap=True)
+    screen.print(table)
+    screen.print(
+        f"Wrote {made.folder / 'report.html'}, and the controller, "
+        f"{made.folder / 'policy.h'}.",
+        markup=False,
+        highlight=False,
+        soft_wrap=True,
+    )
+
+
+def _example_file(name: str) -> Any:
+    return files("acl_gym").joinpath("examples", f"{name}.py")
+
+
+def _free_folder(stem: str) -> Path:
+    """A name that is not taken in this folder: pendulum-design, -2, -3, ..."""
+    path, number = Path(f"{stem}-design"), 1
+    while path.exists():
+        number += 1
+        path = Path(f"{stem}-design-{number}")
+    return path

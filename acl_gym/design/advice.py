@@ -1,0 +1,75 @@
+"""What to try where the goal is not reached from enough starts."""
+
+from __future__ import annotations
+
+from acl_gym.design.learning import GOOD, Learned
+from acl_gym.design.measures import Measures
+from acl_gym.envs.plant import Plant
+from acl_gym.utils.text import digits
+
+NEAR = 3.0
+"""Multiples of the half-widths of the goal within which a failure was close."""
+
+FEW_ACTIONS = 4
+
+
+def advice(learned: Learned, measures: Measures, plant: Plant) -> list[str]:
+    """Sentences on what to try, the most promising first; empty where all is well.
+
+    Args:
+        learned: what learning came to.
+        measures: of the policy.
+        plant: the system.
+    """
+    if measures.success_rate >= GOOD:
+        return []
+    found = []
+    if learned.ended != "converged":
+        found.append(
+            "Give it more time, --seconds with a larger number: learning had not come "
+            f"to its end after {learned.seconds:.0f} s."
+        )
+    near = measures.nearest is not None and measures.nearest < NEAR
+    if near:
+        found.append(
+            "Make the goal larger (tolerance=): from the starts that fail, the state "
+            f"comes within {digits(measures.nearest or 0.0)} times its half-width, which "
+            "is too coarse a meeting for this controller."
+        )
+    finer = (
+        "Sample more finely (sampling_time=, with as many more max_episode_steps): now "
+        f"the input is held for {digits(plant.sampling_time)} s."
+    )
+    actions = (
+        f"Allow more actions (inputs=, now {len(plant.inputs)}), in particular weaker ones "
+        "between the strongest."
+    )
+    found += [finer, actions] if near else []
+    found.append(
+        "Make the inputs stronger (inputs=), if the actuator allows it: from "
+        f"{state_in_words(measures.worst_start, plant)}, the worst start, the goal may be "
+        "out of reach."
+    )
+    found.append(
+        "Allow more time for an episode (max_episode_steps=): it ends after "
+        f"{digits(plant.evaluation_steps * plant.sampling_time)} s."
+    )
+    found += [] if near else [finer, actions]
+    if len(plant.inputs) >= FEW_ACTIONS and not near:
+        found.remove(actions)
+    found.append(
+        "Begin with easier starts (initial=), if the plant never is in all states "
+        "between low and high."
+    )
+    return found
+
+
+def state_in_words(state: tuple[float, ...], plant: Plant) -> str:
+    """The variables of a state with their names: "angle 3.14 rad, speed 0 rad/s"."""
+    parts = []
+    for name, value in zip(plant.signals.observations, state, strict=False):
+        word, *rest = name.split(", ")
+        unit = f" {rest[0]}" if rest else ""
+        joined = f"{word} = " if "[" in word else f"{word} "
+        parts.append(f"{joined}{digits(value)}{unit}")
+    return ", ".join(parts)

@@ -1,0 +1,318 @@
+"""From a plant to a folder with a controller and a report."""
+
+from __future__ import annotations
+
+import json
+import math
+import time
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from acl_gym.design import pictures
+from acl_gym.design.advice import advice
+from acl_gym.design.learning import GOOD, Learned, Progress, learn
+from acl_gym.design.measures import Measures, measure, typical, worst
+from acl_gym.design.page import write_page
+from acl_gym.design.plants import as_vector_env, load_plant
+from acl_gym.design.simulation import Responses, simulate
+from acl_gym.envs.control.environments import ControlVectorEnv
+from acl_gym.envs.plant import Plant
+from acl_gym.experiments.provenance import circumstances
+from acl_gym.policies import TablePolicy
+from acl_gym.utils import files, validation
+from acl_gym.utils.typing import FloatArray
+
+STARTS = 1_000
+"""Random starts of the figures in the report."""
+
+CHOOSING = 300
+"""Other random starts, from which the policies of one run are compared."""
+
+SECONDS = 60.0
+"""The default time limit of learning."""
+
+PLANTS = 50
+"""Plants that are drawn from the range of uncertain parameters."""
+
+
+@dataclass(frozen=True)
+class Design:
+    """What was designed.
+
+    Attributes:
+        folder: where the files are.
+        policy: the controller.
+        measures: what it does from the random starts.
+        learned: how it was learned.
+        advice: what to try, where the goal is not reached from 95% of the starts.
+        summary: what `summary.json` holds.
+    """
+
+    folder: Path
+    policy: TablePolicy
+    measures: Measures
+    learned: Learned
+    advice: tuple[str, ...]
+    summary: dict[str, Any]
+
+    @property
+    def succeeded(self) -> bool:
+        """Whether the goal is reached from 95% of the starts or more."""
+        return self.measures.success_rate >= GOOD
+
+
+def design(
+    plant: Any,
+    out: str | Path,
+    *,
+    seed: int = 0,
+    seconds: float | None = SECONDS,
+    steps: int | None = None,
+    command: str | None = None,
+    stop: Callable[[], bool] = lambda: False,
+    tell: Callable[[Progress], None] = lambda progress: None,
+    say: Callable[[str], None] = lambda words: None,
+) -> Design:
+    """Learn a controller for a plant, and write it with a report into a folder.
+
+    The folder gets `policy.h` (C), `policy.npz` (NumPy), `policy.png`,
+    `trajectories.png`, `starts.png`, `learning.png`, `summary.json`, `report.html`, which
+    holds all of it, and `plant.py`, a copy of the file.
+
+    Args:
+        plant: what `acl_gym.plant` returns, or the path of a Python file that calls it,
+            see `load_plant`. The file is run.
+        out: the folder; it is made if it does not exist, and files of these names in it
+            are replaced.
+        seed: >= 0; the same seed and number of interactions give the same controller.
+        seconds: the most seconds for learning, > 0; None sets no limit.
+        steps: learn for so many interactions, >= 1, whether or not the policy still
+            improves; None ends when it has stopped improving.
+        command: what repeats this, for the report; None writes it in Python.
+        stop: asked after each trial; True ends learning, and the best policy so far is
+            kept.
+        tell: called after each evaluation.
+        say: called with what is done next.
+
+    Returns:
+        The controller and what is known of it.
+
+    Raises:
+        FileNotFoundError: there is no such file, or no folder in which to make `out`.
+        ValueError: the file describes no plant, or an argument is out of range.
+        TypeError: `plant` is something else, or an argument has the wrong type.
+
+    Example:
+        >>> from acl_gym.design import design
+        >>> made = design("pendulum.py", "pendulum", seed=0)  # doctest: +SKIP
+        >>> made.measures.success_rate  # doctest: +SKIP
+        1.0
+    """
+    source = None
+    if isinstance(plant, str | Path):
+        source = Path(plant)
+        env = load_plant(source)
+    else:
+        env = as_vector_env(plant)
+    return design_for(
+        env,
+        out,
+        source=source,
+        seed=seed,
+        seconds=seconds,
+        steps=steps,
+        command=command,
+        stop=stop,
+        tell=tell,
+        say=say,
+    )
+
+
+def design_for(
+    env: ControlVectorEnv,
+    out: str | Path,
+    *,
+    source: Path | None,
+    seed: int,
+    seconds: float | None,
+    steps: int | None,
+    command: str | None,
+    stop: Callable[[], bool],
+    tell: Callable[[Progress], None],
+    say: Callable[[str], None],
+) -> Design:
+    """`design` for a plant that was loaded already.
+
+    Args:
+        env: the plant.
+        out: see `design`, as are the others.
+        source: the file that describes the plant, or None.
+        seed: see `design`.
+        seconds: see `design`.
+        steps: see `design`.
+        command: see `design`.
+        stop: see `design`.
+        tell: see `design`.
+        say: see `design`.
+    """
+    begun = time.monotonic()
+    seed = validation.integer("seed", seed, at_least=0)
+    if seconds is not None:
+        seconds = validation.number("seconds", seconds, above=0)
+    if steps is not None:
+        steps = validation.integer("steps", steps, at_least=1)
+    folder = checked_folder(out)
+    system: Any = env.system
+    folder.mkdir(exist_ok=True)
+
+    say("learning")
+    learned = learn(
+        env,
+        _starts(system, CHOOSING, seed, 1),
+        seed=seed,
+        seconds=seconds,
+        steps=steps,
+        stop=stop,
+        tell=tell,
+    )
+    say(f"simulating {STARTS:,} starts")
+    starts = _starts(system, STARTS, seed, 2)[:, : system.low.size]
+    responses = simulate(learned.policy, env, starts, 2 * system.evaluation_steps, seed)
+    measures = measure(responses, system)
+    robustness = _robustness(learned.policy, env, starts, seed)
+    say("drawing")
+    figures = _draw(learned, responses, env, system)
+    for name, figure in figures.items():
+        figure.savefig(folder / f"{name}.png", dpi=pictures.DPI)
+    learned.policy.to_c(folder / "policy.h")
+    learned.policy.to_numpy(folder / "policy.npz")
+    if source is not None:
+        files.write_atomically(folder / "plant.py", source.read_bytes())
+    tips = advice(learned, measures, system)
+    made = circumstances(1)
+    summary = {
+        "plant": "acl_gym.plant(...)" if source is None else str(source),
+        "reaches_goal": measures.success_rate >= GOOD,
+        "seconds": 0.0,  # below, with all that is still to be done
+        "seed": seed,
+        "command": _command(command, source, folder, seed, learned),
+        "interactions": learned.interactions,
+        "interactions_of_best": learned.interactions_of_best,
+        "learning_seconds": learned.seconds,
+        "ended": learned.ended,
+        "ants": learned.ants,
+        **measures.as_dict(),
+        "costs": asdict(measures.cost),
+        "starts": STARTS,
+        "uncertain": robustness,
+        "advice": tips,
+        "controller": _facts(learned.policy, folder),
+        "made": made,
+    }
+    summary["cost"] = measures.cost.mean
+    summary["seconds"] = time.monotonic() - begun
+    text = json.dumps(_plain(summary), indent=1)
+    files.write_atomically(folder / "summary.json", text.encode())
+    write_page(folder, summary, learned, measures, system, list(figures))
+    return Design(folder, learned.policy, measures, learned, tuple(tips), summary)
+
+
+def checked_folder(out: str | Path) -> Path:
+    """Return a folder into which files can be written; it need not exist yet.
+
+    Raises:
+        FileNotFoundError: there is no folder to make it in.
+        NotADirectoryError: it is a file.
+        OSError: it cannot be written.
+    """
+    folder = validation.path("out", out)
+    if folder.exists() and not folder.is_dir():
+        raise NotADirectoryError(
+            f"{folder} is a file; give the name of a folder, new or old."
+        )
+    target = folder / "summary.json" if folder.exists() else folder
+    files.checked_target(target, "give a folder elsewhere")
+    return folder
+
+
+def _starts(system: Plant, count: int, seed: int, stream: int) -> FloatArray:
+    """Random starts, `(count, state_size)`, others for each number of the stream."""
+    rng = np.random.default_rng([seed, stream])
+    return np.ascontiguousarray(system.sample_states(rng, count).T)
+
+
+def _robustness(
+    policy: TablePolicy, env: ControlVectorEnv, starts: FloatArray, seed: int
+) -> dict[str, Any] | None:
+    """Nominal and worst cost over the uncertain parameters; None where none are."""
+    parameters = getattr(env.system, "parameters", None)
+    if not getattr(parameters, "count", 0):
+        return None
+    module = import_module("acl_gym.evaluation.robustness")
+    found = module.evaluate_over_range(
+        policy, env, draws=PLANTS, seed=seed, states=starts[:CHOOSING]
+    )
+    return {
+        "plants": len(found.costs),
+        "nominal_cost": found.nominal.cost,
+        "nominal_success_rate": found.nominal.success_rate,
+        "worst_cost": found.worst.cost,
+        "worst_success_rate": found.worst.success_rate,
+        "worst_parameters": found.worst_parameters,
+        "lowest_success_rate": float(np.min(found.success_rates)),
+        "median_cost": float(np.median(found.costs)),
+        "ranges": {n: list(map(float, e)) for n, e in parameters.uncertain.items()},
+    }
+
+
+def _draw(
+    learned: Learned, responses: Responses, env: ControlVectorEnv, system: Plant
+) -> dict[str, Any]:
+    shown = [responses.one(typical(responses)), responses.one(worst(responses))]
+    return {
+        "policy": pictures.draw_policy(learned.policy, env, system),
+        "trajectories": pictures.draw_responses(
+            shown, ["typical start", "worst start"], env
+        ),
+        "starts": pictures.draw_starts(responses, learned.policy, env),
+        "learning": pictures.draw_learning(learned),
+    }
+
+
+def _command(
+    command: str | None, source: Path | None, folder: Path, seed: int, learned: Learned
+) -> str:
+    """What gives the same controller again, on any machine."""
+    steps = learned.interactions
+    if command is not None:
+        return f"{command} --seed {seed} --steps {steps}"
+    what = "plant" if source is None else repr(str(source))
+    return f"design({what}, {str(folder)!r}, seed={seed}, steps={steps}, seconds=None)"
+
+
+def _facts(policy: TablePolicy, folder: Path) -> dict[str, Any]:
+    """How large a controller is."""
+    header = (folder / "policy.h").read_text()
+    about = header[: header.index("*/")]
+    return {
+        "partition": repr(policy.partition),
+        "cells": policy.partition.n_cells,
+        "actions": policy.n_actions,
+        "about": about.removeprefix("/* ").replace("\n *", "\n").strip(),
+    }
+
+
+def _plain(value: Any) -> Any:
+    """Numbers that JSON knows: what is not finite becomes None."""
+    if isinstance(value, dict):
+        return {name: _plain(each) for name, each in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(each) for each in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value

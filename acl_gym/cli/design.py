@@ -77,7 +77,7 @@ class DesignCommand(Command):
 
 def example(name: str) -> str:
     """The text of an example."""
-    return _example_file(name).read_text(encoding="utf-8")
+    return str(_example_file(name).read_text(encoding="utf-8"))
 
 
 def design(

@@ -82,7 +82,7 @@ def measure(responses: Responses, plant: Plant) -> Measures:
     step, inside = plant.sampling_time, responses.inside
     to_goal, success = responses.steps_to_goal(), responses.success()
     costs = responses.episode_costs()
-    settled = inside[-_last_quarter(responses) :].all(axis=0)
+    settled = np.asarray(inside[-_last_quarter(responses) :].all(axis=0))
     outside = ~inside
     # The step after the last one that ends outside the goal.
     last_outside = len(inside) - outside[::-1].argmax(axis=0)
@@ -139,7 +139,7 @@ def distances(states: FloatArray, plant: Plant) -> FloatArray | None:
     box = plant.goal_box
     if box is None or not np.isfinite(box).all():
         return None
-    error = states - box.mean(axis=0)
+    error: FloatArray = states - box.mean(axis=0)
     for axis, period in enumerate(periods(plant)):
         if period is not None:
             error[..., axis] -= period * np.round(error[..., axis] / period)

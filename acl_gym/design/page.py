@@ -110,8 +110,8 @@ def _by_variable(spreads: dict[str, Spread]) -> list[tuple[str, list[str]]]:
     return [(name, _cells(spread)) for name, spread in spreads.items()]
 
 
-def _variables(plant: Plant) -> list[tuple[str, str, str, str]]:
-    """Name, range, goal and whether it is circular, of each variable."""
+def _variables(plant: Plant) -> list[tuple[str, str, str]]:
+    """Name, range and goal of each variable."""
     box = plant.goal_box
     rows = []
     for axis, name in enumerate(plant.signals.observations):
@@ -119,7 +119,9 @@ def _variables(plant: Plant) -> list[tuple[str, str, str, str]]:
         if box is not None:
             goal = f"{digits(box[0, axis])} to {digits(box[1, axis])}"
         ends = f"{digits(plant.low[axis])} to {digits(plant.high[axis])}"
-        rows.append((name, ends, goal, "yes" if axis in plant.circular else ""))
+        if axis in plant.circular:
+            ends += ", round"
+        rows.append((name, ends, goal))
     return rows
 
 

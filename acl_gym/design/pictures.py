@@ -37,10 +37,10 @@ def draw_policy(policy: TablePolicy, env: ControlVectorEnv, plant: Plant) -> Fig
     """
     size = plant.low.size
     if size <= 2:
-        figure: Any = plot_policy(policy, env=env).figure
-        for ax in figure.axes[:1]:
-            _mark_goal(ax, plant, tuple(range(size)))
-        return figure
+        ax: Any = plot_policy(policy, env=env)
+        _mark_goal(ax, plant, tuple(range(size)))
+        whole: Figure = ax.figure
+        return whole
     shown = most_divided(policy)
     others = [axis for axis in range(size) if axis not in shown]
     values = [_levels(plant, axis, few=i < 2) for i, axis in enumerate(others)]

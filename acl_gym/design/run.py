@@ -250,7 +250,7 @@ def _robustness(
     policy: TablePolicy, env: ControlVectorEnv, starts: FloatArray, seed: int
 ) -> dict[str, Any] | None:
     """Nominal and worst cost over the uncertain parameters; None where none are."""
-    parameters = getattr(env.system, "parameters", None)
+    parameters: Any = getattr(env.system, "parameters", None)
     if not getattr(parameters, "count", 0):
         return None
     module = import_module("acl_gym.evaluation.robustness")

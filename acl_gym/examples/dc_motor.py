@@ -7,6 +7,7 @@ state of its own; dry friction is smoothed, so that it has no jump at standstill
 """
 
 import numpy as np
+from gymnasium.spaces import Box
 
 import acl_gym
 
@@ -28,8 +29,9 @@ def motor(x, u):
 
 env = acl_gym.plant(
     motor,
-    low=[-np.pi, -20.0],  # rad, rad/s
-    high=[np.pi, 20.0],
+    low=[-4.0, -20.0],  # rad, rad/s: what is ever met
+    high=[4.0, 20.0],
+    initial=Box(np.array([-np.pi, -5.0]), np.array([np.pi, 5.0]), dtype=float),
     inputs=[-12.0, -3.0, 0.0, 3.0, 12.0],  # V
     sampling_time=0.02,  # s
     goal=[0.0, 0.0],

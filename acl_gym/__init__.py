@@ -42,11 +42,18 @@ if TYPE_CHECKING:
     )
     from acl_gym.deposits import Deposit, FunctionDeposit, InverseCost, Rank, Return
     from acl_gym.envs.graph.cities import TravellingSalesmanInstance
+    from acl_gym.envs.learned import LearnedVectorEnv, Transitions
     from acl_gym.envs.plant import plant
+    from acl_gym.envs.wrappers.changing import ChangingVectorEnv, Drift, Jump
     from acl_gym.envs.wrappers.scaling import ScaledObservation, ScaledVectorObservation
     from acl_gym.envs.wrappers.waiting import WaitingVectorEnv
     from acl_gym.envs.wrappers.workers import WorkersVectorEnv
-    from acl_gym.evaluation import PolicyCost, evaluate_policy_cost
+    from acl_gym.evaluation import (
+        PolicyCost,
+        Robustness,
+        evaluate_over_range,
+        evaluate_policy_cost,
+    )
     from acl_gym.partitions import Crisp, Discrete, Fuzzy, Partition
     from acl_gym.partitions.automatic import automatic_partition
     from acl_gym.planning.q_iteration import fuzzy_q_iteration
@@ -66,12 +73,14 @@ _PUBLIC = {
     "AntSystem": "acl_gym.agents.ant_system",
     "CSVLog": "acl_gym.callbacks",
     "Callback": "acl_gym.callbacks",
+    "ChangingVectorEnv": "acl_gym.envs.wrappers.changing",
     "Checkpoint": "acl_gym.callbacks",
     "Constant": "acl_gym.costs",
     "Cost": "acl_gym.costs",
     "Crisp": "acl_gym.partitions",
     "Deposit": "acl_gym.deposits",
     "Discrete": "acl_gym.partitions",
+    "Drift": "acl_gym.envs.wrappers.changing",
     "EarlyStop": "acl_gym.callbacks",
     "Exponential": "acl_gym.schedules",
     "FunctionCost": "acl_gym.costs",
@@ -79,6 +88,8 @@ _PUBLIC = {
     "Fuzzy": "acl_gym.partitions",
     "Harmonic": "acl_gym.schedules",
     "InverseCost": "acl_gym.deposits",
+    "Jump": "acl_gym.envs.wrappers.changing",
+    "LearnedVectorEnv": "acl_gym.envs.learned",
     "Linear": "acl_gym.schedules",
     "MaxMinAntSystem": "acl_gym.agents.ant_system",
     "Overshoot": "acl_gym.costs",
@@ -93,6 +104,7 @@ _PUBLIC = {
     "Return": "acl_gym.deposits",
     "ReturningACL": "acl_gym.agents.returning",
     "RiseTime": "acl_gym.costs",
+    "Robustness": "acl_gym.evaluation",
     "ScaledObservation": "acl_gym.envs.wrappers",
     "ScaledVectorObservation": "acl_gym.envs.wrappers",
     "Schedule": "acl_gym.schedules",
@@ -102,6 +114,7 @@ _PUBLIC = {
     "Steps": "acl_gym.costs",
     "Sum": "acl_gym.costs",
     "TensorBoardLog": "acl_gym.callbacks",
+    "Transitions": "acl_gym.envs.learned",
     "TravellingSalesmanInstance": "acl_gym.envs.graph.cities",
     "UpdateRule": "acl_gym.colony.update_rule",
     "VectorEnvAdapter": "acl_gym.sb3.adapter",
@@ -109,6 +122,7 @@ _PUBLIC = {
     "Weighted": "acl_gym.costs",
     "WorkersVectorEnv": "acl_gym.envs.wrappers.workers",
     "automatic_partition": "acl_gym.partitions.automatic",
+    "evaluate_over_range": "acl_gym.evaluation",
     "evaluate_policy_cost": "acl_gym.evaluation",
     "fuzzy_q_iteration": "acl_gym.planning.q_iteration",
     "get_num_threads": "acl_gym.utils.threads",
@@ -123,12 +137,14 @@ __all__ = [
     "AntSystem",
     "CSVLog",
     "Callback",
+    "ChangingVectorEnv",
     "Checkpoint",
     "Constant",
     "Cost",
     "Crisp",
     "Deposit",
     "Discrete",
+    "Drift",
     "EarlyStop",
     "Exponential",
     "FunctionCost",
@@ -136,6 +152,8 @@ __all__ = [
     "Fuzzy",
     "Harmonic",
     "InverseCost",
+    "Jump",
+    "LearnedVectorEnv",
     "Linear",
     "MaxMinAntSystem",
     "Overshoot",
@@ -150,6 +168,7 @@ __all__ = [
     "Return",
     "ReturningACL",
     "RiseTime",
+    "Robustness",
     "ScaledObservation",
     "ScaledVectorObservation",
     "Schedule",
@@ -159,6 +178,7 @@ __all__ = [
     "Steps",
     "Sum",
     "TensorBoardLog",
+    "Transitions",
     "TravellingSalesmanInstance",
     "UpdateRule",
     "VectorEnvAdapter",
@@ -167,6 +187,7 @@ __all__ = [
     "WorkersVectorEnv",
     "__version__",
     "automatic_partition",
+    "evaluate_over_range",
     "evaluate_policy_cost",
     "fuzzy_q_iteration",
     "get_num_threads",

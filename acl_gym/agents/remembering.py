@@ -142,6 +142,23 @@ class RememberingAgent(TabularAgent):
         """How many steps are remembered."""
         return 0 if self._kept_memory is None else self._kept_memory.n_steps
 
+    def forget(self, keep: int = 0) -> None:
+        """Forget what was done, but for the newest; what was learned of it stays.
+
+        For a plant that has changed: remembered paths would pull levels back to what
+        they were.
+
+        Args:
+            keep: how many states are still remembered, >= 0; only whole paths are kept.
+
+        Raises:
+            ValueError: `keep` is negative.
+            TypeError: it is not an integer.
+        """
+        keep = validation.integer("keep", keep, at_least=0)
+        if self._kept_memory is not None:
+            self._kept_memory.forget(keep)
+
     def _remember(self, walk: Walk) -> IntArray:
         """Remember what was done, in a partition wide enough; the numbers of its paths."""
         if self.grows and isinstance(self.partition, Grid):

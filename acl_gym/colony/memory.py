@@ -120,7 +120,7 @@ class Memory:
         added, new = walk.rows()
         seen = new["seen"]
         size = len(seen)
-        self._forget(self.most - size)
+        self.forget(self.most - size)
         if not isinstance(self.partition, Grid):
             del new["seen"]
         rows = self._room(size, new)
@@ -299,7 +299,7 @@ class Memory:
         rows = self.reward[begin : self._used]
         self.largest_reward = float(max(-rows.min(initial=0.0), rows.max(initial=0.0)))
 
-    def _forget(self, most: int) -> None:
+    def forget(self, most: int) -> None:
         """Forget the oldest paths, until at most so many states are left."""
         sizes = self.last - self.first + 1
         newer = np.cumsum(sizes[::-1])[::-1]  # states of each path and all after it

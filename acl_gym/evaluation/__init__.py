@@ -7,6 +7,7 @@ from acl_gym.evaluation.policy_cost import (
     reports_returns,
 )
 from acl_gym.evaluation.predictions import require_predictor
+from acl_gym.evaluation.robustness import Robustness, evaluate_over_range
 from acl_gym.evaluation.slots import control_env, with_slots_for
 from acl_gym.evaluation.trajectory import Trajectory, actions_in, record_trajectory
 from acl_gym.utils.typing import Predictor
@@ -14,9 +15,11 @@ from acl_gym.utils.typing import Predictor
 __all__ = [
     "PolicyCost",
     "Predictor",
+    "Robustness",
     "Trajectory",
     "actions_in",
     "control_env",
+    "evaluate_over_range",
     "evaluate_policy_cost",
     "policy_measures",
     "record_trajectory",

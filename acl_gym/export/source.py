@@ -11,7 +11,7 @@ import numpy as np
 from acl_gym.colony.greedy import greedy_actions
 from acl_gym.envs.control.signals import Signals
 from acl_gym.partitions import Discrete, Grid, Partition
-from acl_gym.partitions.angles import Angles
+from acl_gym.utils.angles import Angles
 from acl_gym.utils.typing import FloatArray, IntArray, RankArray
 
 

@@ -10,7 +10,6 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import ArrayLike, NDArray
 
-from acl_gym.partitions.angles import Angles, periods_with_angles
 from acl_gym.partitions.axes import (
     check_spans,
     checked_centres,
@@ -27,6 +26,7 @@ from acl_gym.partitions.base import (
 )
 from acl_gym.partitions.kernels import OUTSIDE, Axes, locate, locate_in_parallel
 from acl_gym.utils import threads, validation
+from acl_gym.utils.angles import Angles, periods_with_angles
 from acl_gym.utils.typing import BoolArray, CellArray, FloatArray, IntArray
 
 _FLOAT = np.dtype(np.float64)

@@ -13,13 +13,13 @@ from gymnasium import spaces
 from numpy.typing import ArrayLike
 
 from acl_gym.envs.control.lookup import system_of
-from acl_gym.partitions.angles import find_angles
 from acl_gym.partitions.automatic import centres_for
 from acl_gym.partitions.base import Partition, locate_all
 from acl_gym.partitions.bounds import Env, observation_space, real_box
 from acl_gym.partitions.discrete import FINITE_SPACES, Discrete
 from acl_gym.partitions.grid import Fuzzy, Grid
 from acl_gym.utils import validation
+from acl_gym.utils.angles import find_angles
 from acl_gym.utils.boxes import declared_bounds
 from acl_gym.utils.typing import FloatArray
 
@@ -93,7 +93,7 @@ def widened(
     """Return the grid over the range that is seen, where that is wider than its own.
 
     While nothing is known of the range of variables, those that turn out to be cosine and
-    sine of an angle become one circular variable (`acl_gym.partitions.angles`).
+    sine of an angle become one circular variable (`acl_gym.utils.angles`).
 
     The centres of a variable whose range changes are spread evenly over the new range,
     as many as before; a variable with one centre that is seen to vary gets as many as

@@ -133,7 +133,14 @@ class Subject:
         return values
 
     def values(self, observations: FloatArray) -> FloatArray:
-        """The values of the variables in some observations, each `(n, d)`."""
+        """The values of the variables in some observations, each `(n, d)`.
+
+        These may be states of a plant, with parameters after what is observed.
+        """
+        if self.system is not None and not self.system.fully_observed:
+            space = self.system.observation_space
+            if isinstance(space, spaces.Box):
+                observations = observations[:, : space.shape[0]]
         if not isinstance(self.partition, Grid):
             return observations
         values: FloatArray = self.partition.variables(observations)

@@ -1,4 +1,4 @@
-"""Agents as files: NumPy arrays and JSON in one `.npz`, read without pickle.
+"""Agents and recordings as files: NumPy arrays and JSON in one `.npz`, read without pickle.
 
 An untrusted file cannot run code, for arrays are read without pickle and everything
 else is JSON. Nor can it fill the memory: of its arrays only those are read that are
@@ -24,7 +24,9 @@ from numpy.typing import NDArray
 from acl_gym.utils import validation
 from acl_gym.utils.files import checked_target, with_suffix, write_atomically
 
-FORMAT = "acl-gym agent"
+AGENT, TRANSITIONS = "agent", "transitions"
+"""What a file may hold."""
+
 VERSION = 1
 
 MOST_BYTES = 2**28
@@ -33,6 +35,9 @@ tables of 20 million (cell, action) pairs. An agent takes about five times as mu
 
 _BYTES_A_VALUE = 64
 """What a value in the JSON counts at least, being an object in memory."""
+
+_NAMED = {AGENT: "an agent", TRANSITIONS: "a file of transitions"}
+_AGAIN = {AGENT: "the agent", TRANSITIONS: "them"}
 
 _PART = 2**20
 _SUFFIX = ".npy"
@@ -49,7 +54,10 @@ Target = str | os.PathLike[str] | BinaryIO
 
 
 def save(
-    target: Target, header: dict[str, Any], arrays: dict[str, NDArray[Any]]
+    target: Target,
+    header: dict[str, Any],
+    arrays: dict[str, NDArray[Any]],
+    kind: str = AGENT,
 ) -> Any:
     """Write header and arrays in one atomic step, or into an open file.
 
@@ -58,6 +66,7 @@ def save(
             for writing in binary mode.
         header: JSON types.
         arrays: numbers and truth values.
+        kind: what they are, `AGENT` or `TRANSITIONS`.
 
     Returns:
         The path written; None for an open file.
@@ -67,7 +76,7 @@ def save(
         TypeError: `target` is neither a path nor a binary file.
     """
     path = None if _is_file("save to", target, "write") else with_suffix(target)  # type: ignore[arg-type]
-    text = json.dumps({"format": FORMAT, "version": VERSION, **header})
+    text = json.dumps({"format": f"acl-gym {kind}", "version": VERSION, **header})
     if path is not None:
         checked_target(path)
     buffer = io.BytesIO()
@@ -87,6 +96,7 @@ class Archive:
         source: the path, with or without `.npz`, or a file open for reading in binary
             mode.
         max_bytes: what the file may hold unpacked, as far as it is read.
+        kind: what it must hold, `AGENT` or `TRANSITIONS`.
 
     Attributes:
         name: what the file is called in messages.
@@ -100,25 +110,28 @@ class Archive:
             later version.
     """
 
-    def __init__(self, source: Target, max_bytes: int = MOST_BYTES) -> None:
+    def __init__(
+        self, source: Target, max_bytes: int = MOST_BYTES, kind: str = AGENT
+    ) -> None:
         self.name, content = _content(source, max_bytes)
         try:
             members = _Members(content, max_bytes)
             header = _json(members.pop_header(), max_bytes)
-            kind, number = header.get("format"), header.get("version")
+            form, number = header.get("format"), header.get("version")
         except TooLargeError as error:
             raise ValueError(f"{self.name} {error}") from error
         except Exception as error:
             # NumPy, zipfile, zlib and json raise a dozen kinds of errors, which all mean
             # the same here.
             raise ValueError(
-                f"{self.name} is not an agent saved by acl-gym, or is damaged "
-                f"({type(error).__name__}); save the agent again or use another copy."
+                f"{self.name} is not {_NAMED[kind]} saved by acl-gym, or is damaged "
+                f"({type(error).__name__}); save {_AGAIN[kind]} again or use another copy."
             ) from error
-        if kind != FORMAT or number != VERSION:
+        wanted = f"acl-gym {kind}"
+        if form != wanted or number != VERSION:
             raise ValueError(
-                f"{self.name} must be of format {FORMAT!r} version {VERSION}, got "
-                f"{kind!r:.50} version {number!r:.50}."
+                f"{self.name} must be of format {wanted!r} version {VERSION}, got "
+                f"{form!r:.50} version {number!r:.50}."
             )
         self.header: dict[str, Any] = header
         self.arrays = members

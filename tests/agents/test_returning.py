@@ -432,3 +432,25 @@ def test_what_cannot_be_reckoned_with_is_refused(
     with pytest.raises(ValueError, match=words) as caught:
         ReturningACL(env, seed=0).learn(trials=2)
     assert caught.value.__cause__ is None
+
+
+def test_what_is_forgotten_is_gone_and_what_was_learned_stays() -> None:
+    env = gym.make_vec("acl_gym/Pendulum-v0", num_envs=5)
+    colony = ReturningACL(env, seed=0).learn(total_timesteps=3_000)
+    before, remembered = colony.table.copy(), colony.remembered_steps
+    colony.forget(1_000)
+    assert 0 < colony.remembered_steps < 1_000 < remembered
+    colony.forget()
+    assert colony.remembered_steps == 0
+    assert not colony._memory.evidence.any()  # forgetting undoes adding exactly
+    np.testing.assert_array_equal(colony.table, before)
+    colony.learn(total_timesteps=600)
+    assert 0 < colony.remembered_steps <= 900  # whole trials
+    assert colony.num_timesteps > 3_000
+
+
+@pytest.mark.parametrize(("keep", "error"), [(-1, ValueError), (1.5, TypeError)])
+def test_no_other_number_is_kept(keep: Any, error: type[Exception]) -> None:
+    env = gym.make_vec("acl_gym/Pendulum-v0", num_envs=2)
+    with pytest.raises(error, match="keep must be"):
+        ReturningACL(env, seed=0).forget(keep)

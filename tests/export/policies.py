@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from acl_gym.partitions import Crisp, Fuzzy, Grid
-from acl_gym.partitions.angles import Angles
 from acl_gym.policies import TablePolicy
+from acl_gym.utils.angles import Angles
 
 
 def random_policy(

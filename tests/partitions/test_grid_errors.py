@@ -7,7 +7,7 @@ import pytest
 from gymnasium import spaces
 
 from acl_gym.partitions import Crisp, Fuzzy, partition_from_settings
-from acl_gym.partitions.angles import find_angles
+from acl_gym.utils.angles import find_angles
 
 NAN, INF = float("nan"), float("inf")
 REFUSED = (TypeError, ValueError)

@@ -231,6 +231,8 @@ def states_of_slots(
         return rows
     if rows.ndim == 1 and current.shape[1] == 1:
         rows = rows[:, None]
+    if rows.ndim == 2:  # a plant lets uncertain parameters be left out
+        current = current[:, : rows.shape[1]]
     if rows.shape != current.shape:
         return rows
     merged = current.copy()

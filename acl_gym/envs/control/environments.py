@@ -138,6 +138,45 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
         """The parameters and dynamics of the system."""
         return self._system
 
+    def system_with(self, **values: Any) -> tuple[ControlSystem, dict[str, Any]]:
+        """The system with other values of some parameters, and the arguments of it.
+
+        Args:
+            values: see `with_parameters`.
+
+        Raises:
+            TypeError: see `with_parameters`.
+            ValueError: a value is not valid.
+        """
+        arguments = self._arguments_with(values)
+        return made_system(self.system_type, arguments), arguments
+
+    def set_system(self, system: ControlSystem, arguments: dict[str, Any]) -> None:
+        """Go on with another system, from the states where the slots are.
+
+        Args:
+            system: of `system_with`.
+            arguments: its arguments.
+
+        Raises:
+            ValueError: what can be observed or done there differs.
+        """
+        for name in ("observation_space", "action_space"):
+            own, other = (getattr(each, name) for each in (self._system, system))
+            if own != other:
+                raise ValueError(
+                    f"the {name.replace('_', ' ')} must stay as it is, {own}, got "
+                    f"{other}; let other parameters change."
+                )
+        self._system, self.parameters = system, arguments
+        self._step_some = PartialStep(system, self.num_envs)
+        self._renderer.set_system(system)
+
+    @property
+    def num_walking(self) -> int:
+        """How many slots the next step moves; it resets the others, or they wait."""
+        return self._num_envs if self._walking is None else self._walking.size
+
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observation, dict[str, Any]]:
@@ -320,12 +359,36 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
         Its random numbers continue a copy of this environment's stream, if that was
         seeded.
         """
+        return self._made_anew(num_envs, self.parameters)
+
+    def with_parameters(self, **values: Any) -> Self:
+        """Make a new environment in which some parameters of the system differ.
+
+        Args:
+            values: of the parameters by their names, see the class of the system; of a
+                plant, those that its dynamics takes. A parameter that was uncertain is
+                known there.
+
+        Returns:
+            An environment with the same number of slots, see `with_slots`.
+
+        Raises:
+            TypeError: there is no parameter of that name, or a value has a wrong type.
+            ValueError: a value is not valid.
+        """
+        return self._made_anew(self.num_envs, self._arguments_with(values))
+
+    def _arguments_with(self, values: dict[str, Any]) -> dict[str, Any]:
+        """The arguments of the system if some of its parameters have other values."""
+        return {**self.parameters, **values}
+
+    def _made_anew(self, num_envs: int, parameters: dict[str, Any]) -> Self:
         made = type(self)(
             num_envs,
             max_episode_steps=self.max_episode_steps,
             autoreset_mode=self.autoreset_mode,
             render_mode=self.render_mode,
-            **self.parameters,
+            **parameters,
         )
         made._np_random = copy.deepcopy(self._np_random)
         made._np_random_seed = self._np_random_seed

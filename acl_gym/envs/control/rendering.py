@@ -116,6 +116,11 @@ class Renderer:
             ) from error
         return pygame
 
+    def set_system(self, system: ControlSystem) -> None:
+        """Draw another system of the same kind from now on, and the same table."""
+        self._system = system
+        self.__dict__.pop("_painter", None)
+
     def show_table(self, table: FloatArray | None) -> None:
         """Draw `table` over the frames from now on; see `ControlEnv.show_table`."""
         if table is not None:

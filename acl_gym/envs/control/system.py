@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from dataclasses import fields, is_dataclass
+from difflib import get_close_matches
 from typing import Any, ClassVar
 
 import numpy as np
@@ -74,6 +76,26 @@ class ControlSystem(ABC):
     def signals(self) -> Signals | None:
         """Names of observations and inputs, and the inputs of each action, if known."""
         return None
+
+    def parameter(self, name: str) -> float:
+        """The value of a parameter that is a real number.
+
+        Args:
+            name: of the parameter.
+
+        Raises:
+            TypeError: there is no parameter of that name, or it is not a real number.
+        """
+        known: tuple[Any, ...] = fields(self) if is_dataclass(self) else ()
+        numbers = [f.name for f in known if type(getattr(self, f.name)) is float]
+        if name not in numbers:
+            similar = get_close_matches(str(name), numbers, 1)
+            hint = f" Did you mean {similar[0]!r}?" if similar else ""
+            raise TypeError(
+                f"the parameters of {type(self).__name__} that are real numbers are "
+                f"{', '.join(numbers) or 'none'}, got {validation.shown(name)}.{hint}"
+            )
+        return float(getattr(self, name))
 
     @property
     @abstractmethod

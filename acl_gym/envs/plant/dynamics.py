@@ -7,12 +7,13 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from numba import types
+from numba import typeof, types
 from numba.core.dispatcher import Dispatcher
 from numba.core.errors import NumbaError
 
 from acl_gym.envs.plant import kernels
 from acl_gym.envs.plant.models import Model, is_model
+from acl_gym.envs.plant.uncertain import PlantParameters
 from acl_gym.utils import validation
 from acl_gym.utils.typing import FloatArray, IntArray
 
@@ -20,13 +21,14 @@ _SAMPLES = 7  # no usual number of variables, so that mixed-up axes are noticed
 
 
 class Equations:
-    """x' = f(x, u) or x(t+1) = f(x, u), for many states at once.
+    """x' = f(x, u, p) or x(t+1) = f(x, u, p), for many states at once.
 
     Args:
         dynamics: see `plant`.
         samples: states to try it on, `(state_size, n)`.
         inputs: `(n_actions, n_inputs)`.
         discrete_time: whether it gives the next state.
+        parameters: p. Where there are none, the dynamics is a function of x and u.
 
     Raises:
         TypeError: `dynamics` cannot be called.
@@ -39,12 +41,17 @@ class Equations:
         samples: FloatArray,
         inputs: FloatArray,
         discrete_time: bool,
+        parameters: PlantParameters,
     ) -> None:
         self._dynamics = dynamics
         self._discrete_time = discrete_time
+        self._parameters = parameters
         self._compiled: kernels.Advance | None = None
+        drawn = parameters.draw(np.random.default_rng(1), samples.shape[1])
         if is_model(dynamics):
-            self._dynamics = _checked_model(dynamics, samples, inputs)
+            self._dynamics = _checked_model(
+                dynamics, samples, inputs, parameters, drawn
+            )
         elif hasattr(dynamics, "ninputs"):
             raise TypeError(
                 "dynamics must be a python-control system with a state, got "
@@ -52,13 +59,14 @@ class Equations:
             )
         elif not callable(dynamics):
             raise TypeError(
-                "dynamics must be a function of (x, u) or a python-control system, "
+                f"dynamics must be a function of {_arguments(parameters.names)} or a "
+                "python-control system, "
                 f"got {validation.shown(dynamics)}."
             )
         elif isinstance(dynamics, Dispatcher):
-            self._check_compiled(samples, inputs)
+            self._check_compiled(samples, inputs, drawn)
         else:
-            _check(dynamics, samples, inputs)
+            _check(dynamics, samples, inputs, parameters, drawn)
 
     def __getstate__(self) -> dict[str, Any]:
         """A kernel is compiled again in each process."""
@@ -71,13 +79,18 @@ class Equations:
         inputs: FloatArray,
         step: float,
         substeps: int,
+        own: FloatArray,
     ) -> int:
         """Advance states in place; see `kernels.Advance`."""
+        parameters = self._parameters
         if isinstance(self._dynamics, Dispatcher):
             if self._compiled is None:
                 self._compiled = self._compile(states, inputs)
-            return self._compiled(states, actions, inputs, step, substeps)
-        f, u = self._dynamics, inputs.T[:, actions]
+            return self._compiled(
+                *(states, actions, inputs, step, substeps),
+                *(parameters.nominal, parameters.drawn, own),
+            )
+        f, u = _bound(self._dynamics, parameters, own), inputs.T[:, actions]
         u.setflags(write=False)
         # What is not finite is an error of its own; no need to warn of it as well.
         with np.errstate(all="ignore"):
@@ -101,27 +114,36 @@ class Equations:
         return int(np.argmin(good))
 
     def _compile(self, states: FloatArray, inputs: FloatArray) -> kernels.Advance:
-        given = self._dynamics(states[:, 0].copy(), inputs[0].copy())
+        known = self._parameters
+        p = [known.of(known.nominal_drawn)] if known.names else []
+        given = self._dynamics(states[:, 0].copy(), inputs[0].copy(), *p)
         put = kernels.put_sequence
         if isinstance(given, tuple):
             put = kernels.put_tuple
+        dynamics = kernels.with_parameters(self._dynamics, known.names)
         if self._discrete_time:
-            return kernels.advance_map(self._dynamics, len(states), put)
-        writes = _may_write(self._dynamics)
-        return kernels.advance_ode(self._dynamics, len(states), put, writes)
+            return kernels.advance_map(dynamics, len(states), put)
+        writes = _may_write(self._dynamics, p)
+        return kernels.advance_ode(dynamics, len(states), put, writes)
 
-    def _check_compiled(self, samples: FloatArray, inputs: FloatArray) -> None:
+    def _check_compiled(
+        self, samples: FloatArray, inputs: FloatArray, drawn: FloatArray
+    ) -> None:
         """Check a function that takes one state after the other."""
-        size = len(samples)
+        size, known = len(samples), self._parameters
+        named = ""
+        if known.names:
+            named = f", and parameters p with numbers such as p.{known.names[0]}"
         expects = (
             f"dynamics compiled by Numba must take a state x of shape ({size},) and an "
-            f"input u of shape ({inputs.shape[1]},), and return {size} finite numbers, "
-            "such as (x[1], -x[0] + u[0])"
+            f"input u of shape ({inputs.shape[1]},){named}, and return {size} finite "
+            "numbers, such as (x[1], -x[0] + u[0])"
         )
         for j, x in enumerate(np.ascontiguousarray(samples.T)):
             u = inputs[j % len(inputs)]
+            p = [known.of(drawn[:, j])] if known.names else []
             try:
-                given = self._dynamics(x.copy(), u.copy())
+                given = self._dynamics(x.copy(), u.copy(), *p)
                 values = np.asarray(given, dtype=np.float64)
             except (
                 NumbaError,
@@ -134,14 +156,16 @@ class Equations:
                     f"{expects}; it failed: {_first_line(error)}"
                 ) from error
             if values.shape != (size,) or not np.isfinite(values).all():
-                raise ValueError(
-                    f"{expects}, got "
-                    f"{validation.shown(given)} for x = {x.tolist()}, u = {u.tolist()}."
-                )
+                at = f"x = {x.tolist()}, u = {u.tolist()}"
+                at += f", p = {p[0]}" if p else ""
+                raise ValueError(f"{expects}, got {validation.shown(given)} for {at}.")
         try:
             self._compiled = self._compile(samples, inputs)
             actions = np.zeros(1, dtype=np.int64)
-            self._compiled(samples[:, :1].copy(), actions, inputs, 0.0, 1)
+            self._compiled(
+                *(samples[:, :1].copy(), actions, inputs, 0.0, 1),
+                *(known.nominal, known.drawn, drawn[:, :1].copy()),
+            )
         except NumbaError as error:
             raise ValueError(f"{expects}; it failed: {_first_line(error)}") from error
 
@@ -151,21 +175,36 @@ def sample_count() -> int:
     return _SAMPLES
 
 
-def _may_write(dynamics: Dispatcher) -> bool:
+def _bound(
+    dynamics: Any, parameters: PlantParameters, drawn: FloatArray
+) -> Callable[[FloatArray, FloatArray], Any]:
+    """f(x, u) of plants with these parameters, `(m, n)`."""
+    if not parameters.names:
+        return dynamics  # type: ignore[no-any-return]
+    p = parameters.of(drawn)
+    return lambda x, u: dynamics(x, u, p)
+
+
+def _arguments(names: tuple[str, ...]) -> str:
+    return "(x, u, p)" if names else "(x, u)"
+
+
+def _may_write(dynamics: Dispatcher, parameters: list[Any]) -> bool:
     """Whether a compiled function may write to its arguments: read-only ones tell."""
     read_only = types.Array(types.float64, 1, "C", readonly=True)
     try:
-        dynamics.compile((read_only, read_only))
+        dynamics.compile((read_only, read_only, *map(typeof, parameters)))
     except (NumbaError, RuntimeError):  # the latter where its types are fixed
         return True
     return False
 
 
-def _expects(size: int, n_inputs: int) -> str:
+def _expects(size: int, n_inputs: int, names: tuple[str, ...] = ()) -> str:
+    named = f", and parameters p, such as p.{names[0]} of all n," if names else ""
     return (
         f"dynamics must take states x of shape ({size}, n) and inputs u of shape "
-        f"({n_inputs}, n), so that x[0] is the first variable of all n states, and return "
-        f"{size} rows of n numbers, such as [x[1], -np.sin(x[0]) + u[0]]"
+        f"({n_inputs}, n), so that x[0] is the first variable of all n states,{named} "
+        f"and return {size} rows of n numbers, such as [x[1], -np.sin(x[0]) + u[0]]"
     )
 
 
@@ -213,8 +252,12 @@ def _evaluated(dynamics: Any, x: FloatArray, u: FloatArray) -> FloatArray:
 
 
 def _checked_model(
-    system: Any, samples: FloatArray, inputs: FloatArray
-) -> Callable[[FloatArray, FloatArray], Any]:
+    system: Any,
+    samples: FloatArray,
+    inputs: FloatArray,
+    parameters: PlantParameters,
+    drawn: FloatArray,
+) -> Model:
     """A python-control system as a function; one by one if it takes no arrays."""
     size, n_inputs = system.nstates, system.ninputs
     if (size, n_inputs) != (len(samples), inputs.shape[1]):
@@ -224,14 +267,16 @@ def _checked_model(
             f"{inputs.shape[1]} inputs."
         )
     model = Model(system)
+    model.check_names(parameters.names)
     try:
-        _check(model, samples, inputs)
+        _check(model, samples, inputs, parameters, drawn)
     except ValueError:
         model = Model(system, one_by_one=True)
-        _check(model, samples, inputs)
+        _check(model, samples, inputs, parameters, drawn)
     u = _inputs_for(samples, inputs)
     now, later = (
-        _evaluated(partial(model.at, time), samples, u) for time in (0.0, 17.3)
+        _evaluated(_bound(partial(model.at, time), parameters, drawn), samples, u)
+        for time in (0.0, 17.3)
     )
     if not np.array_equal(now, later):
         raise ValueError(
@@ -245,25 +290,36 @@ def _inputs_for(samples: FloatArray, inputs: FloatArray) -> FloatArray:
     return inputs.T[:, np.arange(samples.shape[1]) % len(inputs)]
 
 
-def _check(dynamics: Any, samples: FloatArray, inputs: FloatArray) -> None:
+def _check(
+    dynamics: Any,
+    samples: FloatArray,
+    inputs: FloatArray,
+    parameters: PlantParameters,
+    drawn: FloatArray,
+) -> None:
     """Check a function of many states on samples, together and one by one."""
-    count = samples.shape[1]
+    count, names = samples.shape[1], parameters.names
     u = _inputs_for(samples, inputs)
-    together = _tried(dynamics, samples, u)
+    together = _tried(_bound(dynamics, parameters, drawn), samples, u, names)
     for j in range(count):
-        alone = _tried(dynamics, samples[:, j : j + 1], u[:, j : j + 1])
+        one = slice(j, j + 1)
+        by_itself = _bound(dynamics, parameters, drawn[:, one])
+        alone = _tried(by_itself, samples[:, one], u[:, one], names)
         if not np.allclose(alone[:, 0], together[:, j], rtol=1e-9, atol=1e-12):
+            of = "x, u and p" if names else "x and u"
             raise ValueError(
-                "dynamics must treat each column of x and u by itself, and the same "
+                f"dynamics must treat each column of {of} by itself, and the same "
                 f"each time; for x = {samples[:, j].tolist()}, u = {u[:, j].tolist()} "
                 f"it gave {together[:, j].tolist()} among {count} columns and "
                 f"{alone[:, 0].tolist()} alone."
             )
 
 
-def _tried(dynamics: Any, x: FloatArray, u: FloatArray) -> FloatArray:
+def _tried(
+    dynamics: Any, x: FloatArray, u: FloatArray, names: tuple[str, ...]
+) -> FloatArray:
     size, count = x.shape
-    expects = _expects(size, len(u))
+    expects = _expects(size, len(u), names)
     x, u = x.copy(), u.copy()
     x.flags.writeable = u.flags.writeable = False
     try:
@@ -275,6 +331,8 @@ def _tried(dynamics: Any, x: FloatArray, u: FloatArray) -> FloatArray:
             hint = "; np.where chooses for each state where `if` cannot"
         if "read-only" in str(error):
             hint = "; it must not change x and u"
+        if not names and "required positional argument" in str(error):
+            hint = "; a third argument needs parameters= or uncertain="
         raise ValueError(
             f"{expects}; for {count} states it raised {_first_line(error)}{hint}"
         ) from error

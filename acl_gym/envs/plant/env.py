@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from gymnasium.vector import AutoresetMode
@@ -11,6 +11,7 @@ from gymnasium.wrappers import TimeLimit
 from acl_gym.envs.control.environments import ControlVectorEnv
 from acl_gym.envs.control.single import ControlEnv
 from acl_gym.envs.plant.system import Plant
+from acl_gym.envs.plant.uncertain import PlantParameters
 from acl_gym.utils import validation
 
 _PAINTER = "acl_gym.envs.plant.painter:PlantPainter"
@@ -28,6 +29,15 @@ class PlantVectorEnv(ControlVectorEnv):
 
     system_type = Plant
     painter = _PAINTER
+
+    def _arguments_with(self, values: dict[str, Any]) -> dict[str, Any]:
+        known: PlantParameters = self.system.parameters  # type: ignore[attr-defined]
+        for name in values:
+            known.value_of(name)  # which must exist
+        named = dict(zip(known.names, known.nominal.tolist(), strict=True))
+        kept = {n: ends for n, ends in known.uncertain.items() if n not in values}
+        named.update(values)
+        return {**self.parameters, "parameters": named, "uncertain": kept}
 
 
 def plant(
@@ -49,6 +59,8 @@ def plant(
     evaluation_states: Any = None,
     state_names: Sequence[str] | None = None,
     input_names: Sequence[str] | None = None,
+    parameters: Mapping[str, float] | None = None,
+    uncertain: Mapping[str, tuple[float, float]] | None = None,
     autoreset_mode: str | AutoresetMode | None = None,
     render_mode: str | None = None,
 ) -> Any:
@@ -125,6 +137,16 @@ def plant(
             100 initial states once, the same each time.
         state_names: of the variables, with units, for exported policies.
         input_names: of the inputs.
+        parameters: numbers that `dynamics` takes by name, such as `{"mass": 0.1}`. It is
+            then a function of x, u and p, and finds them as `p.mass`; a model of
+            python-control finds them in its params. `ChangingVectorEnv` lets them change.
+        uncertain: for some parameters the range (low, high) in which they are known to
+            lie. Each slot walks in a plant of its own, whose values are drawn uniformly
+            for each episode, so that one policy is learned for all of them. To a function
+            of n plants they are arrays `(n,)`. Nominally, as in evaluations, they have
+            the value in `parameters`, or the middle of the range. They are further
+            variables of a state, after the others, which are not observed; states that
+            are set may leave them out. `goal` and `cost` do not depend on them.
         autoreset_mode: of a vector environment, see `ControlVectorEnv`; None takes
             "NextStep".
         render_mode: "rgb_array", or "human" for a single environment: gauges of the
@@ -141,7 +163,7 @@ def plant(
             arrays of the wrong shape, or an argument is out of range.
     """
     steps = validation.integer("max_episode_steps", max_episode_steps, at_least=1)
-    parameters: dict[str, Any] = {
+    settings: dict[str, Any] = {
         "dynamics": dynamics,
         "low": low,
         "high": high,
@@ -158,6 +180,8 @@ def plant(
         "evaluation_steps": steps,
         "state_names": state_names,
         "input_names": input_names,
+        "parameters": parameters,
+        "uncertain": uncertain,
     }
     if num_envs is not None:
         return PlantVectorEnv(
@@ -165,11 +189,11 @@ def plant(
             max_episode_steps=steps,
             autoreset_mode=autoreset_mode or AutoresetMode.NEXT_STEP,
             render_mode=render_mode,
-            **parameters,
+            **settings,
         )
     if autoreset_mode is not None:
         raise ValueError(
             "autoreset_mode belongs to a vector environment, got "
             f"{autoreset_mode!r}; give num_envs as well, or leave it out."
         )
-    return TimeLimit(PlantEnv(render_mode, **parameters), steps)
+    return TimeLimit(PlantEnv(render_mode, **settings), steps)

@@ -3,19 +3,72 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import lru_cache
+from functools import cache, lru_cache
 from typing import Any
 
+import numba
 import numpy as np
 from numba import literal_unroll
 
+from acl_gym.envs.plant.uncertain import parameter_tuple
 from acl_gym.utils.compiling import njit
 from acl_gym.utils.typing import BoolArray, FloatArray, IntArray
 
-Advance = Callable[[FloatArray, IntArray, FloatArray, float, int], int]
+Advance = Callable[
+    [FloatArray, IntArray, FloatArray, float, int, FloatArray, IntArray, FloatArray],
+    int,
+]
 """Advances `states` `(state_size, n)` in place by `substeps` steps of `step` seconds with
-the inputs `inputs[actions]`; returns a slot whose next state is not finite, which keeps its
-state, or -1."""
+the inputs `inputs[actions]` and the parameters `nominal` `(k,)`, of which those at the
+indices `drawn` `(m,)` are a slot's own, `own` `(m, n)`; returns a slot whose next state is
+not finite, which keeps its state, or -1."""
+
+
+@lru_cache(maxsize=64)  # so that the kernels below, which depend on it, are shared too
+def with_parameters(dynamics: Any, names: tuple[str, ...]) -> Any:
+    """A compiled f(x, u, values) around a compiled f(x, u), or f(x, u, p) with names.
+
+    They are not cached on disk, where nothing could tell the types of two processes
+    apart.
+
+    Args:
+        dynamics: compiled by Numba.
+        names: of the parameters; `values` of the function returned holds theirs in this
+            order, `(k,)`.
+    """
+    if not names:
+
+        @numba.njit
+        def without(x: FloatArray, u: FloatArray, values: FloatArray) -> Any:
+            return dynamics(x, u)
+
+        return without
+    made, tuple_of = parameter_tuple(names), _first_entries(len(names))
+
+    @numba.njit
+    def by_name(x: FloatArray, u: FloatArray, values: FloatArray) -> Any:
+        return dynamics(x, u, made(*tuple_of(values)))
+
+    return by_name
+
+
+@cache
+def _first_entries(count: int) -> Any:
+    """A compiled function that makes a tuple of the first entries of an array."""
+    if count == 0:
+
+        @numba.njit
+        def none(values: FloatArray) -> Any:
+            return ()
+
+        return none
+    others = _first_entries(count - 1)
+
+    @numba.njit
+    def some(values: FloatArray) -> Any:
+        return (*others(values), values[count - 1])
+
+    return some
 
 
 @njit
@@ -44,8 +97,8 @@ def advance_ode(dynamics: Any, size: int, put: Any, writes: bool) -> Advance:
     """Fourth-order Runge-Kutta around a compiled x' = f(x, u), the input held constant.
 
     Args:
-        dynamics: compiled by Numba; takes the state `(size,)` and the input
-            `(n_inputs,)` of one slot.
+        dynamics: of `with_parameters`; takes the state `(size,)`, the input
+            `(n_inputs,)` and the parameters `(k,)` of one slot.
         size: the number of state variables.
         put: `put_tuple` or `put_sequence`, for what `dynamics` returns.
         writes: whether `dynamics` may write to its arguments. It then gets fresh copies
@@ -59,44 +112,50 @@ def advance_ode(dynamics: Any, size: int, put: Any, writes: bool) -> Advance:
         inputs: FloatArray,
         step: float,
         substeps: int,
+        nominal: FloatArray,
+        drawn: IntArray,
+        own: FloatArray,
     ) -> int:
         x, y = np.empty(size), np.empty(size)
         k1, k2, k3, k4 = np.empty(size), np.empty(size), np.empty(size), np.empty(size)
         n_inputs = inputs.shape[1]
-        own = np.empty(n_inputs)
+        copied = np.empty(n_inputs)
+        p = nominal.copy()
         bad = -1
         for slot in range(actions.size):
             action = actions[slot]
-            u = own if writes else inputs[action]
+            u = copied if writes else inputs[action]
             for i in range(size):
                 x[i] = states[i, slot]
+            for i in range(drawn.size):
+                p[drawn[i]] = own[i, slot]
             for _ in range(substeps):
                 if writes:
                     for i in range(size):
                         y[i] = x[i]
                     for i in range(n_inputs):
                         u[i] = inputs[action, i]
-                    put(dynamics(y, u), k1)
+                    put(dynamics(y, u, p), k1)
                 else:
-                    put(dynamics(x, u), k1)
+                    put(dynamics(x, u, p), k1)
                 for i in range(size):
                     y[i] = x[i] + 0.5 * step * k1[i]
                 if writes:
                     for i in range(n_inputs):
                         u[i] = inputs[action, i]
-                put(dynamics(y, u), k2)
+                put(dynamics(y, u, p), k2)
                 for i in range(size):
                     y[i] = x[i] + 0.5 * step * k2[i]
                 if writes:
                     for i in range(n_inputs):
                         u[i] = inputs[action, i]
-                put(dynamics(y, u), k3)
+                put(dynamics(y, u, p), k3)
                 for i in range(size):
                     y[i] = x[i] + step * k3[i]
                 if writes:
                     for i in range(n_inputs):
                         u[i] = inputs[action, i]
-                put(dynamics(y, u), k4)
+                put(dynamics(y, u, p), k4)
                 for i in range(size):
                     x[i] += step / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i])
             finite = True
@@ -123,16 +182,22 @@ def advance_map(dynamics: Any, size: int, put: Any) -> Advance:
         inputs: FloatArray,
         step: float,
         substeps: int,
+        nominal: FloatArray,
+        drawn: IntArray,
+        own: FloatArray,
     ) -> int:
         x, y = np.empty(size), np.empty(size)
         u = np.empty(inputs.shape[1])
+        p = nominal.copy()
         bad = -1
         for slot in range(actions.size):
             for i in range(size):
                 x[i] = states[i, slot]
+            for i in range(drawn.size):
+                p[drawn[i]] = own[i, slot]
             for i in range(u.size):
                 u[i] = inputs[actions[slot], i]
-            put(dynamics(x, u), y)
+            put(dynamics(x, u, p), y)
             finite = True
             for i in range(size):
                 finite &= np.isfinite(y[i])

@@ -41,19 +41,52 @@ class Model:
         self.state_names = tuple(map(str, system.state_labels))
         self.input_names = tuple(map(str, system.input_labels))
 
-    def __call__(self, x: FloatArray, u: FloatArray) -> Any:
-        """Evaluate `(state_size, n)` states with `(n_inputs, n)` inputs."""
-        return self.at(0.0, x, u)
+    def check_names(self, names: tuple[str, ...]) -> None:
+        """Check that the system has parameters of these names.
 
-    def at(self, time: float, x: FloatArray, u: FloatArray) -> Any:
+        Raises:
+            ValueError: it has not.
+        """
+        known = () if self._is_linear else tuple(getattr(self.system, "params", ()))
+        unknown = [name for name in names if name not in known]
+        if unknown:
+            remedy = "give it params={...} in control.nlsys"
+            if self._is_linear:
+                remedy = "make a control.nlsys with params={...} of it"
+            raise ValueError(
+                f"parameters and uncertain must be among the params {list(known)} of "
+                f"the system {self.system.name}, got {unknown[0]!r}; {remedy}."
+            )
+
+    @property
+    def _is_linear(self) -> bool:
+        return hasattr(self.system, "A") and hasattr(self.system, "B")
+
+    def __call__(self, x: FloatArray, u: FloatArray, p: Any = None) -> Any:
+        """Evaluate `(state_size, n)` states with `(n_inputs, n)` inputs.
+
+        Args:
+            x: the states.
+            u: the inputs.
+            p: parameters as a named tuple, which replace those of the system; None
+                leaves these.
+        """
+        return self.at(0.0, x, u, p)
+
+    def at(self, time: float, x: FloatArray, u: FloatArray, p: Any = None) -> Any:
         """The same at a time; a system that depends on it is refused."""
         system = self.system
+        own = {} if p is None else p._asdict()
         if self.one_by_one:
-            columns = [
-                np.asarray(system.dynamics(time, x[:, j], u[:, j]), dtype=np.float64)
-                for j in range(x.shape[1])
-            ]
+            columns = []
+            for j in range(x.shape[1]):
+                one = {
+                    name: np.atleast_1d(v)[j % np.size(v)] for name, v in own.items()
+                }
+                params = {**system.params, **one} if own else None
+                found = system.dynamics(time, x[:, j], u[:, j], params)
+                columns.append(np.asarray(found, dtype=np.float64))
             return np.stack(columns, axis=1)
-        if hasattr(system, "A") and hasattr(system, "B"):
+        if self._is_linear:
             return np.asarray(system.A) @ x + np.asarray(system.B) @ u
-        return system.updfcn(time, x, u, system.params)
+        return system.updfcn(time, x, u, {**system.params, **own})

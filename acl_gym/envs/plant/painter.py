@@ -25,6 +25,7 @@ class PlantPainter(Painter[Plant]):
         canvas.fill(_PAPER)
         system = self.system
         inputs = system.inputs
+        state = state[: system.low.size]  # without uncertain parameters
         gauges = state.size + inputs.shape[1]
         size = canvas.get_width()
         height = size / gauges

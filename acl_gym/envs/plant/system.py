@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -16,6 +16,7 @@ from acl_gym.envs.control.system import ControlSystem, SlotError
 from acl_gym.envs.plant import kernels, targets
 from acl_gym.envs.plant.dynamics import Equations, sample_count
 from acl_gym.envs.plant.models import Model, is_model
+from acl_gym.envs.plant.uncertain import PlantParameters
 from acl_gym.utils import validation
 from acl_gym.utils.typing import BoolArray, FloatArray, IntArray
 
@@ -25,6 +26,10 @@ _EVALUATED = 100  # states, as many as the pendulum has
 class Plant(ControlSystem):
     """A system of the user's own; the arguments are those of `acl_gym.plant`.
 
+    Uncertain parameters are further variables of the state, which stay as they were drawn
+    and are not observed. So a state that is set, remembered or sent to another process
+    takes its parameters with it.
+
     Args:
         evaluation_steps: T of an evaluation, `max_episode_steps` of `plant`.
 
@@ -32,10 +37,12 @@ class Plant(ControlSystem):
         low: lower ends of the variables, `(state_size,)`.
         high: upper ends.
         inputs: of each action, `(n_actions, n_inputs)`.
+        parameters: what the dynamics is given by name, and what is uncertain of it.
     """
 
     circular: tuple[int, ...]  # type: ignore[misc]
     evaluation_steps: int  # type: ignore[misc]
+    fully_observed: bool  # type: ignore[misc]
 
     def __init__(
         self,
@@ -56,8 +63,12 @@ class Plant(ControlSystem):
         evaluation_steps: int = 300,
         state_names: Sequence[str] | None = None,
         input_names: Sequence[str] | None = None,
+        parameters: Mapping[str, float] | None = None,
+        uncertain: Mapping[str, tuple[float, float]] | None = None,
     ) -> None:
         self.low, self.high = _bounds(low, high)
+        self.parameters = PlantParameters(parameters, uncertain)
+        self.fully_observed = self.parameters.count == 0
         self.inputs = _inputs(inputs)
         self.sampling_time = validation.number("sampling_time", sampling_time, above=0)
         self.substeps = validation.integer(
@@ -79,7 +90,9 @@ class Plant(ControlSystem):
             input_names = input_names or model.input_names
         self.discrete_time = bool(discrete_time)
         samples = self._draw(np.random.default_rng(0), sample_count())
-        self._equations = Equations(dynamics, samples, self.inputs, self.discrete_time)
+        self._equations = Equations(
+            dynamics, samples, self.inputs, self.discrete_time, self.parameters
+        )
         self._goal = targets.Goal(goal, tolerance, self.low, self.high, self._period)
         self._cost = targets.Cost(cost, self._goal, self.inputs, self.sampling_time)
         self._goal.check(samples)
@@ -100,7 +113,7 @@ class Plant(ControlSystem):
 
     @property
     def observation_space(self) -> spaces.Box:
-        """The state itself, within `low` and `high`, float64."""
+        """The state without its parameters, within `low` and `high`, float64."""
         return spaces.Box(self.low, self.high, dtype=np.float64)
 
     @property
@@ -117,6 +130,14 @@ class Plant(ControlSystem):
     def goal_box(self) -> FloatArray | None:
         """The lower and upper ends of the goal, `(2, state_size)`; None if it has none."""
         return self._goal.box
+
+    def parameter(self, name: str) -> float:
+        """The nominal value of a parameter of the dynamics.
+
+        Raises:
+            TypeError: the dynamics has no parameter of that name.
+        """
+        return self.parameters.value_of(name)
 
     @property
     def has_goal(self) -> bool:
@@ -138,9 +159,19 @@ class Plant(ControlSystem):
         return self._cost.largest(states)
 
     def sample_states(self, rng: np.random.Generator, count: int) -> FloatArray:
-        """Draw initial states; those drawn from a box lie outside the goal."""
+        """Draw initial states; those drawn from a box lie outside the goal.
+
+        Uncertain parameters are drawn with them, unless `initial` holds these too.
+        """
+        states = self._sample(rng, count)
+        if len(states) > self.low.size or not self.parameters.count:
+            return states
+        return np.concatenate([states, self.parameters.draw(rng, count)])
+
+    def _sample(self, rng: np.random.Generator, count: int) -> FloatArray:
+        """Initial states, with parameters only where `initial` holds them."""
         if callable(self._initial):
-            rows = self.checked_states(self._initial(rng, count))
+            rows = self._checked_rows(self._initial(rng, count))
             if len(rows) != count:
                 raise ValueError(
                     f"initial must return {count} states, one a row, got {len(rows)}."
@@ -156,16 +187,34 @@ class Plant(ControlSystem):
     def checked_states(self, states: Any) -> FloatArray:
         """Return states `(n, state_size)`, circular variables brought into X.
 
+        Rows may leave the uncertain parameters out; these then have their nominal values.
+
         Raises:
-            ValueError: wrong shape, not finite, or beyond `low` and `high`.
+            ValueError: wrong shape, not finite, or beyond `low` and `high`, or a
+                parameter is beyond its range.
         """
-        size = self.low.size
+        return self._with_nominal(self._checked_rows(states))
+
+    def _with_nominal(self, rows: FloatArray) -> FloatArray:
+        """States whose parameters have nominal values where there are none."""
+        if rows.shape[1] > self.low.size or not self.parameters.count:
+            return rows
+        own = np.tile(self.parameters.nominal_drawn, (len(rows), 1))
+        return np.concatenate([rows, own], axis=1)
+
+    def _checked_rows(self, states: Any) -> FloatArray:
+        """The states, checked, with parameters only where these are given."""
+        size, more = self.low.size, self.parameters.count
         array = validation.real_array("states", states, finite=False)
         if array.ndim == 1 and size == 1:
             array = array[:, None]
-        if array.ndim != 2 or array.shape[1] != size:
+        if array.ndim != 2 or array.shape[1] not in (size, size + more):
+            wider = ""
+            if more:
+                names = ", ".join(self.parameters.uncertain)
+                wider = f", or {size + more} with the uncertain parameters {names}"
             raise ValueError(
-                f"states must be rows of {size} variables, shape (n, {size}), got "
+                f"states must be rows of {size} variables, shape (n, {size}){wider}, got "
                 f"{array.shape}."
             )
         if not np.isfinite(array).all():
@@ -173,6 +222,9 @@ class Plant(ControlSystem):
             raise ValueError(
                 f"states must be finite, got {array[row].tolist()} in row {row}."
             )
+        array, own = array[:, :size], array[:, size:]
+        if own.size:
+            self.parameters.check_rows(own)
         outside = ((array < self.low) | (array > self.high)) & (self._period == 0)
         if outside.any():
             row, axis = np.argwhere(outside)[0]
@@ -183,7 +235,11 @@ class Plant(ControlSystem):
             )
         columns = np.ascontiguousarray(array.T)
         kernels.settle(columns, self.low, self.high, self._period)
-        return np.ascontiguousarray(columns.T)
+        return np.concatenate([columns.T, own], axis=1)
+
+    def observe(self, states: FloatArray) -> FloatArray:
+        """Return the variables without the parameters, a new array `(n, variables)`."""
+        return super().observe(states[: self.low.size])
 
     def advance(
         self,
@@ -199,12 +255,17 @@ class Plant(ControlSystem):
             SlotError: a next state or a cost is not finite.
         """
         step = self.sampling_time / self.substeps
-        bad = self._equations.advance(states, actions, self.inputs, step, self.substeps)
+        size = self.low.size
+        states, own = states[:size], states[size:]
+        bad = self._equations.advance(
+            states, actions, self.inputs, step, self.substeps, own
+        )
         if bad >= 0:
             raise SlotError(
                 "the dynamics gave no finite next state in slot <slot>, from the state "
                 f"{states[:, bad].tolist()} with the input "
-                f"{self.inputs[actions[bad]].tolist()}; use more substeps or a shorter "
+                f"{self.inputs[actions[bad]].tolist()}{self._shown_parameters(own, bad)}"
+                "; use more substeps or a shorter "
                 "sampling_time, or narrow low and high.",
                 bad,
             )
@@ -214,6 +275,11 @@ class Plant(ControlSystem):
     def evaluation_states(self) -> FloatArray:
         """The states given, or 100 initial ones drawn once, `(n, state_size)`."""
         return self._evaluation_states.copy()
+
+    def _shown_parameters(self, own: FloatArray, slot: int) -> str:
+        if not self.parameters.names:
+            return ""
+        return f" and {self.parameters.of(own[:, slot])}"
 
     def _check_time_of(self, model: Model) -> None:
         own = model.sampling_time
@@ -243,7 +309,9 @@ class Plant(ControlSystem):
             )
         elif initial is not None and not callable(initial):
             rows = validation.real_array("initial", initial)
-            return self.checked_states(rows[None] if rows.shape == (size,) else rows)
+            whole = (size + self.parameters.count,) if size > 1 else (size,)
+            one = rows.shape in ((size,), whole)
+            return self._checked_rows(rows[None] if one else rows)
         self._initial = initial
         if callable(initial) and not isinstance(initial, spaces.Box):
             self.sample_states(np.random.default_rng(0), 3)
@@ -258,9 +326,9 @@ class Plant(ControlSystem):
 
     def _default_evaluation_states(self) -> FloatArray:
         if isinstance(self._initial, np.ndarray) and len(self._initial) <= _EVALUATED:
-            return self._initial
-        rng = np.random.default_rng(0)
-        return np.ascontiguousarray(self.sample_states(rng, _EVALUATED).T)
+            return self._with_nominal(self._initial)
+        drawn = self._sample(np.random.default_rng(0), _EVALUATED)
+        return self._with_nominal(np.ascontiguousarray(drawn.T))
 
 
 def _bounds(low: Any, high: Any) -> tuple[FloatArray, FloatArray]:

@@ -68,3 +68,28 @@ def explosion(x: Any, u: Any) -> Any:
 @njit
 def compiled_explosion(x, u):  # type: ignore[no-untyped-def]
     return (np.inf if x[0] > 0.9 else u[0],)
+
+
+# The same pendulum with parameters: K_m 0.1, m 0.1 kg, D 0.01; J = 0.005, g l = 0.981.
+
+
+def pendulum_with(x: Any, u: Any, p: Any) -> Any:
+    push = p.gain * u[0] - 0.981 * p.mass * np.sin(x[0]) - p.damping * x[1]
+    return [x[1], push / 0.005]
+
+
+@njit
+def compiled_pendulum_with(x, u, p):  # type: ignore[no-untyped-def]
+    push = p.gain * u[0] - 0.981 * p.mass * math.sin(x[0]) - p.damping * x[1]
+    return x[1], push / 0.005
+
+
+KNOWN = {"gain": 0.1, "damping": 0.01}
+UNCERTAIN = {"mass": (0.08, 0.14), "damping": (0.008, 0.012)}
+
+
+def make_uncertain(**changes: Any) -> Any:
+    """Mass and damping are uncertain; nominally they are 0.11 and 0.01."""
+    settings = {**PENDULUM, "parameters": KNOWN, "uncertain": UNCERTAIN}
+    dynamics = changes.pop("dynamics", pendulum_with)
+    return acl_gym.plant(dynamics, **{**settings, **changes})

@@ -15,9 +15,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from acl_gym import Crisp, Fuzzy, ReturningACL, WaitingVectorEnv
-from acl_gym.partitions.angles import Angles, find_angles
 from acl_gym.partitions.growing import carried_over, initial_partition, widened
 from acl_gym.partitions.settings import partition_from_settings
+from acl_gym.utils.angles import Angles, find_angles
 
 CIRCLE = [0.0, math.pi / 2, math.pi, 3 * math.pi / 2]
 LINE = [-1.0, 0.0, 2.0]

@@ -1,0 +1,116 @@
+"""What speaks against learning from a recording."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from acl_gym.envs.learned.description import Description
+from acl_gym.utils.typing import FloatArray
+
+FEW = 10
+"""Steps for each variable and input, below which a recording is called short."""
+
+OFTEN_TWICE = 0.05
+"""The share of rows that may be there twice; a plant at rest repeats itself."""
+
+UNITS = {
+    180 / np.pi: "degrees instead of radians",
+    60.0: "minutes instead of seconds",
+    30 / np.pi: "revolutions per minute instead of radians per second",
+    1000.0: "thousandths",
+    100.0: "hundredths",
+}
+"""Factors between units that are often mixed up."""
+
+
+class DataWarning(UserWarning):
+    """Something speaks against learning from a recording."""
+
+
+def doubts(
+    states: FloatArray,
+    inputs: FloatArray,
+    next_states: FloatArray,
+    description: Description,
+) -> list[str]:
+    """What speaks against learning from this data, a sentence each.
+
+    Args:
+        states: `(n, d)`, circular variables between their ends.
+        inputs: `(n, m)`.
+        next_states: `(n, d)`.
+        description: of both.
+    """
+    count, size = states.shape
+    found = []
+    wanted = FEW * (size + inputs.shape[1])
+    if count < wanted:
+        found.append(
+            f"there are only {count} steps for {size} variables and "
+            f"{inputs.shape[1]} inputs; record {wanted} or more."
+        )
+    for name, column in zip(description.input_names, inputs.T, strict=True):
+        if count > 1 and np.ptp(column) == 0.0:
+            found.append(
+                f"the input {name} is always {column[0]:g}, so that its effect is "
+                "unknown; record with an input that changes."
+            )
+    for axis, name in enumerate(description.state_names):
+        both = np.concatenate([states[:, axis], next_states[:, axis]])
+        if count > 1 and np.ptp(both) == 0.0:
+            found.append(
+                f"the variable {name} is always {both[0]:g}; leave it out, or check its "
+                "sensor."
+            )
+    rows = np.concatenate([states, inputs, next_states], axis=1)
+    twice = count - len(np.unique(rows, axis=0))
+    if twice > OFTEN_TWICE * count and not _discrete(states):
+        found.append(
+            f"{twice} of {count} rows are there twice or more often; check that no file "
+            "was read twice, and that no sensor stands still."
+        )
+    return found + _mixed_units(states, next_states, description)
+
+
+def _discrete(states: FloatArray) -> bool:
+    """Whether states are whole numbers, which repeat themselves."""
+    return bool((states == np.rint(states)).all())
+
+
+def _mixed_units(
+    states: FloatArray, next_states: FloatArray, description: Description
+) -> list[str]:
+    """Variables that are the rate of change of another, but for a factor of a unit."""
+    time = description.sampling_time
+    if time is None or len(states) < FEW:
+        return []
+    change = next_states - states
+    for axis in description.circular:
+        span = description.high[axis] - description.low[axis]
+        change[:, axis] -= span * np.rint(change[:, axis] / span)
+    middle = 0.5 * (states + next_states)
+    found = []
+    names = description.state_names
+    for axis in range(states.shape[1]):
+        for rate in range(states.shape[1]):
+            factor = _factor(change[:, axis], middle[:, rate] * time)
+            if axis == rate or factor is None:
+                continue
+            for unit, words in UNITS.items():
+                for times in (unit, 1 / unit):
+                    if abs(factor / times - 1.0) < 0.1:
+                        found.append(
+                            f"{names[axis]} changes {factor:.3g} times as fast as "
+                            f"{names[rate]} says, as if one of them were in {words}; "
+                            "give both in the same unit."
+                        )
+    return found
+
+
+def _factor(change: FloatArray, expected: FloatArray) -> float | None:
+    """By which factor one follows the other; None if it does not."""
+    if change.std() == 0.0 or expected.std() == 0.0:
+        return None
+    if np.corrcoef(change, expected)[0, 1] < 0.98:
+        return None
+    return float(change @ expected / (expected @ expected))

@@ -1,0 +1,192 @@
+"""Running an environment step by step, and keeping what it did."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Protocol
+
+import numpy as np
+from gymnasium import spaces
+from gymnasium.vector import AutoresetMode, VectorEnv
+from numpy.typing import NDArray
+
+from acl_gym.envs.control.lookup import signals_of
+from acl_gym.envs.learned.description import described_by
+from acl_gym.utils import validation
+from acl_gym.utils.typing import BoolArray
+
+
+class _Predicts(Protocol):
+    def predict(self, observation: Any) -> Any: ...
+
+
+Policy = _Predicts | Callable[[Any], Any] | None
+"""What chooses actions; None draws them at random."""
+
+
+class Recorder:
+    """Steps an environment and keeps states, inputs, next states, rewards and ends.
+
+    Args:
+        env: see `Transitions.record`.
+        policy: see there.
+        hold: see there.
+        seed: see there.
+
+    Attributes:
+        steps: how many were made, of all slots together.
+        observation: where the slots are now, `(num_envs, size)`.
+        facts: what the environment tells of its numbers, arguments of `Transitions`.
+
+    Raises:
+        TypeError: observations or actions are of a kind that cannot be recorded.
+    """
+
+    def __init__(
+        self,
+        env: Any,
+        policy: Policy = None,
+        *,
+        hold: int = 1,
+        seed: int | None = None,
+    ) -> None:
+        self.facts = described_by(env)
+        del self.facts["size"], self.facts["n_inputs"]
+        self.env, self.policy = env, policy
+        self.hold = validation.integer("hold", hold, at_least=1)
+        self._vector = isinstance(env, VectorEnv)
+        self.num_envs = env.num_envs if self._vector else 1
+        self._space = env.single_action_space if self._vector else env.action_space
+        signals = signals_of(env)
+        self._values = None if signals is None else np.array(signals.values)
+        seed = validation.seed(seed)
+        # Another stream than that of the environment, which gets the same seed.
+        self._rng = np.random.default_rng(None if seed is None else [seed, 2])
+        self._drawn: Any = None
+        self._held = 0
+        self.steps = 0
+        self._kept: dict[str, list[NDArray[Any]]] = {
+            name: []
+            for name in (
+                "states",
+                "inputs",
+                "next_states",
+                "rewards",
+                "terminated",
+                "slots",
+            )
+        }
+        self._runs = np.arange(self.num_envs)  # the number of each slot's run
+        self._starting = np.zeros(self.num_envs, np.bool_)
+        self.observation = self._reset(seed=seed)
+
+    def step(self, actions: Any = None) -> BoolArray:
+        """Make a step in each slot.
+
+        Args:
+            actions: of the slots, `(num_envs, ...)`; None asks the policy.
+
+        Returns:
+            Which slots' episodes have ended, `(num_envs,)`.
+        """
+        if actions is None:
+            actions = self._chosen()
+        if self._vector:
+            found, rewards, terminated, truncated, infos = self.env.step(actions)
+        else:
+            found, *results, infos = self.env.step(self._single(actions))
+            found = np.asarray(found)[None]
+            rewards, terminated, truncated = (np.array([each]) for each in results)
+        found = np.asarray(found, dtype=np.float64)
+        ended = np.asarray(terminated | truncated, dtype=np.bool_)
+        reached = found
+        mode = self._mode()
+        if ended.any() and mode is AutoresetMode.SAME_STEP:
+            reached = found.copy()
+            last = infos["final_obs"]
+            for slot in np.flatnonzero(ended):
+                reached[slot] = np.asarray(last[slot], dtype=np.float64)
+        made = ~self._starting  # the step of a slot that restarts is none
+        rows = np.flatnonzero(made)
+        new = {
+            "states": self.observation[rows],
+            "inputs": self._inputs(actions)[rows],
+            "next_states": reached[rows],
+            "rewards": np.asarray(rewards, dtype=np.float64)[rows],
+            "terminated": np.asarray(terminated, dtype=np.bool_)[rows],
+            "slots": self._runs[rows],
+        }
+        for name, array in new.items():
+            self._kept[name].append(array)
+        self.steps += rows.size
+        ended &= made
+        self._starting = np.zeros(self.num_envs, np.bool_)
+        self.observation = found
+        if ended.any():
+            self._runs[ended] = self._runs.max() + 1 + np.arange(ended.sum())
+            if not self._vector:
+                self.observation = self._reset()
+            elif mode is AutoresetMode.NEXT_STEP:
+                self._starting = ended
+            elif mode is AutoresetMode.DISABLED:
+                self.observation = self._reset(options={"reset_mask": ended})
+        return ended
+
+    def newest(self) -> dict[str, NDArray[Any]]:
+        """What the last step of each slot did, arguments of `Transitions`."""
+        return {name: kept[-1] for name, kept in self._kept.items() if name != "slots"}
+
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        """Everything that was recorded, run after run, arguments of `Transitions`."""
+        joined = {name: np.concatenate(kept) for name, kept in self._kept.items()}
+        runs = joined.pop("slots")
+        order = np.argsort(runs, kind="stable")
+        _, numbers = np.unique(runs[order], return_inverse=True)
+        return {
+            **{name: array[order] for name, array in joined.items()},
+            "episodes": numbers.astype(np.int64),
+        }
+
+    def random_actions(self) -> Any:
+        """Actions drawn from the action space, `(num_envs, ...)`."""
+        space = self._space
+        if isinstance(space, spaces.Discrete):
+            first = int(space.start)
+            return self._rng.integers(first, first + int(space.n), self.num_envs)
+        bounded = space.bounded_below & space.bounded_above
+        if not bounded.all():
+            raise ValueError(
+                "random actions need a Box with finite bounds, got "
+                f"{validation.shown(space)}; give a policy."
+            )
+        shape = self.num_envs, *space.shape
+        return self._rng.uniform(space.low, space.high, shape).astype(space.dtype)
+
+    def _chosen(self) -> Any:
+        if self.policy is None:
+            if self._held == 0:
+                self._drawn, self._held = self.random_actions(), self.hold
+            self._held -= 1
+            return self._drawn
+        predict: Any = getattr(self.policy, "predict", self.policy)
+        found: Any = predict(self.observation)
+        return np.asarray(found[0] if isinstance(found, tuple) else found)
+
+    def _inputs(self, actions: Any) -> NDArray[np.float64]:
+        """What the actions set, `(num_envs, n_inputs)`."""
+        array = np.asarray(actions)
+        if self._values is not None:
+            return np.asarray(self._values[array - int(self._space.start)])
+        return array.reshape(self.num_envs, -1).astype(np.float64)
+
+    def _single(self, actions: Any) -> Any:
+        action = np.asarray(actions)[0]
+        return int(action) if isinstance(self._space, spaces.Discrete) else action
+
+    def _mode(self) -> Any:
+        return self.env.metadata.get("autoreset_mode") if self._vector else None
+
+    def _reset(self, **how: Any) -> NDArray[np.float64]:
+        found, _ = self.env.reset(**how)
+        array = np.asarray(found, dtype=np.float64)
+        return array if self._vector else array[None]

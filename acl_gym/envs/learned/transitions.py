@@ -1,0 +1,461 @@
+"""Recorded transitions of a plant: checked arrays, joined, saved and read again."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from acl_gym.envs.learned import reading
+from acl_gym.envs.learned.description import Description, described
+from acl_gym.envs.learned.quality import doubts
+from acl_gym.envs.learned.recorder import Policy, Recorder
+from acl_gym.utils import archives, validation
+from acl_gym.utils.angles import find_angles
+from acl_gym.utils.typing import BoolArray, FloatArray, IntArray
+
+MOST_BYTES = 2**32
+"""What a file of transitions may hold unpacked, unless `load` is told otherwise."""
+
+_ARRAYS = ("states", "inputs", "next_states", "rewards", "terminated", "episodes")
+_FLAT = ("state_names", "input_names", "circular", "angles", "numbered")
+
+
+class Transitions:
+    """What a plant did: in a state, with an input held for a sampling time, the next state.
+
+    Read them from a run of an environment (`record`), from files of measurements
+    (`from_csv`, `from_parquet`, `from_frame`), or from a Minari data set
+    (`from_minari`); several recordings of one plant are added with `+`.
+
+    >>> import gymnasium as gym
+    >>> from acl_gym import Transitions
+    >>> env = gym.make("acl_gym/Pendulum-v0")
+    >>> data = Transitions.record(env, steps=300, seed=0)
+    >>> len(data), data.states.shape, data.input_names
+    (300, (300, 2), ('torque u, N m',))
+
+    Args:
+        states: x(t), `(n, state_size)`, or `(n,)` for one variable; finite.
+        inputs: u(t), `(n, n_inputs)`, or `(n,)` for one input; finite.
+        next_states: x(t+1), in the shape of `states`.
+        rewards: what the steps gave, `(n,)`; None if that is not known.
+        terminated: whether an episode ended with the step, in its goal or in failure,
+            `(n,)`; None if that is not known.
+        episodes: the number of the run that each step belongs to, `(n,)`, in order; None
+            begins a new one wherever a state is not the next state of the step before.
+        state_names: of the variables, with units.
+        input_names: of the inputs.
+        low: lower end of each variable, None where it is unknown.
+        high: upper end of each.
+        circular: names or numbers of the variables that wrap around from `high` to
+            `low`, such as angles; without ends these are -pi and pi. Angles that were
+            counted on beyond the ends are brought back.
+        angles: pairs of variables that are cosine and sine of one angle; None looks for
+            them.
+        values: the inputs of each action, `(n_actions, n_inputs)`, where they are known.
+        numbered: whether the inputs are numbers of actions, without order or size.
+        sampling_time: s, > 0, where it is known.
+
+    Raises:
+        ValueError: the arrays do not belong together, or hold NaN; or see `described`.
+    """
+
+    def __init__(
+        self,
+        states: ArrayLike,
+        inputs: ArrayLike,
+        next_states: ArrayLike,
+        rewards: ArrayLike | None = None,
+        terminated: ArrayLike | None = None,
+        *,
+        episodes: ArrayLike | None = None,
+        state_names: Sequence[str] | None = None,
+        input_names: Sequence[str] | None = None,
+        low: Any = None,
+        high: Any = None,
+        circular: Iterable[int | str] = (),
+        angles: Any = None,
+        values: Any = None,
+        numbered: bool = False,
+        sampling_time: float | None = None,
+    ) -> None:
+        x = _table("states", states)
+        count = len(x)
+        u = _table("inputs", inputs, rows=count)
+        y = _table("next_states", next_states, rows=count, columns=x.shape[1])
+        self.description = described(
+            x.shape[1],
+            u.shape[1],
+            state_names=state_names,
+            input_names=input_names,
+            low=low,
+            high=high,
+            circular=circular,
+            angles=find_angles(x) if angles is None else angles,
+            values=values,
+            numbered=numbered,
+            sampling_time=sampling_time,
+        )
+        x, y = self.description.settled(x), self.description.settled(y)
+        self._arrays: dict[str, NDArray[Any]] = {
+            "states": x,
+            "inputs": u,
+            "next_states": y,
+        }
+        if rewards is not None:
+            self._arrays["rewards"] = _column("rewards", rewards, count)
+        if terminated is not None:
+            self._arrays["terminated"] = _flags("terminated", terminated, count)
+        self._arrays["episodes"] = (
+            _runs(x, y) if episodes is None else _numbers(episodes, count)
+        )
+        for array in self._arrays.values():
+            array.setflags(write=False)
+
+    @property
+    def states(self) -> FloatArray:
+        """x(t), `(n, state_size)`, read-only."""
+        return self._arrays["states"]
+
+    @property
+    def inputs(self) -> FloatArray:
+        """u(t), `(n, n_inputs)`, read-only."""
+        return self._arrays["inputs"]
+
+    @property
+    def next_states(self) -> FloatArray:
+        """x(t+1), `(n, state_size)`, read-only."""
+        return self._arrays["next_states"]
+
+    @property
+    def rewards(self) -> FloatArray | None:
+        """What the steps gave, `(n,)`, read-only; None if that is not known."""
+        return self._arrays.get("rewards")
+
+    @property
+    def terminated(self) -> BoolArray | None:
+        """Whether an episode ended, `(n,)`, read-only; None if that is not known."""
+        return self._arrays.get("terminated")
+
+    @property
+    def episodes(self) -> IntArray:
+        """The number of the run that each step belongs to, `(n,)`, read-only."""
+        return self._arrays["episodes"]
+
+    @property
+    def starts(self) -> FloatArray:
+        """The states in which runs began, `(n_runs, state_size)`, a new array."""
+        first = np.ones(len(self), np.bool_)
+        first[1:] = self.episodes[1:] != self.episodes[:-1]
+        return self.states[first]
+
+    @property
+    def state_names(self) -> tuple[str, ...]:
+        """Names of the variables."""
+        return self.description.state_names
+
+    @property
+    def input_names(self) -> tuple[str, ...]:
+        """Names of the inputs."""
+        return self.description.input_names
+
+    @property
+    def sampling_time(self) -> float | None:
+        """Seconds between a state and the next; None if that is not known."""
+        return self.description.sampling_time
+
+    def __len__(self) -> int:
+        """The number of steps."""
+        return len(self.states)
+
+    def __repr__(self) -> str:
+        """How many steps and runs, and of what."""
+        runs = len(self.starts)
+        names = ", ".join(name.split(",")[0] for name in self.state_names)
+        inputs = ", ".join(name.split(",")[0] for name in self.input_names)
+        return (
+            f"Transitions({len(self):,} steps in {runs:,} "
+            f"{'run' if runs == 1 else 'runs'}, state {names}, input {inputs})"
+        )
+
+    def __getitem__(self, rows: Any) -> Self:
+        """Some steps, in order: a slice, or a mask `(n,)`.
+
+        Raises:
+            TypeError: `rows` is neither.
+            ValueError: none are left, or the mask has another length.
+        """
+        if not isinstance(rows, slice):
+            rows = validation.as_array(rows)
+            if rows is None or rows.dtype != np.bool_:
+                raise TypeError(
+                    "steps are chosen by a slice or a mask of booleans, got "
+                    f"{validation.shown(rows)}."
+                )
+            if rows.shape != (len(self),):
+                raise ValueError(
+                    f"the mask must have shape ({len(self)},), got {rows.shape}."
+                )
+        kept = {name: array[rows] for name, array in self._arrays.items()}
+        if not len(kept["states"]):
+            raise ValueError("at least one step must be left, got none.")
+        return self._made(self.description, kept)
+
+    def __add__(self, other: Any) -> Self:
+        """Both recordings, one after the other.
+
+        What only one of them knows, such as rewards, is left out.
+
+        Raises:
+            ValueError: they are not of the same plant: names, angles or the sampling
+                time differ.
+        """
+        if not isinstance(other, Transitions):
+            return NotImplemented
+        difference = self.description.difference(other.description)
+        if difference is not None:
+            raise ValueError(
+                f"recordings must be of the same plant, got {difference}; give both the "
+                "same description."
+            )
+        joined = {
+            name: np.concatenate([array, other._arrays[name]])
+            for name, array in self._arrays.items()
+            if name in other._arrays
+        }
+        after = self.episodes[-1] + 1 - other.episodes[0]
+        joined["episodes"][len(self) :] += after
+        return self._made(_both(self.description, other.description), joined)
+
+    def doubts(self) -> list[str]:
+        """What speaks against learning from this data, a sentence each; empty if nothing.
+
+        Few steps, inputs that never change, rows that are there twice, variables that
+        never change, and units that do not fit together.
+        """
+        return doubts(self.states, self.inputs, self.next_states, self.description)
+
+    def save(self, path: archives.Target) -> Any:
+        """Write everything to one file, in one atomic step.
+
+        Args:
+            path: the file, to which `.npz` is added where it is missing.
+
+        Returns:
+            The path written; None for an open file.
+        """
+        known = self.description
+        header = {name: getattr(known, name) for name in _FLAT}
+        header["sampling_time"] = known.sampling_time
+        arrays: dict[str, NDArray[Any]] = dict(self._arrays)
+        arrays |= {"low": np.array(known.low), "high": np.array(known.high)}
+        if known.values is not None:
+            arrays["values"] = np.array(known.values)
+        return archives.save(path, header, arrays, archives.TRANSITIONS)
+
+    @classmethod
+    def load(cls, path: archives.Target, *, max_bytes: int = MOST_BYTES) -> Self:
+        """Read what `save` wrote. A file from a stranger runs no code.
+
+        Args:
+            path: the file, with or without `.npz`.
+            max_bytes: what it may hold unpacked.
+
+        Raises:
+            FileNotFoundError: there is no such file.
+            ValueError: it is none of this package, or is damaged.
+        """
+        archive = archives.Archive(path, max_bytes, archives.TRANSITIONS)
+        try:
+            header = {name: archive.header[name] for name in _FLAT}
+            header["sampling_time"] = archive.header["sampling_time"]
+            arrays = {n: archive.arrays[n] for n in _ARRAYS if n in archive.arrays}
+            for name in ("low", "high", "values"):
+                header[name] = archive.arrays.get(name)
+            facts: dict[str, Any] = {**arrays, **header}
+            return cls(**facts)
+        except archives.TooLargeError as error:
+            raise ValueError(f"{archive.name} {error}") from error
+        except Exception as error:  # whatever a damaged file leads to
+            raise ValueError(
+                f"{archive.name} is not a complete file of transitions: {error} Save "
+                "them again or use another copy."
+            ) from error
+
+    @classmethod
+    def record(
+        cls,
+        env: Any,
+        steps: int,
+        policy: Policy = None,
+        *,
+        hold: int = 1,
+        seed: int | None = None,
+    ) -> Self:
+        """Run an environment and keep what it did.
+
+        Args:
+            env: a single or a vector environment with a Box of one axis as observations,
+                and `Discrete` actions or a Box of one axis. It is left in the middle of
+                its episodes.
+            steps: of all slots together, >= 1; a vector environment takes at most
+                `num_envs` - 1 more.
+            policy: something with `predict(observations)`, or a function of the
+                observations `(n, ...)` that returns the actions of n slots. None draws
+                them from the action space.
+            hold: for how many steps a random action is kept, >= 1. An input that changes
+                in each step hardly moves a sluggish plant.
+            seed: of the environment and of random actions.
+        """
+        steps = validation.integer("steps", steps, at_least=1)
+        recorder = Recorder(env, policy, hold=hold, seed=seed)
+        while recorder.steps < steps:
+            recorder.step()
+        facts: dict[str, Any] = {**recorder.arrays(), **recorder.facts}
+        return cls(**facts)
+
+    @classmethod
+    def from_frame(cls, frame: Any, **columns: Any) -> Self:
+        """Read a pandas frame, a row for each moment; see `from_csv`."""
+        return cls(**reading.arrays_of_frames([frame], **columns))
+
+    @classmethod
+    def from_csv(cls, path: Any, **columns: Any) -> Self:
+        """Read measurements from a CSV file, a row for each moment.
+
+        A step leads from each row to the next of the same run. A row with a gap in time
+        before it begins a new run.
+
+        Args:
+            path: the file, or several files, each with runs of its own.
+            **columns: which columns there are:
+
+                - `state`: names of the columns of the state, required;
+                - `input`: those of the inputs, which are held from their row to the
+                  next, required;
+                - `time`: the column of the time in seconds, for gaps and the sampling
+                  time;
+                - `run`: the column whose value changes from one run to the next;
+                - `reward`, `terminated`: columns of the step that begins in a row;
+                - `next_state`: columns of the next state, for rows that are steps
+                  already.
+
+                And what `Transitions` takes: `circular`, `low`, `high`, `sampling_time`,
+                `values`, `angles`, `numbered`.
+
+        Raises:
+            FileNotFoundError: there is no such file.
+            ValueError: a column is missing or holds what is no number, or time does not
+                increase.
+        """
+        return cls(**reading.arrays_of_files(path, "csv", **columns))
+
+    @classmethod
+    def from_parquet(cls, path: Any, **columns: Any) -> Self:
+        """Read measurements from a Parquet file; see `from_csv`."""
+        return cls(**reading.arrays_of_files(path, "parquet", **columns))
+
+    @classmethod
+    def from_minari(cls, dataset: Any, **described: Any) -> Self:
+        """Read a data set of Minari.
+
+        Args:
+            dataset: a `minari.MinariDataset`, or the id of one on this machine.
+            **described: what `Transitions` takes beyond the arrays.
+
+        Raises:
+            ImportError: an id is given, and minari is not installed.
+            TypeError: observations or actions are not arrays of one axis or numbers.
+        """
+        return cls(**{**reading.arrays_of_minari(dataset), **described})
+
+    @classmethod
+    def _made(cls, description: Description, arrays: dict[str, Any]) -> Self:
+        """From arrays that are known to be good."""
+        made = cls.__new__(cls)
+        made.description, made._arrays = description, arrays
+        for array in arrays.values():
+            array.setflags(write=False)
+        return made
+
+
+def _both(one: Description, other: Description) -> Description:
+    """The wider bounds of two recordings, and what either knows."""
+    return replace(
+        one,
+        low=tuple(map(min, one.low, other.low)),
+        high=tuple(map(max, one.high, other.high)),
+        values=one.values if one.values is not None else other.values,
+        sampling_time=one.sampling_time or other.sampling_time,
+    )
+
+
+def _table(
+    name: str, values: Any, rows: int | None = None, columns: int | None = None
+) -> FloatArray:
+    array = validation.real_array(name, values, finite=False)
+    if array.ndim == 1:
+        array = array[:, None]
+    if array.ndim != 2 or rows not in (None, len(array)):
+        count = "n" if rows is None else str(rows)
+        raise ValueError(
+            f"{name} must have a row for each step, shape ({count}, size), got "
+            f"{np.shape(values)}."
+        )
+    if columns not in (None, array.shape[1]):
+        raise ValueError(
+            f"{name} must have the {columns} variables of states, got {array.shape[1]}."
+        )
+    _check_finite(name, array)
+    return np.ascontiguousarray(array)
+
+
+def _column(name: str, values: Any, count: int) -> FloatArray:
+    array = validation.real_array(name, values, finite=False)
+    if array.shape != (count,):
+        raise ValueError(f"{name} must have shape ({count},), got {array.shape}.")
+    _check_finite(name, array[:, None])
+    return array
+
+
+def _check_finite(name: str, array: FloatArray) -> None:
+    finite = np.isfinite(array).all(axis=1)
+    if not finite.all():
+        row = int(np.argmin(finite))
+        raise ValueError(
+            f"{name} must be finite, got {array[row].tolist()} in row {row} "
+            f"({np.count_nonzero(~finite)} rows of {len(array)} are not); leave such "
+            "rows out or repair them."
+        )
+
+
+def _flags(name: str, values: Any, count: int) -> BoolArray:
+    array = validation.as_array(values)
+    good = array is not None and array.shape == (count,) and array.dtype.kind in "biuf"
+    if not good or not ((array == 0) | (array == 1)).all():  # type: ignore[union-attr]
+        raise ValueError(
+            f"{name} must be {count} booleans, got {validation.shown(values)}."
+        )
+    return np.asarray(array == 1)
+
+
+def _numbers(values: Any, count: int) -> IntArray:
+    array = validation.as_array(values)
+    good = array is not None and array.shape == (count,) and array.dtype.kind in "iu"
+    if array is None or not good or (np.diff(array.astype(np.int64)) < 0).any():
+        raise ValueError(
+            f"episodes must be {count} integers that do not fall, got "
+            f"{validation.shown(values)}."
+        )
+    return array.astype(np.int64)
+
+
+def _runs(states: FloatArray, next_states: FloatArray) -> IntArray:
+    """The numbers of runs, a new one where a state does not follow the one before."""
+    breaks = np.zeros(len(states), np.int64)
+    breaks[1:] = (states[1:] != next_states[:-1]).any(axis=1)
+    return np.cumsum(breaks)

@@ -9,10 +9,11 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from importlib.resources import as_file, files
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
+from acl_gym.cli import recorded
 from acl_gym.cli.common import DebugOption, JsonOption, check_name, console, print_json
 from acl_gym.cli.errors import (
     BadArgumentError,
@@ -39,10 +40,16 @@ PROGRESS_SECONDS = 5.0
 
 HELP = """Design a controller for a plant of yours, and say how good it is.
 
+FILE describes the plant by equations (PLANT.py) or by measurements (DATA.csv).
+
 PLANT.py is a Python file that calls acl_gym.plant(...) and keeps what it returns in a
 name, such as env = acl_gym.plant(...); or defines make(num_envs), which returns it. The
 file is run. A colony of ants then learns the plant until the goal is reached from 95% of
 the starts and the cost no longer falls, or the time is up.
+
+DATA.csv (or .parquet) has a row for each moment, and names of columns in its first row:
+those of --state, and those of --input, which are held from one row to the next. A model
+is fitted, ants learn in it, and the report shows where it is unsure.
 
 The folder gets policy.h, the controller as C without any library; policy.npz, the same
 for NumPy; report.html, one page with the policy, trajectories from a typical and the
@@ -58,6 +65,8 @@ Examples:
   acl-gym design my_plant.py --out my_controller
   acl-gym design my_plant.py --seconds 300 --seed 1
   acl-gym design --example cart_pole
+  acl-gym design DATA.csv --state theta,omega --circular theta --input u --time t
+    --goal 3.1416,0 --tolerance 0.1,0.3 --cost 1,0.1:0.05
 """
 
 
@@ -84,8 +93,8 @@ def design(
     plant: Annotated[
         Path | None,
         typer.Argument(
-            metavar="PLANT.py",
-            help="The file that describes the plant.",
+            metavar="FILE",
+            help="PLANT.py or DATA.csv, which describes the plant.",
             show_default=False,
         ),
     ] = None,
@@ -139,6 +148,119 @@ def design(
             show_default=False,
         ),
     ] = None,
+    state: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME,...",
+            help="For DATA.csv: the columns of the state.",
+            show_default=False,
+        ),
+    ] = None,
+    input_names: Annotated[
+        str | None,
+        typer.Option(
+            "--input",
+            metavar="NAME,...",
+            help="For DATA.csv: the columns of the inputs.",
+            show_default=False,
+        ),
+    ] = None,
+    goal: Annotated[
+        str | None,
+        typer.Option(
+            metavar="X,...",
+            help="For DATA.csv: the state to which the plant is to be brought.",
+            show_default=False,
+        ),
+    ] = None,
+    tolerance: Annotated[
+        str | None,
+        typer.Option(
+            metavar="X,...",
+            help="For DATA.csv: half-widths of the goal, one for all or for each "
+            "variable.  [default: a fortieth of each range]",
+            show_default=False,
+        ),
+    ] = None,
+    cost: Annotated[
+        str,
+        typer.Option(
+            metavar="Q,...:R,...|time",
+            help="For DATA.csv: weights on the squared error of each variable and on the "
+            "square of each input, such as 1,0.1:0.05; or time.",
+        ),
+    ] = "time",
+    circular: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME,...",
+            help="For DATA.csv: the variables that wrap around, such as angles, from -pi "
+            "to pi if --low and --high do not say otherwise.",
+            show_default=False,
+        ),
+    ] = None,
+    low: Annotated[
+        str | None,
+        typer.Option(
+            metavar="X,...",
+            help="For DATA.csv: lower ends of the variables; an empty one is taken from "
+            "the data.  [default: from the data]",
+            show_default=False,
+        ),
+    ] = None,
+    high: Annotated[
+        str | None,
+        typer.Option(
+            metavar="X,...",
+            help="For DATA.csv: upper ends of the variables.  [default: from the data]",
+            show_default=False,
+        ),
+    ] = None,
+    actions: Annotated[
+        str | None,
+        typer.Option(
+            metavar="U;U;...",
+            help="For DATA.csv: the inputs to choose among, such as -1;0;1, or "
+            "-1,0;1,0 for two.  [default: those in the data]",
+            show_default=False,
+        ),
+    ] = None,
+    time_name: Annotated[
+        str | None,
+        typer.Option(
+            "--time",
+            metavar="NAME",
+            help="For DATA.csv: the column of the time in seconds.",
+            show_default=False,
+        ),
+    ] = None,
+    run_name: Annotated[
+        str | None,
+        typer.Option(
+            "--run",
+            metavar="NAME",
+            help="For DATA.csv: the column that changes from one run to the next.",
+            show_default=False,
+        ),
+    ] = None,
+    sampling_time: Annotated[
+        float | None,
+        typer.Option(
+            metavar="S",
+            help="For DATA.csv: seconds from one row to the next, without --time.",
+            show_default=False,
+        ),
+    ] = None,
+    max_steps: Annotated[
+        int | None,
+        typer.Option(
+            min=1,
+            metavar="T",
+            help="For DATA.csv: steps within which the goal is to be reached.  "
+            "[default: 100]",
+            show_default=False,
+        ),
+    ] = None,
     quiet: Annotated[bool, typer.Option("--quiet", help="Print no progress.")] = False,
     as_json: JsonOption = False,
     debug: DebugOption = False,
@@ -158,47 +280,104 @@ def design(
         from acl_gym.design.run import SECONDS
 
         seconds = SECONDS
-    shown = [str(plant)]
+    given = {
+        "--state": state,
+        "--input": input_names,
+        "--goal": goal,
+        "--tolerance": tolerance,
+        "--cost": None if cost == "time" else cost,
+        "--circular": circular,
+        "--low": low,
+        "--high": high,
+        "--actions": actions,
+        "--time": time_name,
+        "--run": run_name,
+        "--sampling-time": sampling_time,
+        "--max-steps": max_steps,
+    }
+    words = [f"{name}={value}" for name, value in given.items() if value is not None]
+    learning = {"seed": seed, "seconds": seconds, "steps": steps}
+    shown = _Shown(quiet, as_json)
     if plant is None:
         name = check_name("--example", str(example_name), EXAMPLES)
-        shown, plant = ["--example", name], Path(f"{name}.py")
+        _refuse_columns(f"--example {name}", words)
         with as_file(_example_file(name)) as file:
-            _run(file, plant.stem, shown, out, seed, seconds, steps, quiet, as_json)
+            loaded = _loaded(file)
+            _run(loaded, file, name, ["--example", name], out, learning, shown)
+        return
+    if plant.suffix.lower() in recorded.SUFFIXES:
+        loaded = recorded.load(plant, given)
     else:
-        _run(plant, plant.stem, shown, out, seed, seconds, steps, quiet, as_json)
+        _refuse_columns(str(plant), words)
+        loaded = _loaded(plant)
+    _run(loaded, plant, plant.stem, [str(plant), *words], out, learning, shown)
+
+
+class _Shown(NamedTuple):
+    """What is printed.
+
+    Attributes:
+        quiet: no progress.
+        as_json: JSON and nothing else.
+    """
+
+    quiet: bool
+    as_json: bool
+
+
+def _loaded(file: Path) -> Any:
+    from acl_gym.design.plants import load_plant
+
+    with bad_arguments():
+        return load_plant(file)
+
+
+def _refuse_columns(what: str, words: list[str]) -> None:
+    if words:
+        raise BadArgumentError(
+            f"{words[0].partition('=')[0]} describes measurements, a file that ends in "
+            f"{' or '.join(recorded.SUFFIXES)}, got {what}, which describes its plant by "
+            "itself; leave it out."
+        )
 
 
 def _run(
+    env: Any,
     file: Path,
     stem: str,
-    shown: list[str],
+    named: list[str],
     out: Path | None,
-    seed: int,
-    seconds: float | None,
-    steps: int | None,
-    quiet: bool,
-    as_json: bool,
+    learning: dict[str, Any],
+    shown: _Shown,
 ) -> None:
-    from acl_gym.design.plants import load_plant
-    from acl_gym.design.run import checked_folder, design_for
+    """Design and print.
+
+    Args:
+        env: the plant.
+        file: that describes it.
+        stem: what a new folder is named after.
+        named: how the command line names the plant.
+        out: the folder, or None.
+        learning: `seed`, `seconds` and `steps`.
+        shown: what is printed.
+    """
+    from acl_gym.design import design as design_controller
+    from acl_gym.design.run import checked_folder
 
     with bad_arguments():
-        env = load_plant(file)
         folder = checked_folder(_free_folder(stem) if out is None else out)
-    command = shlex.join(["acl-gym", "design", *shown, "--out", str(folder)])
-    with Interruption() as interruption, _progress(not quiet) as (tell, say):
+    command = shlex.join(["acl-gym", "design", *named, "--out", str(folder)])
+    with Interruption() as interruption, _progress(not shown.quiet) as (tell, say):
         try:
-            made = design_for(
+            made = design_controller(
                 env,
                 folder,
                 source=file,
-                seed=seed,
-                seconds=seconds,
-                steps=steps,
                 command=command,
                 stop=lambda: interruption.wanted,
                 tell=tell,
                 say=say,
+                **learning,
             )
         except KeyboardInterrupt:
             if not interruption.wanted:
@@ -207,7 +386,7 @@ def _run(
                 "interrupted before there was a policy; nothing is saved.",
                 interruption.exit_code,
             ) from None
-    if as_json:
+    if shown.as_json:
         print_json(made.summary)
     else:
         _print(made)

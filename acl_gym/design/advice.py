@@ -67,7 +67,7 @@ def advice(learned: Learned, measures: Measures, plant: Plant) -> list[str]:
 def state_in_words(state: tuple[float, ...], plant: Plant) -> str:
     """The variables of a state with their names: "angle 3.14 rad, speed 0 rad/s"."""
     parts = []
-    for name, value in zip(plant.signals.observations, state, strict=False):
+    for name, value in zip(plant.variable_names, state, strict=False):
         word, *rest = name.split(", ")
         unit = f" {rest[0]}" if rest else ""
         joined = f"{word} = " if "[" in word else f"{word} "

@@ -87,7 +87,7 @@ def measure(responses: Responses, plant: Plant) -> Measures:
     # The step after the last one that ends outside the goal.
     last_outside = len(inside) - outside[::-1].argmax(axis=0)
     settling = np.where(outside.any(axis=0), last_outside + 1, 1)
-    names = plant.signals.observations
+    names = plant.variable_names
     return Measures(
         starts=responses.count,
         success_rate=float(success.mean()),

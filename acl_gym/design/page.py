@@ -12,6 +12,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from acl_gym.design.advice import state_in_words
 from acl_gym.design.learning import GOOD, Learned
 from acl_gym.design.measures import Measures, Spread, distances
+from acl_gym.design.recordings import UNSURE
 from acl_gym.envs.plant import Plant
 from acl_gym.utils.files import write_atomically
 from acl_gym.utils.text import digits
@@ -56,6 +57,7 @@ def write_page(
         title=_title(summary),
         summary=summary,
         good=GOOD,
+        unsure=UNSURE,
         measures=measures,
         learned=learned,
         ended=_ENDED[learned.ended],
@@ -114,7 +116,7 @@ def _variables(plant: Plant) -> list[tuple[str, str, str]]:
     """Name, range and goal of each variable."""
     box = plant.goal_box
     rows = []
-    for axis, name in enumerate(plant.signals.observations):
+    for axis, name in enumerate(plant.variable_names):
         goal = "see the file"
         if box is not None:
             goal = f"{digits(box[0, axis])} to {digits(box[1, axis])}"

@@ -12,8 +12,10 @@ from matplotlib.figure import Figure
 
 from acl_gym.design.learning import GOOD, Learned
 from acl_gym.design.measures import periods
+from acl_gym.design.recordings import spread_over
 from acl_gym.design.simulation import Responses
 from acl_gym.envs.control.environments import ControlVectorEnv
+from acl_gym.envs.learned.env import LearnedVectorEnv
 from acl_gym.envs.plant import Plant
 from acl_gym.partitions import Grid
 from acl_gym.plotting import palettes, plot_policy, style
@@ -76,7 +78,7 @@ def draw_responses(
         env: the plant.
     """
     plant: Any = env.system
-    names = [style.symbol(_with_unit(name)) for name in plant.signals.observations]
+    names = [style.symbol(_with_unit(name)) for name in plant.variable_names]
     inputs = [style.symbol(_with_unit(name)) for name in plant.signals.inputs]
     count = len(names) + len(inputs)
     shown = _steps_shown(responses)
@@ -123,7 +125,7 @@ def draw_starts(
 ) -> Figure:
     """What each start costs, over two variables, and which do not reach the goal."""
     plant: Any = env.system
-    names = [style.symbol(_with_unit(name)) for name in plant.signals.observations]
+    names = [style.symbol(_with_unit(name)) for name in plant.variable_names]
     states, success = responses.states[0], responses.success()
     costs = responses.episode_costs()
     axes = most_divided(policy) if len(names) > 1 else (0,)
@@ -175,7 +177,7 @@ def draw_learning(learned: Learned) -> Figure:
         lower.axhline(100.0 * GOOD, **style.BOUND)
         lower.set_ylim(-3, 103)
         lower.set_ylabel("success (%)")
-        lower.set_xlabel("interactions with the plant")
+        lower.set_xlabel("interactions with the model")
         for ax in (upper, lower):
             ax.axvline(learned.interactions_of_best, color=style.ORANGE, linewidth=1.0)
         upper.annotate(
@@ -184,6 +186,46 @@ def draw_learning(learned: Learned) -> Figure:
             color=style.ORANGE, fontsize="small", ha="right", va="top",
         )  # fmt: skip
         style.plain_log(upper.yaxis)
+    return figure
+
+
+def draw_spread(policy: TablePolicy, env: LearnedVectorEnv) -> Figure:
+    """Where a learned model is unsure, over two variables, and what was recorded.
+
+    The others are at the goal, or in the middle of their range.
+    """
+    plant = env.system
+    size = plant.low.size
+    names = [style.symbol(_with_unit(name)) for name in plant.variable_names]
+    shown = list(most_divided(policy) if size > 1 else (0,))
+    fixed = [_levels(plant, axis, few=False)[0] for axis in range(size)]
+    lines = [np.linspace(plant.low[axis], plant.high[axis], 61) for axis in shown]
+    mesh = np.meshgrid(*lines)
+    states = np.tile(np.array(fixed), (mesh[0].size, 1))
+    for axis, values in zip(shown, mesh, strict=True):
+        states[:, axis] = values.ravel()
+    # The end of a circle is its beginning.
+    spread = spread_over(env, np.clip(states, plant.low, plant.high))
+    seen = plant.variables(env.transitions.states)
+    with style.in_style():
+        figure = style.new_figure(3.6, 5.6)
+        ax = figure.subplots()
+        if size == 1:
+            ax.plot(lines[0], spread, color=style.BLUE)
+            ax.plot(seen[:, 0], np.zeros(len(seen)), "|", color="0.2")
+            ax.set_ylabel("spread")
+        else:
+            image = ax.pcolormesh(
+                *lines, spread.reshape(mesh[0].shape), cmap="Purples", vmin=0.0,
+                vmax=max(1.0, float(spread.max())), shading="nearest", rasterized=True,
+            )  # fmt: skip
+            palettes.add_level_bar(ax, image, "spread")
+            ax.plot(*seen[:, shown].T, ".", color=style.ORANGE, markersize=2.5)
+            ax.set_ylabel(names[shown[1]])
+            _mark_goal(ax, plant, tuple(shown))
+            ax.grid(visible=False)
+        ax.set_xlim(plant.low[shown[0]], plant.high[shown[0]])
+        ax.set_xlabel(names[shown[0]])
     return figure
 
 

@@ -6,8 +6,8 @@ import json
 import math
 import time
 from collections.abc import Callable
+from contextlib import nullcontext
 from dataclasses import asdict, dataclass
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -19,9 +19,12 @@ from acl_gym.design.learning import GOOD, Learned, Progress, learn
 from acl_gym.design.measures import Measures, measure, typical, worst
 from acl_gym.design.page import write_page
 from acl_gym.design.plants import as_vector_env, load_plant
+from acl_gym.design.recordings import model_facts, one_thread
 from acl_gym.design.simulation import Responses, simulate
 from acl_gym.envs.control.environments import ControlVectorEnv
+from acl_gym.envs.learned.env import LearnedVectorEnv
 from acl_gym.envs.plant import Plant
+from acl_gym.evaluation import evaluate_over_range
 from acl_gym.experiments.provenance import circumstances
 from acl_gym.policies import TablePolicy
 from acl_gym.utils import files, validation
@@ -73,6 +76,7 @@ def design(
     seed: int = 0,
     seconds: float | None = SECONDS,
     steps: int | None = None,
+    source: Path | None = None,
     command: str | None = None,
     stop: Callable[[], bool] = lambda: False,
     tell: Callable[[Progress], None] = lambda progress: None,
@@ -85,14 +89,16 @@ def design(
     holds all of it, and `plant.py`, a copy of the file.
 
     Args:
-        plant: what `acl_gym.plant` returns, or the path of a Python file that calls it,
-            see `load_plant`. The file is run.
+        plant: what `acl_gym.plant` returns, or a `LearnedVectorEnv`; or the path of a
+            Python file that makes one, see `load_plant`. The file is run.
         out: the folder; it is made if it does not exist, and files of these names in it
             are replaced.
         seed: >= 0; the same seed and number of interactions give the same controller.
         seconds: the most seconds for learning, > 0; None sets no limit.
         steps: learn for so many interactions, >= 1, whether or not the policy still
             improves; None ends when it has stopped improving.
+        source: the file that describes a plant which is given itself; a copy of it is
+            written into the folder.
         command: what repeats this, for the report; None writes it in Python.
         stop: asked after each trial; True ends learning, and the best policy so far is
             kept.
@@ -113,53 +119,6 @@ def design(
         >>> made.measures.success_rate  # doctest: +SKIP
         1.0
     """
-    source = None
-    if isinstance(plant, str | Path):
-        source = Path(plant)
-        env = load_plant(source)
-    else:
-        env = as_vector_env(plant)
-    return design_for(
-        env,
-        out,
-        source=source,
-        seed=seed,
-        seconds=seconds,
-        steps=steps,
-        command=command,
-        stop=stop,
-        tell=tell,
-        say=say,
-    )
-
-
-def design_for(
-    env: ControlVectorEnv,
-    out: str | Path,
-    *,
-    source: Path | None,
-    seed: int,
-    seconds: float | None,
-    steps: int | None,
-    command: str | None,
-    stop: Callable[[], bool],
-    tell: Callable[[Progress], None],
-    say: Callable[[str], None],
-) -> Design:
-    """`design` for a plant that was loaded already.
-
-    Args:
-        env: the plant.
-        out: see `design`, as are the others.
-        source: the file that describes the plant, or None.
-        seed: see `design`.
-        seconds: see `design`.
-        steps: see `design`.
-        command: see `design`.
-        stop: see `design`.
-        tell: see `design`.
-        say: see `design`.
-    """
     begun = time.monotonic()
     seed = validation.integer("seed", seed, at_least=0)
     if seconds is not None:
@@ -167,58 +126,111 @@ def design_for(
     if steps is not None:
         steps = validation.integer("steps", steps, at_least=1)
     folder = checked_folder(out)
+    if isinstance(plant, str | Path):
+        source = Path(plant)
+        env = load_plant(source)
+    else:
+        env = as_vector_env(plant)
     system: Any = env.system
     folder.mkdir(exist_ok=True)
+    with one_thread() if isinstance(env, LearnedVectorEnv) else nullcontext():
+        say("learning")
+        learned = learn(
+            env,
+            draw_starts(system, CHOOSING, seed, 1),
+            seed=seed,
+            seconds=seconds,
+            steps=steps,
+            stop=stop,
+            tell=tell,
+        )
+        say(f"simulating {STARTS:,} starts")
+        measured = _measured(learned, env, folder, seed)
+    repeated = _command(command, source, folder, seed, learned)
+    return _written(folder, source, env, learned, measured, repeated, seed, begun)
 
-    say("learning")
-    learned = learn(
-        env,
-        _starts(system, CHOOSING, seed, 1),
-        seed=seed,
-        seconds=seconds,
-        steps=steps,
-        stop=stop,
-        tell=tell,
-    )
-    say(f"simulating {STARTS:,} starts")
-    starts = _starts(system, STARTS, seed, 2)[:, : system.low.size]
+
+@dataclass(frozen=True)
+class _Measured:
+    """What is known of a controller.
+
+    Attributes:
+        measures: over the random starts.
+        robustness: over uncertain parameters, or None.
+        model: of a learned model, or None.
+        figures: the names of the pictures, which are written.
+    """
+
+    measures: Measures
+    robustness: dict[str, Any] | None
+    model: dict[str, Any] | None
+    figures: tuple[str, ...]
+
+
+def _measured(
+    learned: Learned, env: ControlVectorEnv, folder: Path, seed: int
+) -> _Measured:
+    """Simulate the controller from random starts, and draw."""
+    system: Any = env.system
+    starts = draw_starts(system, STARTS, seed, 2)[:, : system.low.size]
     responses = simulate(learned.policy, env, starts, 2 * system.evaluation_steps, seed)
-    measures = measure(responses, system)
-    robustness = _robustness(learned.policy, env, starts, seed)
-    say("drawing")
     figures = _draw(learned, responses, env, system)
+    model = None
+    if isinstance(env, LearnedVectorEnv):
+        model = model_facts(env, responses)
+        figures["model"] = pictures.draw_spread(learned.policy, env)
     for name, figure in figures.items():
         figure.savefig(folder / f"{name}.png", dpi=pictures.DPI)
+    return _Measured(
+        measure(responses, system),
+        _robustness(learned.policy, env, starts, seed),
+        model,
+        tuple(figures),
+    )
+
+
+def _written(
+    folder: Path,
+    source: Path | None,
+    env: ControlVectorEnv,
+    learned: Learned,
+    measured: _Measured,
+    command: str,
+    seed: int,
+    begun: float,
+) -> Design:
+    """Write the controller, the figures and the page."""
+    system: Any = env.system
+    measures = measured.measures
     learned.policy.to_c(folder / "policy.h")
     learned.policy.to_numpy(folder / "policy.npz")
     if source is not None:
-        files.write_atomically(folder / "plant.py", source.read_bytes())
+        name = "plant.py" if measured.model is None else f"data{source.suffix}"
+        files.write_atomically(folder / name, source.read_bytes())
     tips = advice(learned, measures, system)
-    made = circumstances(1)
     summary = {
         "plant": "acl_gym.plant(...)" if source is None else str(source),
         "reaches_goal": measures.success_rate >= GOOD,
-        "seconds": 0.0,  # below, with all that is still to be done
+        **measures.as_dict(),
+        "cost": measures.cost.mean,
+        "costs": asdict(measures.cost),
+        "uncertain": measured.robustness,
+        "model": measured.model,
         "seed": seed,
-        "command": _command(command, source, folder, seed, learned),
+        "command": command,
         "interactions": learned.interactions,
         "interactions_of_best": learned.interactions_of_best,
         "learning_seconds": learned.seconds,
         "ended": learned.ended,
         "ants": learned.ants,
-        **measures.as_dict(),
-        "costs": asdict(measures.cost),
-        "starts": STARTS,
-        "uncertain": robustness,
         "advice": tips,
         "controller": _facts(learned.policy, folder),
-        "made": made,
+        "made": circumstances(1),
+        "seconds": time.monotonic() - begun,
     }
-    summary["cost"] = measures.cost.mean
-    summary["seconds"] = time.monotonic() - begun
     text = json.dumps(_plain(summary), indent=1)
     files.write_atomically(folder / "summary.json", text.encode())
-    write_page(folder, summary, learned, measures, system, list(figures))
+    write_page(folder, summary, learned, measures, system, measured.figures)
     return Design(folder, learned.policy, measures, learned, tuple(tips), summary)
 
 
@@ -240,21 +252,27 @@ def checked_folder(out: str | Path) -> Path:
     return folder
 
 
-def _starts(system: Plant, count: int, seed: int, stream: int) -> FloatArray:
-    """Random starts, `(count, state_size)`, others for each number of the stream."""
+def draw_starts(plant: Plant, count: int, seed: int, stream: int) -> FloatArray:
+    """Random starts, `(count, state_size)`, others for each number of the stream.
+
+    Args:
+        plant: the system, which says where episodes begin.
+        count: how many.
+        seed: >= 0.
+        stream: >= 0; those of 1 choose among policies, those of 2 are reported on.
+    """
     rng = np.random.default_rng([seed, stream])
-    return np.ascontiguousarray(system.sample_states(rng, count).T)
+    return np.ascontiguousarray(plant.sample_states(rng, count).T)
 
 
 def _robustness(
     policy: TablePolicy, env: ControlVectorEnv, starts: FloatArray, seed: int
 ) -> dict[str, Any] | None:
     """Nominal and worst cost over the uncertain parameters; None where none are."""
-    parameters: Any = getattr(env.system, "parameters", None)
-    if not getattr(parameters, "count", 0):
+    system: Any = env.system
+    if not system.parameters.count:
         return None
-    module = import_module("acl_gym.evaluation.robustness")
-    found = module.evaluate_over_range(
+    found = evaluate_over_range(
         policy, env, draws=PLANTS, seed=seed, states=starts[:CHOOSING]
     )
     return {
@@ -266,7 +284,9 @@ def _robustness(
         "worst_parameters": found.worst_parameters,
         "lowest_success_rate": float(np.min(found.success_rates)),
         "median_cost": float(np.median(found.costs)),
-        "ranges": {n: list(map(float, e)) for n, e in parameters.uncertain.items()},
+        "ranges": {
+            n: list(map(float, e)) for n, e in system.parameters.uncertain.items()
+        },
     }
 
 

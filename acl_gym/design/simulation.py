@@ -16,7 +16,7 @@ class Responses:
     """What a policy does from n starts in H steps, whether or not it has been at the goal.
 
     Attributes:
-        states: the variables, without parameters, `(H + 1, n, variables)`.
+        states: the variables, without uncertain parameters, `(H + 1, n, variables)`.
         actions: indices, `(H, n)`.
         costs: of each step, `(H, n)`.
         inside: whether the state after each step lies in the goal, `(H, n)`.
@@ -77,24 +77,24 @@ def simulate(
         steps: H, >= 1.
         seed: of what is random in the plant.
     """
-    system = env.system
+    system: Any = env.system
+    size = system.low.size
     state = np.ascontiguousarray(system.checked_states(starts).T)
     count = state.shape[1]
-    observation = system.observe(state)
-    states = np.empty((steps + 1, *observation.shape))
+    states = np.empty((steps + 1, count, size))
     actions = np.empty((steps, count), dtype=np.int64)
     costs, inside = np.empty((steps, count)), np.empty((steps, count), dtype=np.bool_)
     rng = np.random.default_rng(seed)
-    states[0] = observation
+    states[0] = state[:size].T
     rewards, reached = np.empty(count), np.empty(count, dtype=np.bool_)
     space: Any = env.single_action_space
     for step in range(steps):
-        chosen, _ = policy.predict(observation, deterministic=True)
+        chosen, _ = policy.predict(system.observe(state), deterministic=True)
         actions[step] = np.asarray(chosen) - int(space.start)
         uniforms = None
         if system.draws_per_step:
             uniforms = rng.random((system.draws_per_step, count))
         system.advance(state, actions[step].copy(), uniforms, rewards, reached)
-        states[step + 1] = observation = system.observe(state)
+        states[step + 1] = state[:size].T
         costs[step], inside[step] = -rewards, reached
     return Responses(states, actions, costs, inside, system.evaluation_steps)

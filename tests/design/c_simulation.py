@@ -104,7 +104,9 @@ int main(void)
 """
 
 
-def steps_in_c(name: str, header: Path, plant: object, starts: np.ndarray) -> np.ndarray:
+def steps_in_c(
+    name: str, header: Path, plant: object, starts: np.ndarray
+) -> np.ndarray:
     """Steps to the goal from each start, -1 where it is not reached in time.
 
     Args:

@@ -11,7 +11,7 @@ import pytest
 
 from acl_gym.cli.design import EXAMPLES, example
 from acl_gym.design.learning import learn
-from acl_gym.design.run import _starts
+from acl_gym.design.run import draw_starts
 from tests.design.c_simulation import EQUATIONS, steps_in_c
 
 needs_cc = pytest.mark.skipif(shutil.which("cc") is None, reason="needs a C compiler")
@@ -35,7 +35,7 @@ def test_the_controller_in_c_reaches_the_goal(name: str, tmp_path: Path) -> None
     plant = env.system
     learned = learn(
         env,
-        _starts(plant, 300, 0, 1),
+        draw_starts(plant, 300, 0, 1),
         seed=0,
         seconds=None,
         steps=STEPS[name],
@@ -43,7 +43,7 @@ def test_the_controller_in_c_reaches_the_goal(name: str, tmp_path: Path) -> None
         tell=lambda progress: None,
     )
     header = learned.policy.to_c(tmp_path / "policy.h")
-    starts = _starts(plant, 100, 0, 3)
+    starts = draw_starts(plant, 100, 0, 3)
     steps = steps_in_c(name, header, plant, starts)
     assert steps.shape == (100,)
     assert (steps > 0).mean() >= 0.95

@@ -127,6 +127,11 @@ class Plant(ControlSystem):
         return self._signals
 
     @property
+    def variable_names(self) -> tuple[str, ...]:
+        """The names of the state variables, without those of parameters."""
+        return self._signals.observations
+
+    @property
     def goal_box(self) -> FloatArray | None:
         """The lower and upper ends of the goal, `(2, state_size)`; None if it has none."""
         return self._goal.box

@@ -81,6 +81,15 @@ def plant_of_recording(path: str | Path, recording: Recording) -> LearnedVectorE
             "the time between two rows must be known, got neither the column of the time "
             "in seconds nor the sampling time; give --time NAME or --sampling-time S."
         )
+    for name, values in (("goal", recording.goal), ("tolerance", recording.tolerance)):
+        if values is not None and len(values) not in (
+            len(recording.state),
+            *([1] if name == "tolerance" else []),
+        ):
+            raise ValueError(
+                f"{name} must hold a number for each of the {len(recording.state)} "
+                f"columns of the state, got {len(values)}."
+            )
     ends = {} if recording.low is None else {"low": _circular_only(recording, "low")}
     if recording.high is not None:
         ends["high"] = _circular_only(recording, "high")
@@ -94,15 +103,6 @@ def plant_of_recording(path: str | Path, recording: Recording) -> LearnedVectorE
         circular=list(recording.circular),
         **ends,
     )
-    for name, values in (("goal", recording.goal), ("tolerance", recording.tolerance)):
-        if values is not None and len(values) not in (
-            len(recording.state),
-            *([1] if name == "tolerance" else []),
-        ):
-            raise ValueError(
-                f"{name} must hold a number for each of the {len(recording.state)} "
-                f"columns of the state, got {len(values)}."
-            )
     with one_thread():
         return LearnedVectorEnv(
             data,

@@ -428,11 +428,11 @@ def _progress(
 
 
 def _in_words(progress: Progress) -> str:
+    now, best = progress.now, progress.best
     return (
         f"learning, {progress.seconds:.0f} s, {progress.interactions:,} interactions: "
-        f"goal reached from {progress.success_rate:.0%} of the starts, cost "
-        f"{progress.cost:.4g}; best {progress.best_success_rate:.0%}, "
-        f"{progress.best_cost:.4g}"
+        f"goal reached from {now.success_rate:.0%} of the starts, cost {now.cost:.4g}; "
+        f"best {best.success_rate:.0%}, {best.cost:.4g}"
     )
 
 

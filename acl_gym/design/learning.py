@@ -11,8 +11,8 @@ from typing import Any
 
 from acl_gym.callbacks.base import Agent, Callback
 from acl_gym.design.colonies import colony_for
+from acl_gym.design.simulation import simulate
 from acl_gym.envs.control.environments import ControlVectorEnv
-from acl_gym.evaluation import PolicyCost, evaluate_policy_cost, with_slots_for
 from acl_gym.policies import TablePolicy
 from acl_gym.utils.typing import FloatArray, Row
 
@@ -36,6 +36,33 @@ _NO_LIMIT = 10**12  # interactions; the callback ends learning
 CLOSE = 0.01
 """Success rates that differ by no more than this count as equal, and the cost decides."""
 
+LEAVING = 1.0
+"""By which share a cost counts more if the state stays in the goal from no start at all."""
+
+
+@dataclass(frozen=True)
+class Quality:
+    """How good a policy is, from the starts for choosing.
+
+    Attributes:
+        cost: the mean.
+        success_rate: the share of starts from which it reaches the goal.
+        settled_rate: the share from which it stays there.
+    """
+
+    cost: float
+    success_rate: float
+    settled_rate: float
+
+    @property
+    def score(self) -> float:
+        """The cost, more by up to `LEAVING` of it where the state leaves the goal again.
+
+        Episodes end at the goal, so that ants do not learn to stay: of policies that cost
+        much the same some do and some do not.
+        """
+        return self.cost * (1.0 + LEAVING * (1.0 - self.settled_rate))
+
 
 @dataclass(frozen=True)
 class Progress:
@@ -44,18 +71,14 @@ class Progress:
     Attributes:
         interactions: steps of all ants together.
         seconds: since learning began.
-        cost: of the policy now, the mean over the starts for choosing.
-        success_rate: of the policy now.
-        best_cost: of the best policy so far.
-        best_success_rate: of it.
+        now: the policy as it is.
+        best: the best policy so far.
     """
 
     interactions: int
     seconds: float
-    cost: float
-    success_rate: float
-    best_cost: float
-    best_success_rate: float
+    now: Quality
+    best: Quality
 
 
 @dataclass(frozen=True)
@@ -84,39 +107,39 @@ class Learned:
 class Choice:
     """The best policy of those seen.
 
-    The success rate comes first, but for differences of `CLOSE`; then the cost.
+    The success rate comes first, but for differences of `CLOSE`; then the score.
 
     Attributes:
-        best: its costs; None before the first.
+        best: how good it is; None before the first.
         policy: it.
         interactions: when it was seen.
     """
 
     def __init__(self) -> None:
-        self.best: PolicyCost | None = None
+        self.best: Quality | None = None
         self.policy: TablePolicy | None = None
         self.interactions = 0
         self._highest = 0.0
 
-    def look_at(self, policy: TablePolicy, result: PolicyCost, steps: int) -> bool:
-        """Take a policy if it is better; returns whether its cost is clearly lower.
+    def look_at(self, policy: TablePolicy, found: Quality, steps: int) -> bool:
+        """Take a policy if it is better; returns whether it is clearly better.
 
         Args:
             policy: copied if it is taken.
-            result: its costs.
+            found: how good it is.
             steps: interactions so far.
         """
-        rate, before = _rate(result), self.best
-        self._highest = max(self._highest, rate)
+        before = self.best
+        self._highest = max(self._highest, found.success_rate)
         # Against the highest ever, so that many small steps do not lead far down.
         least = self._highest - CLOSE
-        lost = before is None or _rate(before) < least
-        if rate < least or not (
-            lost or (before is not None and result.cost < before.cost)
-        ):
+        lost = before is None or before.success_rate < least
+        if found.success_rate < least:
             return False
-        self.best, self.policy, self.interactions = result, policy.copy(), steps
-        return before is None or lost or result.cost < (1.0 - BETTER) * before.cost
+        if not lost and before is not None and found.score >= before.score:
+            return False
+        self.best, self.policy, self.interactions = found, policy.copy(), steps
+        return before is None or lost or found.score < (1.0 - BETTER) * before.score
 
 
 class _Watch(Callback):
@@ -131,7 +154,7 @@ class _Watch(Callback):
         stop: Callable[[], bool],
         tell: Callable[[Progress], None],
     ) -> None:
-        self._env, self._states = with_slots_for(env, states), states
+        self._env, self._states = env, states
         self._seconds, self._steps = seconds, steps
         self._stop, self._tell = stop, tell
         self._begun = time.monotonic()
@@ -165,25 +188,30 @@ class _Watch(Callback):
         return why is None
 
     def _look(self, agent: Any, done: int) -> None:
-        result = evaluate_policy_cost(agent.policy, self._env, self._states, seed=0)
-        if self.choice.look_at(agent.policy, result, done):
+        policy = agent.policy
+        now = quality(policy, self._env, self._states)
+        if self.choice.look_at(policy, now, done):
             self._improved = done
-        best = self.choice.best or result
-        found = Progress(
-            done,
-            self.elapsed(),
-            result.cost,
-            _rate(result),
-            best.cost,
-            _rate(best),
-        )
+        best = self.choice.best or now
+        found = Progress(done, self.elapsed(), now, best)
         self.rows.append(found)
         self._tell(found)
 
     def _has_converged(self, done: int) -> bool:
         best = self.choice.best
-        good = best is not None and _rate(best) >= GOOD
+        good = best is not None and best.success_rate >= GOOD
         return good and done >= max(LEAST, (1.0 + PATIENCE) * self._improved)
+
+
+def quality(policy: TablePolicy, env: ControlVectorEnv, states: FloatArray) -> Quality:
+    """Simulate a policy from some starts, for twice the time limit."""
+    limit = env.system.evaluation_steps
+    found = simulate(policy, env, states, 2 * limit)
+    return Quality(
+        float(found.episode_costs().mean()),
+        float(found.success().mean()),
+        float(found.settled().mean()),
+    )
 
 
 def learn(
@@ -247,8 +275,3 @@ def _without_hints() -> Iterator[None]:
         yield
     finally:
         logger.setLevel(before)
-
-
-def _rate(result: PolicyCost) -> float:
-    """The success rate, which every plant has."""
-    return 0.0 if result.success_rate is None else result.success_rate

@@ -82,7 +82,7 @@ def measure(responses: Responses, plant: Plant) -> Measures:
     step, inside = plant.sampling_time, responses.inside
     to_goal, success = responses.steps_to_goal(), responses.success()
     costs = responses.episode_costs()
-    settled = np.asarray(inside[-_last_quarter(responses) :].all(axis=0))
+    settled = responses.settled()
     outside = ~inside
     # The step after the last one that ends outside the goal.
     last_outside = len(inside) - outside[::-1].argmax(axis=0)
@@ -168,15 +168,10 @@ def _overshoots(responses: Responses, plant: Plant) -> list[Spread]:
 
 def _remaining(responses: Responses, plant: Plant, success: BoolArray) -> list[Spread]:
     """The largest distance of each start that succeeds in the last quarter."""
-    error = distances(responses.states[-_last_quarter(responses) :], plant)
+    error = distances(responses.states[-responses.last_quarter :], plant)
     if error is None or not success.any():
         return []
     return [_spread(values) for values in error.max(axis=0)[success].T]
-
-
-def _last_quarter(responses: Responses) -> int:
-    """So many steps."""
-    return max(1, len(responses.actions) // 4)
 
 
 def _nearest(responses: Responses, plant: Plant, failed: BoolArray) -> float | None:

@@ -169,10 +169,10 @@ def draw_learning(learned: Learned) -> Figure:
     with style.in_style():
         figure = style.new_figure(3.4)
         upper, lower = figure.subplots(2, 1, sharex=True)
-        upper.plot(steps, [row.cost for row in rows], color=style.BLUE)
+        upper.plot(steps, [row.now.cost for row in rows], color=style.BLUE)
         upper.set_yscale("log")
         upper.set_ylabel("cost")
-        rates = [100.0 * row.success_rate for row in rows]
+        rates = [100.0 * row.now.success_rate for row in rows]
         lower.plot(steps, rates, color=style.BLUE)
         lower.axhline(100.0 * GOOD, **style.BOUND)
         lower.set_ylim(-3, 103)

@@ -81,15 +81,12 @@ def plant_of_recording(path: str | Path, recording: Recording) -> LearnedVectorE
             "the time between two rows must be known, got neither the column of the time "
             "in seconds nor the sampling time; give --time NAME or --sampling-time S."
         )
-    for name, values in (("goal", recording.goal), ("tolerance", recording.tolerance)):
-        if values is not None and len(values) not in (
-            len(recording.state),
-            *([1] if name == "tolerance" else []),
-        ):
-            raise ValueError(
-                f"{name} must hold a number for each of the {len(recording.state)} "
-                f"columns of the state, got {len(values)}."
-            )
+    size = len(recording.state)
+    if len(recording.goal) != size:
+        raise ValueError(
+            f"goal must hold a number for each of the {size} columns of the state, got "
+            f"{len(recording.goal)}."
+        )
     ends = {} if recording.low is None else {"low": _circular_only(recording, "low")}
     if recording.high is not None:
         ends["high"] = _circular_only(recording, "high")

@@ -49,6 +49,15 @@ class Responses:
         counted = np.arange(len(self.costs))[:, None] < last
         return np.asarray(np.sum(self.costs, axis=0, where=counted))
 
+    def settled(self) -> BoolArray:
+        """Whether the state is in the goal throughout the last quarter, `(n,)`."""
+        return np.asarray(self.inside[-self.last_quarter :].all(axis=0))
+
+    @property
+    def last_quarter(self) -> int:
+        """A quarter of the H steps, >= 1."""
+        return max(1, len(self.inside) // 4)
+
     def one(self, start: int) -> Responses:
         """The response from one of the starts."""
         chosen = slice(start, start + 1)

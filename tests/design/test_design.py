@@ -234,7 +234,7 @@ def run(**limits: Any) -> tuple[Learned, list[Progress]]:
 def test_learning_ends_by_itself() -> None:
     found, told = run()
     assert found.ended == "converged"
-    assert told[-1].best_success_rate >= 0.95
+    assert told[-1].best.success_rate >= 0.95
     assert found.interactions >= 10_000
 
 

@@ -11,11 +11,11 @@ from hypothesis import strategies as st
 
 import acl_gym
 from acl_gym.design.advice import advice, state_in_words
-from acl_gym.design.learning import Choice, Learned
+from acl_gym.design.learning import Choice, Learned, Quality
 from acl_gym.design.measures import measure, typical, worst
 from acl_gym.design.page import percent
 from acl_gym.design.simulation import Responses, simulate
-from acl_gym.evaluation import PolicyCost, evaluate_policy_cost
+from acl_gym.evaluation import evaluate_policy_cost
 from acl_gym.policies import TablePolicy
 
 
@@ -122,41 +122,48 @@ def test_a_goal_that_is_a_function_has_no_distance() -> None:
     assert measures.success_rate == 1.0
 
 
-def result(cost: float, rate: float) -> PolicyCost:
-    success = np.arange(100) < 100 * rate
-    return PolicyCost(
-        np.full(100, cost), success, np.ones(100, dtype=np.int64), np.full(100, -cost)
-    )
-
-
 def policy(number: int) -> TablePolicy:
     return TablePolicy(acl_gym.Fuzzy([[0.0, 1.0]]), np.full((2, 2), float(number)))
 
 
 def test_success_comes_first_then_cost() -> None:
     choice = Choice()
-    assert choice.look_at(policy(0), result(9.0, 0.5), 10)
-    assert not choice.look_at(policy(1), result(1.0, 0.4), 20)  # cheaper, less success
-    assert choice.look_at(policy(2), result(10.0, 0.9), 30)
-    assert choice.look_at(policy(3), result(5.0, 0.89), 40)  # as good, and cheaper
+    assert choice.look_at(policy(0), Quality(9.0, 0.5, 1.0), 10)
+    # Cheaper, with less success.
+    assert not choice.look_at(policy(1), Quality(1.0, 0.4, 1.0), 20)
+    assert choice.look_at(policy(2), Quality(10.0, 0.9, 1.0), 30)
+    # As good, and cheaper.
+    assert choice.look_at(policy(3), Quality(5.0, 0.89, 1.0), 40)
     # Within 1% of the last, but not of the best ever.
-    assert not choice.look_at(policy(4), result(4.0, 0.88), 50)
-    assert not choice.look_at(policy(5), result(4.99, 0.9), 60)  # kept, hardly better
+    assert not choice.look_at(policy(4), Quality(4.0, 0.88, 1.0), 50)
+    # Kept, though it is hardly better.
+    assert not choice.look_at(policy(5), Quality(4.99, 0.9, 1.0), 60)
     assert choice.interactions == 60
     assert choice.policy is not None
     assert choice.policy.table[0, 0] == 5.0
 
 
-@given(st.lists(st.tuples(st.floats(1, 100), st.floats(0, 1)), min_size=1, max_size=30))
+def test_what_stays_in_the_goal_is_better_than_what_is_a_little_cheaper() -> None:
+    choice = Choice()
+    choice.look_at(policy(0), Quality(5.0, 1.0, 0.0), 10)
+    assert choice.look_at(policy(1), Quality(8.0, 1.0, 1.0), 20)
+    assert not choice.look_at(policy(2), Quality(5.0, 1.0, 0.0), 30)
+    assert choice.look_at(policy(3), Quality(3.0, 1.0, 0.0), 40)
+
+
+RATES = st.floats(0, 1)
+
+
+@given(st.lists(st.tuples(st.floats(1, 100), RATES, RATES), min_size=1, max_size=30))
 def test_the_choice_never_falls_far_below_the_highest(
-    seen: list[tuple[float, float]],
+    seen: list[tuple[float, float, float]],
 ) -> None:
     choice = Choice()
-    for step, (cost, rate) in enumerate(seen):
-        choice.look_at(policy(step), result(cost, rate), step)
+    for step, each in enumerate(seen):
+        choice.look_at(policy(step), Quality(*each), step)
     assert choice.best is not None
-    highest = max(result(*each).success_rate or 0.0 for each in seen)
-    assert (choice.best.success_rate or 0.0) >= highest - 0.01 - 1e-12
+    highest = max(rate for _, rate, _ in seen)
+    assert choice.best.success_rate >= highest - 0.01
 
 
 def learned(ended: str) -> Learned:

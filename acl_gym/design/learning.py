@@ -19,6 +19,9 @@ from acl_gym.utils.typing import FloatArray, Row
 GOOD = 0.95
 """The share of starts from which the goal must be reached."""
 
+CHOOSING = 500
+"""Random starts from which the policies of one run are compared."""
+
 FIRST, GROWTH = 1_000, 1.1
 """Interactions before the first evaluation, and how much later each next one is at least."""
 
@@ -29,7 +32,7 @@ PATIENCE = 0.5
 """Learning ends when the cost has not improved for this share of the interactions before."""
 
 LEAST = 10_000
-"""Interactions before it may end for that reason."""
+"""Interactions before it may end for that reason; twice as many if any start fails."""
 
 _NO_LIMIT = 10**12  # interactions; the callback ends learning
 
@@ -199,8 +202,10 @@ class _Watch(Callback):
 
     def _has_converged(self, done: int) -> bool:
         best = self.choice.best
-        good = best is not None and best.success_rate >= GOOD
-        return good and done >= max(LEAST, (1.0 + PATIENCE) * self._improved)
+        if best is None or best.success_rate < GOOD:
+            return False
+        least = LEAST if best.success_rate == 1.0 else 2 * LEAST
+        return done >= max(least, (1.0 + PATIENCE) * self._improved)
 
 
 def quality(policy: TablePolicy, env: ControlVectorEnv, states: FloatArray) -> Quality:

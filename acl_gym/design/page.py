@@ -10,7 +10,7 @@ from typing import Any
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from acl_gym.design.advice import state_in_words
-from acl_gym.design.learning import GOOD, Learned
+from acl_gym.design.learning import CHOOSING, GOOD, Learned
 from acl_gym.design.measures import Measures, Spread, distances
 from acl_gym.design.recordings import UNSURE
 from acl_gym.envs.plant import Plant
@@ -58,6 +58,7 @@ def write_page(
         summary=summary,
         good=GOOD,
         unsure=UNSURE,
+        choosing=CHOOSING,
         measures=measures,
         learned=learned,
         ended=_ENDED[learned.ended],

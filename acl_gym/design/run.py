@@ -15,7 +15,7 @@ import numpy as np
 
 from acl_gym.design import pictures
 from acl_gym.design.advice import advice
-from acl_gym.design.learning import GOOD, Learned, Progress, learn
+from acl_gym.design.learning import CHOOSING, GOOD, Learned, Progress, learn
 from acl_gym.design.measures import Measures, measure, typical, worst
 from acl_gym.design.page import write_page
 from acl_gym.design.plants import as_vector_env, load_plant
@@ -32,9 +32,6 @@ from acl_gym.utils.typing import FloatArray
 
 STARTS = 1_000
 """Random starts of the figures in the report."""
-
-CHOOSING = 300
-"""Other random starts, from which the policies of one run are compared."""
 
 SECONDS = 60.0
 """The default time limit of learning."""

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from acl_gym.cli.design import EXAMPLES, example
-from acl_gym.design.learning import learn
+from acl_gym.design.learning import CHOOSING, learn
 from acl_gym.design.run import draw_starts
 from tests.design.c_simulation import EQUATIONS, steps_in_c
 
@@ -35,7 +35,7 @@ def test_the_controller_in_c_reaches_the_goal(name: str, tmp_path: Path) -> None
     plant = env.system
     learned = learn(
         env,
-        draw_starts(plant, 300, 0, 1),
+        draw_starts(plant, CHOOSING, 0, 1),
         seed=0,
         seconds=None,
         steps=STEPS[name],

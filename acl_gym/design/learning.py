@@ -22,7 +22,7 @@ GOOD = 0.95
 CHOOSING = 500
 """Random starts from which the policies of one run are compared."""
 
-FIRST, GROWTH = 1_000, 1.1
+FIRST, GROWTH = 1_500, 1.1
 """Interactions before the first evaluation, and how much later each next one is at least."""
 
 BETTER = 0.01

@@ -12,7 +12,6 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from acl_gym.design.advice import state_in_words
 from acl_gym.design.learning import CHOOSING, GOOD, Learned
 from acl_gym.design.measures import Measures, Spread, distances
-from acl_gym.design.recordings import UNSURE
 from acl_gym.envs.plant import Plant
 from acl_gym.utils.files import write_atomically
 from acl_gym.utils.text import digits
@@ -57,7 +56,6 @@ def write_page(
         title=_title(summary),
         summary=summary,
         good=GOOD,
-        unsure=UNSURE,
         choosing=CHOOSING,
         measures=measures,
         learned=learned,

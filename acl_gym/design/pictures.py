@@ -12,10 +12,8 @@ from matplotlib.figure import Figure
 
 from acl_gym.design.learning import GOOD, Learned
 from acl_gym.design.measures import periods
-from acl_gym.design.recordings import spread_over
 from acl_gym.design.simulation import Responses
 from acl_gym.envs.control.environments import ControlVectorEnv
-from acl_gym.envs.learned.env import LearnedVectorEnv
 from acl_gym.envs.plant import Plant
 from acl_gym.partitions import Grid
 from acl_gym.plotting import palettes, plot_policy, style
@@ -28,7 +26,7 @@ DPI = 110
 
 _GOAL: dict[str, Any] = {"color": style.GREEN, "alpha": 0.18, "linewidth": 0}
 _AFTER = 0.35  # opacity of what comes after the goal
-_COLOURS = (style.BLUE, style.ORANGE, style.GREEN, "#CC79A7", style.BLACK)
+_COLOURS = (style.BLUE, style.ORANGE, style.GREEN, style.BLACK)
 
 
 def draw_policy(policy: TablePolicy, env: ControlVectorEnv, plant: Plant) -> Figure:
@@ -40,12 +38,12 @@ def draw_policy(policy: TablePolicy, env: ControlVectorEnv, plant: Plant) -> Fig
     size = plant.low.size
     if size <= 2:
         ax: Any = plot_policy(policy, env=env)
-        _mark_goal(ax, plant, tuple(range(size)))
+        mark_goal(ax, plant, tuple(range(size)))
         whole: Figure = ax.figure
         return whole
     shown = most_divided(policy)
     others = [axis for axis in range(size) if axis not in shown]
-    values = [_levels(plant, axis, few=i < 2) for i, axis in enumerate(others)]
+    values = [levels_shown(plant, axis, few=i < 2) for i, axis in enumerate(others)]
     slices = list(itertools.product(*values))
     columns = 3
     subject = subject_of(policy, env)
@@ -60,7 +58,7 @@ def draw_policy(policy: TablePolicy, env: ControlVectorEnv, plant: Plant) -> Fig
             ax.set_title(_at(subject, where), fontsize="small")
             ax.set_xlabel("")
             ax.set_ylabel("")
-            _mark_goal(ax, plant, shown)
+            mark_goal(ax, plant, shown)
         x, y = (style.symbol(subject.variables[axis].name) for axis in shown)
         style.label_outer(panels, columns, x, y)
         palettes.add_bar(panels[0], palettes.of_inputs(subject), below=True)
@@ -78,8 +76,8 @@ def draw_responses(
         env: the plant.
     """
     plant: Any = env.system
-    names = [style.symbol(_with_unit(name)) for name in plant.variable_names]
-    inputs = [style.symbol(_with_unit(name)) for name in plant.signals.inputs]
+    names = [style.symbol(with_unit(name)) for name in plant.variable_names]
+    inputs = [style.symbol(with_unit(name)) for name in plant.signals.inputs]
     count = len(names) + len(inputs)
     shown = _steps_shown(responses)
     time = plant.sampling_time * np.arange(shown + 1)
@@ -125,7 +123,7 @@ def draw_starts(
 ) -> Figure:
     """What each start costs, over two variables, and which do not reach the goal."""
     plant: Any = env.system
-    names = [style.symbol(_with_unit(name)) for name in plant.variable_names]
+    names = [style.symbol(with_unit(name)) for name in plant.variable_names]
     states, success = responses.states[0], responses.success()
     costs = responses.episode_costs()
     axes = most_divided(policy) if len(names) > 1 else (0,)
@@ -146,7 +144,7 @@ def draw_starts(
             palettes.add_level_bar(ax, dots, "cost", extend="max")
             ax.set_ylabel(names[axes[1]])
             ax.set_ylim(plant.low[axes[1]], plant.high[axes[1]])
-            _mark_goal(ax, plant, axes)
+            mark_goal(ax, plant, axes)
         ax.set_xlim(plant.low[axes[0]], plant.high[axes[0]])
         ax.scatter(
             *(x[~success], y[~success]), s=30, marker="x", color=style.ORANGE, zorder=3,
@@ -189,46 +187,6 @@ def draw_learning(learned: Learned) -> Figure:
     return figure
 
 
-def draw_spread(policy: TablePolicy, env: LearnedVectorEnv) -> Figure:
-    """Where a learned model is unsure, over two variables, and what was recorded.
-
-    The others are at the goal, or in the middle of their range.
-    """
-    plant = env.system
-    size = plant.low.size
-    names = [style.symbol(_with_unit(name)) for name in plant.variable_names]
-    shown = list(most_divided(policy) if size > 1 else (0,))
-    fixed = [_levels(plant, axis, few=False)[0] for axis in range(size)]
-    lines = [np.linspace(plant.low[axis], plant.high[axis], 61) for axis in shown]
-    mesh = np.meshgrid(*lines)
-    states = np.tile(np.array(fixed), (mesh[0].size, 1))
-    for axis, values in zip(shown, mesh, strict=True):
-        states[:, axis] = values.ravel()
-    # The end of a circle is its beginning.
-    spread = spread_over(env, np.clip(states, plant.low, plant.high))
-    seen = plant.variables(env.transitions.states)
-    with style.in_style():
-        figure = style.new_figure(3.6, 5.6)
-        ax = figure.subplots()
-        if size == 1:
-            ax.plot(lines[0], spread, color=style.BLUE)
-            ax.plot(seen[:, 0], np.zeros(len(seen)), "|", color="0.2")
-            ax.set_ylabel("spread")
-        else:
-            image = ax.pcolormesh(
-                *lines, spread.reshape(mesh[0].shape), cmap="Purples", vmin=0.0,
-                vmax=max(1.0, float(spread.max())), shading="nearest", rasterized=True,
-            )  # fmt: skip
-            palettes.add_level_bar(ax, image, "spread")
-            ax.plot(*seen[:, shown].T, ".", color=style.ORANGE, markersize=2.5)
-            ax.set_ylabel(names[shown[1]])
-            _mark_goal(ax, plant, tuple(shown))
-            ax.grid(visible=False)
-        ax.set_xlim(plant.low[shown[0]], plant.high[shown[0]])
-        ax.set_xlabel(names[shown[0]])
-    return figure
-
-
 def most_divided(policy: TablePolicy) -> tuple[int, int]:
     """The two variables with the most cells, in their order."""
     partition = policy.partition
@@ -239,7 +197,7 @@ def most_divided(policy: TablePolicy) -> tuple[int, int]:
     return first, second
 
 
-def _levels(plant: Plant, axis: int, few: bool) -> list[float]:
+def levels_shown(plant: Plant, axis: int, few: bool) -> list[float]:
     """Values at which a variable is held: low, at the goal, high; or at the goal."""
     low, high = float(plant.low[axis]), float(plant.high[axis])
     middle, box = 0.5 * (low + high), plant.goal_box
@@ -258,7 +216,7 @@ def _at(subject: Subject, where: dict[str | int, float]) -> str:
     return ", ".join(parts)
 
 
-def _mark_goal(ax: Axes, plant: Plant, shown: tuple[int, ...]) -> None:
+def mark_goal(ax: Axes, plant: Plant, shown: tuple[int, ...]) -> None:
     """A frame around the goal in a plane of two variables."""
     box = plant.goal_box
     if box is None or len(shown) != 2 or not np.isfinite(box).all():
@@ -303,6 +261,7 @@ def _steps_shown(responses: Sequence[Responses]) -> int:
     return max(2, min(whole, int(1.3 * last) + 5))
 
 
-def _with_unit(name: str) -> str:
+def with_unit(name: str) -> str:
+    """The unit of a name in brackets: "speed (m/s)"."""
     word, *rest = name.split(", ")
     return f"{word} ({rest[0]})" if rest else word

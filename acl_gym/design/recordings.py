@@ -156,7 +156,7 @@ def model_facts(env: LearnedVectorEnv, responses: Responses) -> dict[str, Any]:
         Plain numbers and texts: `steps` and `runs` that were recorded, `regressor`, the
         `errors` of each variable in cross-validation, `doubts` about the data, and
         the `spread`, the largest on the way to the goal from each start: its median, 95%
-        quantile and worst, and the share of starts for which it exceeds `UNSURE`.
+        quantile and worst, and the share of starts, `unsure`, for which it exceeds the `limit`.
     """
     data, dynamics = env.transitions, env.dynamics
     largest = largest_spreads(env, responses)
@@ -171,6 +171,7 @@ def model_facts(env: LearnedVectorEnv, responses: Responses) -> dict[str, Any]:
             "median": float(np.median(largest)),
             "high": float(np.quantile(largest, 0.95)),
             "worst": float(largest.max()),
+            "limit": UNSURE,
             "unsure": float((largest > UNSURE).mean()),
         },
     }

@@ -6,7 +6,7 @@ import json
 import math
 import time
 from collections.abc import Callable
-from contextlib import nullcontext
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -19,10 +19,8 @@ from acl_gym.design.learning import CHOOSING, GOOD, Learned, Progress, learn
 from acl_gym.design.measures import Measures, measure, typical, worst
 from acl_gym.design.page import write_page
 from acl_gym.design.plants import as_vector_env, load_plant
-from acl_gym.design.recordings import model_facts, one_thread
 from acl_gym.design.simulation import Responses, simulate
 from acl_gym.envs.control.environments import ControlVectorEnv
-from acl_gym.envs.learned.env import LearnedVectorEnv
 from acl_gym.envs.plant import Plant
 from acl_gym.evaluation import evaluate_over_range
 from acl_gym.experiments.provenance import circumstances
@@ -130,7 +128,7 @@ def design(
         env = as_vector_env(plant)
     system: Any = env.system
     folder.mkdir(exist_ok=True)
-    with one_thread() if isinstance(env, LearnedVectorEnv) else nullcontext():
+    with _threads_for(env):
         say("learning")
         learned = learn(
             env,
@@ -164,18 +162,19 @@ class _Measured:
     figures: tuple[str, ...]
 
 
-def _measured(
-    learned: Learned, env: ControlVectorEnv, folder: Path, seed: int
-) -> _Measured:
+def _measured(learned: Learned, env: Any, folder: Path, seed: int) -> _Measured:
     """Simulate the controller from random starts, and draw."""
     system: Any = env.system
     starts = draw_starts(system, STARTS, seed, 2)[:, : system.low.size]
     responses = simulate(learned.policy, env, starts, 2 * system.evaluation_steps, seed)
     figures = _draw(learned, responses, env, system)
     model = None
-    if isinstance(env, LearnedVectorEnv):
+    if is_learned(env):
+        from acl_gym.design.recordings import model_facts
+        from acl_gym.design.spread import draw_spread
+
         model = model_facts(env, responses)
-        figures["model"] = pictures.draw_spread(learned.policy, env)
+        figures["model"] = draw_spread(learned.policy, env)
     for name, figure in figures.items():
         figure.savefig(folder / f"{name}.png", dpi=pictures.DPI)
     return _Measured(
@@ -247,6 +246,23 @@ def checked_folder(out: str | Path) -> Path:
     target = folder / "summary.json" if folder.exists() else folder
     files.checked_target(target, "give a folder elsewhere")
     return folder
+
+
+def is_learned(env: Any) -> bool:
+    """Whether a plant is a `LearnedVectorEnv`.
+
+    Asked so because the libraries of regression take a second to import, which a plant
+    with equations should not cost.
+    """
+    return hasattr(env, "transitions")
+
+
+def _threads_for(env: Any) -> AbstractContextManager[None]:
+    if not is_learned(env):
+        return nullcontext()
+    from acl_gym.design.recordings import one_thread
+
+    return one_thread()
 
 
 def draw_starts(plant: Plant, count: int, seed: int, stream: int) -> FloatArray:

@@ -62,3 +62,17 @@ def test_each_example_is_listed_with_equations_in_c() -> None:
         text = example(name)
         assert f"acl-gym design {name}.py" in text
         assert text.count("\n") <= 60
+
+
+PAGE = Path(__file__).resolve().parents[2] / "docs" / "design.md"
+
+
+@pytest.mark.skipif(not PAGE.exists(), reason="a source distribution has no docs")
+def test_the_documentation_shows_the_example_as_it_is() -> None:
+    text = PAGE.read_text()
+    lines = text.partition("```python\n")[2].partition("```")[0].splitlines()
+    known = example("pendulum").splitlines()
+    assert len(lines) > 15
+    assert [line for line in lines if line and line not in known] == []
+    for name in EXAMPLES:
+        assert f"`{name}`" in text

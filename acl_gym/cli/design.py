@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 import shlex
-import sys
-import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from importlib.resources import as_file, files
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import typer
 
 from acl_gym.cli import recorded
-from acl_gym.cli.common import DebugOption, JsonOption, check_name, console, print_json
+from acl_gym.cli.common import DebugOption, JsonOption, check_name, print_json
+from acl_gym.cli.design_output import print_design, progress
 from acl_gym.cli.errors import (
     BadArgumentError,
     Command,
@@ -24,19 +21,12 @@ from acl_gym.cli.errors import (
 )
 from acl_gym.cli.interrupts import Interruption
 
-if TYPE_CHECKING:
-    from acl_gym.design import Design
-    from acl_gym.design.learning import Progress
-
 EXAMPLES = {
     "pendulum": "swing up a pendulum on a weak motor; seconds",
     "dc_motor": "turn the shaft of a geared motor to an angle, with friction; seconds",
     "two_tanks": "bring the second of two coupled tanks to a level; seconds",
     "cart_pole": "swing up a pole on a cart, four variables; most of a minute",
 }
-
-PROGRESS_SECONDS = 5.0
-"""Between two lines of progress where there is no terminal."""
 
 HELP = """Design a controller for a plant of yours, and say how good it is.
 
@@ -367,7 +357,7 @@ def _run(
     with bad_arguments():
         folder = checked_folder(_free_folder(stem) if out is None else out)
     command = shlex.join(["acl-gym", "design", *named, "--out", str(folder)])
-    with Interruption() as interruption, _progress(not shown.quiet) as (tell, say):
+    with Interruption() as interruption, progress(not shown.quiet) as tell:
         try:
             made = design_controller(
                 env,
@@ -376,7 +366,7 @@ def _run(
                 command=command,
                 stop=lambda: interruption.wanted,
                 tell=tell,
-                say=say,
+                on_learned=interruption.learning_is_over,
                 **learning,
             )
         except KeyboardInterrupt:
@@ -389,7 +379,7 @@ def _run(
     if shown.as_json:
         print_json(made.summary)
     else:
-        _print(made)
+        print_design(made)
     if interruption.wanted:
         raise InterruptedRunError(
             f"interrupted; the best controller so far is in {folder}.",
@@ -402,74 +392,6 @@ def _run(
             f"less than 95%. What to try: {' '.join(made.advice)}",
         )
         raise typer.Exit(1)
-
-
-@contextmanager
-def _progress(
-    wanted: bool,
-) -> Iterator[tuple[Callable[[Progress], None], Callable[[str], None]]]:
-    """Functions that show progress on stderr: in place on a terminal, else in lines."""
-    if not wanted:
-        yield (lambda progress: None), (lambda words: None)
-        return
-    if sys.stderr.isatty():
-        with console(stderr=True).status("") as status:
-            yield (lambda progress: status.update(_in_words(progress))), status.update
-        return
-    last = time.monotonic()
-
-    def tell(progress: Progress) -> None:
-        nonlocal last
-        if time.monotonic() - last >= PROGRESS_SECONDS:
-            last = time.monotonic()
-            report("acl-gym", _in_words(progress))
-
-    yield tell, (lambda words: None)
-
-
-def _in_words(progress: Progress) -> str:
-    now, best = progress.now, progress.best
-    return (
-        f"learning, {progress.seconds:.0f} s, {progress.interactions:,} interactions: "
-        f"goal reached from {now.success_rate:.0%} of the starts, cost {now.cost:.4g}; "
-        f"best {best.success_rate:.0%}, {best.cost:.4g}"
-    )
-
-
-def _print(made: Design) -> None:
-    from rich.table import Table
-
-    measures = made.measures
-    table = Table(box=None, pad_edge=False, header_style="bold")
-    for head in ("", "median", "mean", "95% below", "worst"):
-        table.add_column(head, justify="right" if head else "left")
-    named = {
-        "cost": measures.cost,
-        "time to the goal, s": measures.time_to_goal,
-        "settling time, s": measures.settling_time,
-        **{f"overshoot of {n}": each for n, each in measures.overshoot.items()},
-    }
-    for name, spread in named.items():
-        if spread is not None:
-            values = spread.median, spread.mean, spread.high, spread.worst
-            table.add_row(name, *(f"{value:.4g}" for value in values))
-    screen = console()
-    lines = [
-        f"The goal is reached from {measures.success_rate:.1%} of {measures.starts:,} "
-        f"random starts; {measures.settled_rate:.1%} stay there.",
-        f"Learned from {made.learned.interactions:,} interactions in "
-        f"{made.learned.seconds:.1f} s; {made.summary['seconds']:.1f} s in all.",
-    ]
-    for line in lines:
-        screen.print(line, markup=False, highlight=False, soft_wrap=True)
-    screen.print(table)
-    screen.print(
-        f"Wrote {made.folder / 'report.html'}, and the controller, "
-        f"{made.folder / 'policy.h'}.",
-        markup=False,
-        highlight=False,
-        soft_wrap=True,
-    )
 
 
 def _example_file(name: str) -> Any:

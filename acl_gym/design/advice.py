@@ -12,6 +12,12 @@ NEAR = 3.0
 
 FEW_ACTIONS = 4
 
+_MORE = {
+    "time": "Give it more time, --seconds with a larger number",
+    "steps": "Give it more interactions, --steps with a larger number",
+    "interrupted": "Do not interrupt it",
+}
+
 
 def advice(learned: Learned, measures: Measures, plant: Plant) -> list[str]:
     """Sentences on what to try, the most promising first; empty where all is well.
@@ -24,17 +30,26 @@ def advice(learned: Learned, measures: Measures, plant: Plant) -> list[str]:
     if measures.success_rate >= GOOD:
         return []
     found = []
-    if learned.ended != "converged":
+    if learned.ended in _MORE:
         found.append(
-            "Give it more time, --seconds with a larger number: learning had not come "
-            f"to its end after {learned.seconds:.0f} s."
+            f"{_MORE[learned.ended]}: learning had not come to its end after "
+            f"{learned.seconds:.0f} s."
+        )
+    longer = (
+        "Allow more time for an episode (max_episode_steps=): it ends after "
+        f"{digits(plant.evaluation_steps * plant.sampling_time)} s"
+    )
+    late = measures.late_rate > 0.5 * (1.0 - measures.success_rate)
+    if late:
+        found.append(
+            f"{longer}, and from most of the starts that fail the goal is reached later."
         )
     near = measures.nearest is not None and measures.nearest < NEAR
     if near:
         found.append(
             "Make the goal larger (tolerance=): from the starts that fail, the state "
-            f"comes within {digits(measures.nearest or 0.0)} times its half-width, which "
-            "is too coarse a meeting for this controller."
+            f"misses it narrowly, by {digits(measures.nearest or 0.0)} times its "
+            "half-width from its middle."
         )
     finer = (
         "Sample more finely (sampling_time=, with as many more max_episode_steps): now "
@@ -50,10 +65,8 @@ def advice(learned: Learned, measures: Measures, plant: Plant) -> list[str]:
         f"{state_in_words(measures.worst_start, plant)}, the worst start, the goal may be "
         "out of reach."
     )
-    found.append(
-        "Allow more time for an episode (max_episode_steps=): it ends after "
-        f"{digits(plant.evaluation_steps * plant.sampling_time)} s."
-    )
+    if not late:
+        found.append(f"{longer}.")
     found += [] if near else [finer, actions]
     if len(plant.inputs) >= FEW_ACTIONS and not near:
         found.remove(actions)

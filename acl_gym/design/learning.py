@@ -248,6 +248,7 @@ def learn(
     Raises:
         KeyboardInterrupt: it was interrupted before any policy was evaluated.
     """
+    _compile(env, states)
     watch = _Watch(env, states, seconds, steps, stop, tell)
     colony = colony_for(env, seed)
     try:
@@ -268,6 +269,12 @@ def learn(
         tuple(watch.rows),
         colony.num_envs,
     )
+
+
+def _compile(env: ControlVectorEnv, states: FloatArray) -> None:
+    """Compile what is compiled at its first use, half a minute that are no learning."""
+    colony = colony_for(env, 0).learn(trials=1)
+    simulate(colony.policy, env, states[:2], 1)
 
 
 @contextmanager

@@ -50,9 +50,10 @@ class Measures:
         worst_start: the start of the highest cost; one that fails if any does.
         typical_start: the successful start whose cost is the median of all successful
             ones; of all starts if none succeeds.
-        nearest: how near those that fail come to the goal: the median over them of the
-            least distance, in multiples of the half-widths of the goal; None where none
-            fails, or the goal is no place.
+        late_rate: the share from which the goal is reached, but after the time limit.
+        nearest: how near those that fail come to the goal within the time limit: the
+            median over them of the least distance, in multiples of the half-widths of the
+            goal; None where none fails, or the goal is no place.
     """
 
     starts: int
@@ -65,6 +66,7 @@ class Measures:
     remaining: dict[str, Spread]
     worst_start: tuple[float, ...]
     typical_start: tuple[float, ...]
+    late_rate: float
     nearest: float | None
 
     def as_dict(self) -> dict[str, Any]:
@@ -99,6 +101,7 @@ def measure(responses: Responses, plant: Plant) -> Measures:
         remaining=dict(zip(names, _remaining(responses, plant, success), strict=False)),
         worst_start=_state(responses, worst(responses)),
         typical_start=_state(responses, typical(responses)),
+        late_rate=float((inside.any(axis=0) & ~success).mean()),
         nearest=_nearest(responses, plant, ~success),
     )
 
@@ -175,7 +178,9 @@ def _remaining(responses: Responses, plant: Plant, success: BoolArray) -> list[S
 
 
 def _nearest(responses: Responses, plant: Plant, failed: BoolArray) -> float | None:
-    error, box = distances(responses.states[:, failed], plant), plant.goal_box
+    # Where a start fails, no state is in the goal until then but perhaps the first.
+    within = responses.states[1 : responses.limit + 1, failed]
+    error, box = distances(within, plant), plant.goal_box
     if error is None or box is None or not failed.any():
         return None
     half = np.maximum((box[1] - box[0]) / 2, np.finfo(float).tiny)

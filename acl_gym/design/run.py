@@ -75,7 +75,7 @@ def design(
     command: str | None = None,
     stop: Callable[[], bool] = lambda: False,
     tell: Callable[[Progress], None] = lambda progress: None,
-    say: Callable[[str], None] = lambda words: None,
+    on_learned: Callable[[], None] = lambda: None,
 ) -> Design:
     """Learn a controller for a plant, and write it with a report into a folder.
 
@@ -98,7 +98,7 @@ def design(
         stop: asked after each trial; True ends learning, and the best policy so far is
             kept.
         tell: called after each evaluation.
-        say: called with what is done next.
+        on_learned: called when learning is over, before anything is written.
 
     Returns:
         The controller and what is known of it.
@@ -127,9 +127,7 @@ def design(
     else:
         env = as_vector_env(plant)
     system: Any = env.system
-    folder.mkdir(exist_ok=True)
     with _threads_for(env):
-        say("learning")
         learned = learn(
             env,
             draw_starts(system, CHOOSING, seed, 1),
@@ -139,7 +137,8 @@ def design(
             stop=stop,
             tell=tell,
         )
-        say(f"simulating {STARTS:,} starts")
+        on_learned()
+        folder.mkdir(exist_ok=True)
         measured = _measured(learned, env, folder, seed)
     repeated = _command(command, source, folder, seed, learned)
     return _written(folder, source, env, learned, measured, repeated, seed, begun)
@@ -204,7 +203,7 @@ def _written(
         name = "plant.py" if measured.model is None else f"data{source.suffix}"
         files.write_atomically(folder / name, source.read_bytes())
     tips = advice(learned, measures, system)
-    summary = {
+    facts = {
         "plant": "acl_gym.plant(...)" if source is None else str(source),
         "reaches_goal": measures.success_rate >= GOOD,
         **measures.as_dict(),
@@ -224,7 +223,8 @@ def _written(
         "made": circumstances(1),
         "seconds": time.monotonic() - begun,
     }
-    text = json.dumps(_plain(summary), indent=1)
+    summary: dict[str, Any] = _plain(facts)
+    text = json.dumps(summary, indent=1)
     files.write_atomically(folder / "summary.json", text.encode())
     write_page(folder, summary, learned, measures, system, measured.figures)
     return Design(folder, learned.policy, measures, learned, tuple(tips), summary)

@@ -181,6 +181,11 @@ def test_advice_names_the_worst_start_and_what_to_try() -> None:
     near = measure(respond([1] * 20, [[1.0, 0.0]]), plant)
     first, *_ = advice(learned("converged"), near, plant)
     assert "tolerance=" in first
+    late = measure(respond([1] * 10 + [0] * 10, [[4.0, 0.0]]), plant)
+    assert (late.success_rate, late.late_rate) == (0.0, 1.0)
+    first, *_ = advice(learned("converged"), late, plant)
+    assert "max_episode_steps=" in first
+    assert "reached later" in first
 
 
 def test_words_and_percents() -> None:

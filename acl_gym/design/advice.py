@@ -10,8 +10,6 @@ from acl_gym.utils.text import digits
 NEAR = 3.0
 """Multiples of the half-widths of the goal within which a failure was close."""
 
-FEW_ACTIONS = 4
-
 _MORE = {
     "time": "Give it more time, --seconds with a larger number",
     "steps": "Give it more interactions, --steps with a larger number",
@@ -29,37 +27,39 @@ def advice(learned: Learned, measures: Measures, plant: Plant) -> list[str]:
     """
     if measures.success_rate >= GOOD:
         return []
+    from_data = hasattr(plant, "dynamics")
+    failed = 1.0 - measures.success_rate
+    late = measures.late_rate > 0.5 * failed
+    near = measures.nearest is not None and measures.nearest < NEAR
+    longer = (
+        "Allow more time for an episode (max_episode_steps=): it ends after "
+        f"{digits(plant.evaluation_steps * plant.sampling_time)} s"
+    )
+    finer = [
+        "Sample more finely (sampling_time=, with as many more max_episode_steps): now "
+        f"the input is held for {digits(plant.sampling_time)} s.",
+        f"Allow more actions (inputs=, now {len(plant.inputs)}), in particular weaker ones "
+        "between the strongest.",
+    ]
+    if from_data:
+        finer = ["Record more, in particular where the report shows an unsure model."]
     found = []
     if learned.ended in _MORE:
         found.append(
             f"{_MORE[learned.ended]}: learning had not come to its end after "
             f"{learned.seconds:.0f} s."
         )
-    longer = (
-        "Allow more time for an episode (max_episode_steps=): it ends after "
-        f"{digits(plant.evaluation_steps * plant.sampling_time)} s"
-    )
-    late = measures.late_rate > 0.5 * (1.0 - measures.success_rate)
     if late:
         found.append(
             f"{longer}, and from most of the starts that fail the goal is reached later."
         )
-    near = measures.nearest is not None and measures.nearest < NEAR
     if near:
         found.append(
             "Make the goal larger (tolerance=): from the starts that fail, the state "
-            f"misses it narrowly, by {digits(measures.nearest or 0.0)} times its "
-            "half-width from its middle."
+            f"comes as near as {digits(measures.nearest or 0.0)} times the distance from "
+            "the middle of the goal to its border."
         )
-    finer = (
-        "Sample more finely (sampling_time=, with as many more max_episode_steps): now "
-        f"the input is held for {digits(plant.sampling_time)} s."
-    )
-    actions = (
-        f"Allow more actions (inputs=, now {len(plant.inputs)}), in particular weaker ones "
-        "between the strongest."
-    )
-    found += [finer, actions] if near else []
+        found += finer
     found.append(
         "Make the inputs stronger (inputs=), if the actuator allows it: from "
         f"{state_in_words(measures.worst_start, plant)}, the worst start, the goal may be "
@@ -67,13 +67,13 @@ def advice(learned: Learned, measures: Measures, plant: Plant) -> list[str]:
     )
     if not late:
         found.append(f"{longer}.")
-    found += [] if near else [finer, actions]
-    if len(plant.inputs) >= FEW_ACTIONS and not near:
-        found.remove(actions)
-    found.append(
-        "Begin with easier starts (initial=), if the plant never is in all states "
-        "between low and high."
-    )
+    if not near:
+        found += finer
+    if not from_data:
+        found.append(
+            "Begin with easier starts (initial=), if the plant never is in all states "
+            "between low and high."
+        )
     return found
 
 

@@ -10,6 +10,8 @@ import acl_gym
 from acl_gym.cli.common import DebugOption
 from acl_gym.cli.compare import HELP as COMPARE_HELP
 from acl_gym.cli.compare import CompareCommand, compare
+from acl_gym.cli.design import HELP as DESIGN_HELP
+from acl_gym.cli.design import DesignCommand, design
 from acl_gym.cli.envs import HELP as ENVS_HELP
 from acl_gym.cli.envs import envs
 from acl_gym.cli.errors import Command, Group
@@ -27,6 +29,7 @@ Examples:
   acl-gym envs                                   list the environments
   acl-gym train acl_gym/Pendulum-v0 --out a.npz  learn, in a few seconds
   acl-gym evaluate a.npz                         evaluate the saved policy
+  acl-gym design --example pendulum              a controller in C, and a report
   acl-gym compare                                compare ACL, Q-learning, DQN
   acl-gym reproduce fig5.4 --runs 3              repeat a figure of the thesis
 
@@ -63,6 +66,7 @@ def _main(
 
 app.command(help=TRAIN_HELP, cls=TrainCommand)(train)
 app.command(help=EVALUATE_HELP)(evaluate)
+app.command(help=DESIGN_HELP, cls=DesignCommand)(design)
 app.command(help=ENVS_HELP)(envs)
 app.command(help=COMPARE_HELP, cls=CompareCommand)(compare)
 app.command(help=REPRODUCE_HELP, cls=ReproduceCommand)(reproduce)

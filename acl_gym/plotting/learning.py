@@ -5,10 +5,9 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.ticker import EngFormatter
@@ -18,6 +17,9 @@ from acl_gym.utils import validation
 from acl_gym.utils.pictures import COLOURS
 from acl_gym.utils.steps import hold_last_value
 from acl_gym.utils.typing import FloatArray
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 AXES = {"env_steps": "interactions", "seconds": "seconds of learning"}
 """What curves may be drawn over: a column of the logs, and its name."""
@@ -184,6 +186,8 @@ def _rises(column: str) -> bool:
 
 def _histories(value: Any) -> list[pd.DataFrame]:
     """The rows of each run."""
+    import pandas as pd  # takes half a second, which other pictures need not cost
+
     several = isinstance(value, (list, tuple)) and not all(
         isinstance(row, Mapping) for row in value
     )

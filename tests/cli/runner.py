@@ -17,7 +17,7 @@ ROOT = Path(__file__).resolve().parents[2]
 PENDULUM = "acl_gym/Pendulum-v0"
 SMALL = ["train", PENDULUM, "--ants", "10", "--cells", "6,7", "--trials", "5"]
 SMALL += ["--evaluate-every", "2", "--agent", "acl"]
-COMMANDS = ("train", "evaluate", "envs", "compare", "reproduce", "report")
+COMMANDS = ("train", "evaluate", "design", "envs", "compare", "reproduce", "report")
 
 
 def invoke(*arguments: str) -> Any:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from typing import Any, ClassVar
 
 import gymnasium as gym
@@ -45,6 +46,7 @@ class ControlEnv(gym.Env[NDArray[Any], np.int64]):
 
     def __init__(self, render_mode: str | None = None, **parameters: Any) -> None:
         self.render_mode = checked_render_mode(render_mode, self.metadata)
+        self.parameters = copy.deepcopy(parameters)  # the caller may change a list
         self.system = made_system(self.system_type, parameters)
         self.observation_space = self.system.observation_space
         self.action_space = self.system.action_space

@@ -204,6 +204,10 @@ class Fit:
         seed: int = 0,
         begin: Fit | None = None,
     ) -> None:
+        # Before threads are limited: only libraries that are loaded are told.
+        import sklearn.ensemble
+        import sklearn.gaussian_process
+        import sklearn.neighbors  # noqa: F401
         from threadpoolctl import threadpool_limits
 
         folds = folds_of(len(rows))

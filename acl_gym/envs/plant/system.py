@@ -134,6 +134,11 @@ class Plant(ControlSystem):
         return dict(self._task)
 
     @property
+    def variable_names(self) -> tuple[str, ...]:
+        """The names of the state variables, without those of parameters."""
+        return self._signals.observations
+
+    @property
     def goal_box(self) -> FloatArray | None:
         """The lower and upper ends of the goal, `(2, state_size)`; None if it has none."""
         return self._goal.box
@@ -145,6 +150,11 @@ class Plant(ControlSystem):
             TypeError: the dynamics has no parameter of that name.
         """
         return self.parameters.value_of(name)
+
+    @property
+    def has_goal(self) -> bool:
+        """Whether an episode may end in success."""
+        return self._goal.centre is not None or self._goal.function is not None
 
     @property
     def max_stage_cost(self) -> float:

@@ -89,7 +89,7 @@ class PlantParameters:
     def draw(self, rng: np.random.Generator, count: int) -> FloatArray:
         """Values of the uncertain ones for some plants, uniform, `(m, count)`."""
         span = (self.high - self.low)[:, None]
-        return self.low[:, None] + span * rng.random((self.count, count))
+        return np.asarray(self.low[:, None] + span * rng.random((self.count, count)))
 
     def of(self, drawn: FloatArray) -> Any:
         """All parameters of some plants by their names.

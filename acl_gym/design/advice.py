@@ -1,0 +1,88 @@
+"""What to try where the goal is not reached from enough starts."""
+
+from __future__ import annotations
+
+from acl_gym.design.learning import GOOD, Learned
+from acl_gym.design.measures import Measures
+from acl_gym.envs.plant import Plant
+from acl_gym.utils.text import digits
+
+NEAR = 3.0
+"""Multiples of the half-widths of the goal within which a failure was close."""
+
+_MORE = {
+    "time": "Give it more time, --seconds with a larger number",
+    "steps": "Give it more interactions, --steps with a larger number",
+    "interrupted": "Do not interrupt it",
+}
+
+
+def advice(learned: Learned, measures: Measures, plant: Plant) -> list[str]:
+    """Sentences on what to try, the most promising first; empty where all is well.
+
+    Args:
+        learned: what learning came to.
+        measures: of the policy.
+        plant: the system.
+    """
+    if measures.success_rate >= GOOD:
+        return []
+    from_data = hasattr(plant, "dynamics")
+    failed = 1.0 - measures.success_rate
+    late = measures.late_rate > 0.5 * failed
+    near = measures.nearest is not None and measures.nearest < NEAR
+    longer = (
+        "Allow more time for an episode (max_episode_steps=): it ends after "
+        f"{digits(plant.evaluation_steps * plant.sampling_time)} s"
+    )
+    finer = [
+        "Sample more finely (sampling_time=, with as many more max_episode_steps): now "
+        f"the input is held for {digits(plant.sampling_time)} s.",
+        f"Allow more actions (inputs=, now {len(plant.inputs)}), in particular weaker ones "
+        "between the strongest.",
+    ]
+    if from_data:
+        finer = ["Record more, in particular where the report shows an unsure model."]
+    found = []
+    if learned.ended in _MORE:
+        found.append(
+            f"{_MORE[learned.ended]}: learning had not come to its end after "
+            f"{learned.seconds:.0f} s."
+        )
+    if late:
+        found.append(
+            f"{longer}, and from most of the starts that fail the goal is reached later."
+        )
+    if near:
+        found.append(
+            "Make the goal larger (tolerance=): from the starts that fail, the state "
+            f"comes as near as {digits(measures.nearest or 0.0)} times the distance from "
+            "the middle of the goal to its border."
+        )
+        found += finer
+    found.append(
+        "Make the inputs stronger (inputs=), if the actuator allows it: from "
+        f"{state_in_words(measures.worst_start, plant)}, the worst start, the goal may be "
+        "out of reach."
+    )
+    if not late:
+        found.append(f"{longer}.")
+    if not near:
+        found += finer
+    if not from_data:
+        found.append(
+            "Begin with easier starts (initial=), if the plant never is in all states "
+            "between low and high."
+        )
+    return found
+
+
+def state_in_words(state: tuple[float, ...], plant: Plant) -> str:
+    """The variables of a state with their names: "angle 3.14 rad, speed 0 rad/s"."""
+    parts = []
+    for name, value in zip(plant.variable_names, state, strict=False):
+        word, *rest = name.split(", ")
+        unit = f" {rest[0]}" if rest else ""
+        joined = f"{word} = " if "[" in word else f"{word} "
+        parts.append(f"{joined}{digits(value)}{unit}")
+    return ", ".join(parts)

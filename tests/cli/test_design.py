@@ -1,0 +1,211 @@
+"""The command `acl-gym design`."""
+
+from __future__ import annotations
+
+import json
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from acl_gym.cli.design import EXAMPLES, _free_folder, example
+from tests.cli.runner import figures, invoke, refused, run
+
+# A mass on a line is brought to rest; learned in a second.
+PLANT = """
+import acl_gym
+
+env = acl_gym.plant(
+    lambda x, u: [x[1], u[0]], low=[-1, -1], high=[1, 1], inputs={inputs},
+    sampling_time=0.1, goal=[0, 0], tolerance=[0.2, 0.2], cost=([1, 0.1], 0.01),
+    max_episode_steps=40,
+)
+"""
+
+
+def plant(inputs: str = "[-1, 0, 1]") -> str:
+    Path("mass.py").write_text(PLANT.format(inputs=inputs))
+    return "mass.py"
+
+
+def test_a_file_becomes_a_folder() -> None:
+    result = invoke("design", plant(), "--steps", "2500", "--seed", "1")
+    assert result.exit_code == 0, result.output
+    assert "The goal is reached from" in result.stdout
+    assert "settling time, s" in result.stdout
+    folder = Path("mass-design")
+    assert str(folder / "policy.h") in result.stdout
+    assert (folder / "plant.py").read_text() == Path("mass.py").read_text()
+    summary = json.loads((folder / "summary.json").read_text())
+    assert {"cost", "success_rate", "seconds"} <= set(summary)
+    # The command in the summary gives the same again, in the same folder.
+    command = summary["command"].split()
+    assert command[:3] == ["acl-gym", "design", "mass.py"]
+    before = (folder / "policy.h").read_bytes()
+    (folder / "policy.h").unlink()
+    again = figures(*command[1:])
+    assert (folder / "policy.h").read_bytes() == before
+    assert again["cost"] == summary["cost"]
+    assert _free_folder("mass") == Path("mass-design-2")  # of another one
+
+
+def test_a_goal_out_of_reach_is_1_and_says_what_to_try() -> None:
+    result = invoke(
+        "design", plant("[-0.01, 0.01]"), "--out", "weak", "--steps", "1000"
+    )
+    assert result.exit_code == 1
+    lines = result.stderr.splitlines()
+    assert len(lines) == 1
+    assert "less than 95%. What to try: " in lines[0]
+    assert "the worst start" in lines[0]
+    assert json.loads(Path("weak", "summary.json").read_text())["reaches_goal"] is False
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["nothing.py"], "there is no file nothing.py"),
+        (["broken.py"], "broken.py, line 1 is not Python: '(' was never closed"),
+        (["empty.py"], "must make a plant and keep it in a name"),
+        (["."], "must be a Python file"),
+        ([], "give either a file that describes a plant"),
+        (["mass.py", "--example", "pendulum"], "give either a file"),
+        (["--example", "pendulun"], "Did you mean 'pendulum'?"),
+        (["--show", "nothing"], "--show must be one of 'pendulum'"),
+        (["mass.py", "--seconds", "0"], "--seconds must be a number > 0, got 0"),
+        (["mass.py", "--out", "mass.py"], "mass.py is a file"),
+        (["mass.py", "--out", "a/b"], "there is no folder a"),
+        (["mass.py", "--state", "x"], "--state describes measurements"),
+        (["data.csv"], "--state is missing"),
+        (
+            ["none.csv", *["--state", "x", "--input", "u", "--goal", "0"]],
+            "time between two rows",
+        ),
+    ],
+)
+def test_bad_arguments_are_one_line_and_2(arguments: list[str], message: str) -> None:
+    plant()
+    Path("broken.py").write_text("x = (")
+    Path("empty.py").write_text("")
+    assert message in refused(2, "design", *arguments)
+    assert not list(Path().glob("*-design"))
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ("--goal a,0", "--goal must be numbers such as 3.14,0, got 'a,0'"),
+        ("--goal 1", "goal must hold a number for each of the 2 columns"),
+        ("--cost 1", "--cost must be time, or weights"),
+        ("--low 1", "low must hold a number, or nothing, for each of the 2"),
+        ("--state place,sped", "must have a column 'sped'"),
+        ("--circular height", "circular must hold names"),
+        ("--actions 1,2", "inputs must hold a row of 1 numbers"),
+    ],
+)
+def test_bad_words_about_measurements(options: str, message: str) -> None:
+    record("data.csv", 20)
+    usual = [
+        "--state",
+        "place,speed",
+        "--input",
+        "force",
+        "--goal",
+        "0,0",
+        "--time",
+        "t",
+        "--run",
+        "run",
+    ]
+    assert message in refused(2, "design", "data.csv", *usual, *options.split())
+
+
+def record(name: str, runs: int) -> None:
+    """A table of a mass on a line under random forces, eight rows a run."""
+    rng = np.random.default_rng(0)
+    rows = ["run,t,place,speed,force"]
+    for number in range(runs):
+        place, speed = rng.uniform(-1.0, 1.0, 2)
+        for step in range(8):
+            force = rng.integers(-1, 2)
+            rows.append(f"{number},{0.1 * step:.1f},{place},{speed},{force}")
+            place += 0.1 * speed + 0.005 * force
+            speed += 0.1 * force
+    Path(name).write_text("\n".join(rows))
+
+
+def test_measurements_become_a_folder() -> None:
+    record("data.csv", 40)
+    words = "--state place,speed --input force --time t --run run --goal 0,0"
+    words += " --tolerance 0.2,0.2 --cost 1,0.1:0.01 --low -1,-1 --high 1,1"
+    words += " --max-steps 40 --steps 2500"
+    summary = figures("design", "data.csv", *words.split())
+    assert summary["success_rate"] >= 0.95
+    model = summary["model"]
+    assert (model["steps"], model["runs"]) == (280, 40)
+    assert model["errors"]["speed"] < 0.05
+    assert model["sampling_time"] == pytest.approx(0.1)
+    folder = Path("data-design")
+    assert (folder / "model.png").exists()
+    assert (folder / "data.csv").read_text() == Path("data.csv").read_text()
+    page = (folder / "report.html").read_text()
+    assert "280 recorded steps in 40 runs" in page
+    assert "What was assumed" in page
+
+
+def test_show_prints_a_file_that_can_be_used() -> None:
+    for name in EXAMPLES:
+        shown = invoke("design", "--show", name)
+        assert shown.exit_code == 0
+        assert shown.stdout == example(name)
+
+
+def test_help_teaches_with_a_complete_file() -> None:
+    shown = invoke("design", "--help")
+    assert shown.exit_code == 0
+    text = [line.strip() for line in shown.stdout.splitlines()]
+    for line in example("pendulum").splitlines():
+        assert line.strip() in text, line
+    for name in EXAMPLES:
+        assert name in shown.stdout
+
+
+def test_a_plant_that_fails_while_learning_is_one_line_and_1() -> None:
+    Path("mass.py").write_text(
+        PLANT.format(inputs="[-1, 1]").replace(
+            "[x[1], u[0]]", "[x[1] / (x[0] < 0.9), u[0]]"
+        )
+    )
+    line = refused(1, "design", "mass.py", "--quiet")
+    assert "the dynamics gave no finite next state in slot" in line
+    assert not Path("mass-design").exists()
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="sends a signal")
+def test_ctrl_c_keeps_the_best_so_far(tmp_path: Path) -> None:
+    plant()
+    command = [sys.executable, "-m", "acl_gym", "design", "mass.py", "--out", "kept"]
+    process = subprocess.Popen(
+        [*command, "--steps", "100000000"],
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    # A line every five seconds says that there is a policy.
+    while "learning, " not in (line := process.stderr.readline()):
+        assert line, "it has ended"
+    process.send_signal(signal.SIGINT)
+    _, words = process.communicate(timeout=60)
+    assert process.returncode == 130, words
+    assert "interrupted" in words.splitlines()[-1]
+    assert "best controller so far is in kept" in words
+    assert Path("kept", "policy.h").exists()
+
+
+def test_an_example_in_a_new_interpreter() -> None:
+    done = run("design", "--example", "pendulum", "--steps", "6000", cwd=Path())
+    assert done.returncode == 0, done.stderr
+    assert done.stderr == ""
+    assert Path("pendulum-design", "report.html").exists()

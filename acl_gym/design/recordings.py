@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -100,35 +98,16 @@ def plant_of_recording(path: str | Path, recording: Recording) -> LearnedVectorE
         circular=list(recording.circular),
         **ends,
     )
-    with one_thread():
-        return LearnedVectorEnv(
-            data,
-            goal=list(recording.goal),
-            tolerance=None
-            if recording.tolerance is None
-            else list(recording.tolerance),
-            cost=recording.cost,
-            inputs=recording.actions,
-            low=recording.low,
-            high=recording.high,
-            max_episode_steps=recording.max_steps,
-        )
-
-
-@contextmanager
-def one_thread() -> Iterator[None]:
-    """Let libraries of linear algebra and regression use one thread.
-
-    The matrices of a few hundred steps are small: more threads gain little, and where
-    other programs keep the cores busy, threads that wait for each other take many times
-    as long.
-    """
-    # Only what is loaded already can be told; this loads OpenMP.
-    import sklearn.ensemble  # noqa: F401
-    from threadpoolctl import threadpool_limits
-
-    with threadpool_limits(1):
-        yield
+    return LearnedVectorEnv(
+        data,
+        goal=list(recording.goal),
+        tolerance=None if recording.tolerance is None else list(recording.tolerance),
+        cost=recording.cost,
+        inputs=recording.actions,
+        low=recording.low,
+        high=recording.high,
+        max_episode_steps=recording.max_steps,
+    )
 
 
 def _circular_only(recording: Recording, end: str) -> list[float | None]:

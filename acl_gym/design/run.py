@@ -257,12 +257,6 @@ def is_learned(env: Any) -> bool:
     return hasattr(env, "transitions")
 
 
-def _threads_for(env: Any) -> AbstractContextManager[None]:
-    if not is_learned(env):
-        return nullcontext()
-    from acl_gym.design.recordings import one_thread
-
-    return one_thread()
 
 
 def draw_starts(plant: Plant, count: int, seed: int, stream: int) -> FloatArray:

@@ -90,6 +90,9 @@ class LearnedSystem(Plant):
             input_names=known.input_names,
             **ranges,
         )
+        # As observed, which is what agents and pictures ask for: of an angle that is
+        # shown as cosine and sine, neither wraps around.
+        self.circular = known.circular
 
     @property
     def observation_space(self) -> spaces.Box:

@@ -207,6 +207,8 @@ def test_what_is_seen_shows_angles_as_they_were_recorded() -> None:
         np.testing.assert_allclose(seen[:, 0] ** 2 + seen[:, 1] ** 2, 1.0)
         assert env.single_observation_space.contains(seen[0])
     np.testing.assert_allclose(env.system.variables(seen), env.states)
+    assert env.system.circular == ()
+    assert ReturningACL(env, seed=0).partition.periods == (None, None, None)  # type: ignore[attr-defined]
 
 
 def test_cost_and_goal_are_learned_where_none_are_given() -> None:

@@ -67,8 +67,11 @@ class ControlSystem(ABC):
 
     @property
     @abstractmethod
-    def action_space(self) -> spaces.Discrete:
-        """The space of one action."""
+    def action_space(self) -> spaces.Discrete | spaces.Box:
+        """The space of one action: numbered actions, or real inputs within bounds.
+
+        A Box has one axis, an entry for each input.
+        """
 
     @property
     def signals(self) -> Signals | None:
@@ -115,7 +118,8 @@ class ControlSystem(ABC):
 
         Args:
             states: shape `(state_size, n)`, replaced by the next states in place.
-            actions: shape `(n,)`, valid indices of actions.
+            actions: shape `(n,)`, valid indices of actions; where `action_space` is a
+                Box, the inputs, float64 `(n, n_inputs)` within its bounds.
             uniforms: shape `(draws_per_step, n)` from [0, 1), None if there are none.
             rewards: shape `(n,)`, receives -(stage cost).
             reached: shape `(n,)`, receives whether the next state is the goal.

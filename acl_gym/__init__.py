@@ -43,6 +43,7 @@ if TYPE_CHECKING:
     from acl_gym.deposits import Deposit, FunctionDeposit, InverseCost, Rank, Return
     from acl_gym.envs.graph.cities import TravellingSalesmanInstance
     from acl_gym.envs.plant import plant
+    from acl_gym.envs.wrappers.action_grid import ActionGrid
     from acl_gym.envs.wrappers.scaling import ScaledObservation, ScaledVectorObservation
     from acl_gym.envs.wrappers.waiting import WaitingVectorEnv
     from acl_gym.envs.wrappers.workers import WorkersVectorEnv
@@ -51,7 +52,7 @@ if TYPE_CHECKING:
     from acl_gym.partitions.automatic import automatic_partition
     from acl_gym.planning.q_iteration import fuzzy_q_iteration
     from acl_gym.planning.value_iteration import value_iteration
-    from acl_gym.policies import SoftPolicy
+    from acl_gym.policies import InterpolatedPolicy, SoftPolicy
     from acl_gym.sb3.adapter import VectorEnvAdapter
     from acl_gym.schedules import Exponential, Harmonic, Linear, Schedule
     from acl_gym.utils.threads import get_num_threads, set_num_threads
@@ -62,6 +63,7 @@ __version__ = "0.1.0"
 # take seconds to load, which `gym.make` of another environment should not cost.
 _PUBLIC = {
     "ACL": "acl_gym.agents.acl",
+    "ActionGrid": "acl_gym.envs.wrappers.action_grid",
     "AntColonySystem": "acl_gym.agents.ant_system",
     "AntSystem": "acl_gym.agents.ant_system",
     "CSVLog": "acl_gym.callbacks",
@@ -78,6 +80,7 @@ _PUBLIC = {
     "FunctionDeposit": "acl_gym.deposits",
     "Fuzzy": "acl_gym.partitions",
     "Harmonic": "acl_gym.schedules",
+    "InterpolatedPolicy": "acl_gym.policies",
     "InverseCost": "acl_gym.deposits",
     "Linear": "acl_gym.schedules",
     "MaxMinAntSystem": "acl_gym.agents.ant_system",
@@ -119,6 +122,7 @@ _PUBLIC = {
 
 __all__ = [
     "ACL",
+    "ActionGrid",
     "AntColonySystem",
     "AntSystem",
     "CSVLog",
@@ -135,6 +139,7 @@ __all__ = [
     "FunctionDeposit",
     "Fuzzy",
     "Harmonic",
+    "InterpolatedPolicy",
     "InverseCost",
     "Linear",
     "MaxMinAntSystem",

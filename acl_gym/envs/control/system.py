@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from acl_gym.envs.control.signals import Signals
 from acl_gym.utils import validation
 from acl_gym.utils.compiling import njit
-from acl_gym.utils.typing import BoolArray, FloatArray, IntArray
+from acl_gym.utils.typing import BoolArray, FloatArray
 
 BLOCK = 512
 """Slots that a kernel advances at a time, so that their data stays in the nearest cache."""
@@ -109,7 +109,7 @@ class ControlSystem(ABC):
     def advance(
         self,
         states: FloatArray,
-        actions: IntArray,
+        actions: Any,
         uniforms: FloatArray | None,
         rewards: FloatArray,
         reached: BoolArray,

@@ -207,7 +207,8 @@ class Plant(ControlSystem):
         own: FloatArray | None = None
         if self.real_inputs is not None:
             # Kernels look up what each action does: here each slot has one of its own.
-            actions, own = np.arange(len(actions)), actions
+            own = actions
+            actions = np.arange(len(own))
         inputs = self.inputs if own is None else own
         bad = self._equations.advance(states, actions, inputs, step, self.substeps)
         if bad >= 0:

@@ -186,7 +186,7 @@ class Cost:
 
     def _costs_of(self, inputs: FloatArray) -> FloatArray:
         """u' R u of each row of inputs."""
-        return np.einsum("ai,ij,aj->a", inputs, self._on_inputs, inputs)
+        return np.asarray(np.einsum("ai,ij,aj->a", inputs, self._on_inputs, inputs))
 
     def judge(
         self,

@@ -1,5 +1,6 @@
 """Wrappers around environments, of this package or of others."""
 
+from acl_gym.envs.wrappers.action_grid import ActionGrid
 from acl_gym.envs.wrappers.scaling import (
     ScaledObservation,
     ScaledVectorObservation,
@@ -8,6 +9,7 @@ from acl_gym.envs.wrappers.scaling import (
 from acl_gym.envs.wrappers.waiting import WaitingVectorEnv
 
 __all__ = [
+    "ActionGrid",
     "ScaledObservation",
     "ScaledVectorObservation",
     "Scaling",

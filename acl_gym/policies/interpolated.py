@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from acl_gym.colony.greedy import greedy_actions, weighted_value
+from acl_gym.colony.greedy import greedy_actions
+from acl_gym.colony.interpolation import interpolated_inputs
 from acl_gym.envs.control.signals import Signals
+from acl_gym.export import Source, write_c_header, write_numpy_file
 from acl_gym.policies.table import TablePolicy
 from acl_gym.utils import validation
-from acl_gym.utils.compiling import njit
 from acl_gym.utils.input_grid import InputGrid
 from acl_gym.utils.parameters import Fixed
 from acl_gym.utils.text import short
-from acl_gym.utils.typing import CellArray, FloatArray, IntArray
+from acl_gym.utils.typing import CellArray, FloatArray
 
 
 class InterpolatedPolicy(Fixed):
@@ -115,6 +117,62 @@ class InterpolatedPolicy(Fixed):
         inputs = self._inputs(index, degree)
         return (inputs[0] if single else inputs), state
 
+    def to_numpy(self, path: str | Path) -> Path:
+        """Write the policy to a file for NumPy, without this package.
+
+        The file is that of `TablePolicy.to_numpy`, with three arrays more: `below` and
+        `above`, the actions next to each along each input, -1 where there is none, and
+        `input_values`. `acl_gym.export.numpy_file.NUMPY_INPUT_CODE` holds the lines that
+        evaluate it, to rounding.
+
+        Args:
+            path: the file; `.npz` is added where it is missing.
+
+        Returns:
+            The path written, atomically.
+
+        Raises:
+            TypeError: the partition locates states by a method of its own.
+            ValueError: the table holds numbers that are not finite.
+            FileNotFoundError: the folder of the file does not exist.
+            IsADirectoryError: the path is a folder.
+        """
+        return write_numpy_file(path, self._source())
+
+    def to_c(
+        self, path: str | Path, *, name: str = "policy", precision: str = "float"
+    ) -> Path:
+        """Write the policy as one C99 header; see `PartitionPolicy.to_c`.
+
+        `name_input(x, u)` sets the inputs u for the observation x and returns 1; where x
+        is not valid, it returns 0 and leaves u alone. `name_action(x)` is there as well,
+        the action without interpolation.
+
+        With "double" the inputs are those of `predict` to the bit, with the exceptions
+        of `PartitionPolicy.to_c`, before they are rounded to `dtype`. With "float" they
+        differ by rounding, which is much where levels of neighbouring actions differ by
+        little: then by at most half the distance to a neighbour.
+
+        Args:
+            path: the file; `.h` is added to a name without an ending.
+            name: what all names in the file begin with, a C identifier.
+            precision: "float" or "double", of observations, tables and inputs.
+
+        Returns:
+            The path written, atomically; the same policy gives the same bytes.
+
+        Raises:
+            TypeError: the partition locates states by a method of its own.
+            ValueError: an argument is not valid, the table holds numbers that are not
+                finite or do not fit a float, or is too large for a header.
+            FileNotFoundError: the folder of the file does not exist.
+            IsADirectoryError: the path is a folder.
+        """
+        return write_c_header(path, self._source(), name, precision)
+
+    def _source(self) -> Source:
+        return self.greedy._source().between(self.grid, self._signals)
+
     def copy(self) -> InterpolatedPolicy:
         """The same policy over a table that no longer changes."""
         copied = object.__new__(type(self))
@@ -125,79 +183,5 @@ class InterpolatedPolicy(Fixed):
         """The inputs for cells and degrees `(n, k)`."""
         table, grid = self.greedy.table, self.grid
         best = greedy_actions(table, self.greedy.ranks, index, degree)
-        inputs = np.empty((len(index), grid.n_inputs))
-        _interpolate(
-            table, index, degree, best, grid.values, grid.below, grid.above, inputs
-        )
+        inputs = interpolated_inputs(table, index, degree, best, grid)
         return inputs.astype(self.dtype, copy=False)
-
-
-@njit
-def vertex(
-    lower: float, middle: float, upper: float, low: float, best: float, high: float
-) -> float:
-    """Where the parabola through three points is highest, if the middle one is.
-
-    Args:
-        lower: the input below.
-        middle: the input whose value is the largest.
-        upper: the input above.
-        low: the value of the input below.
-        best: the largest value.
-        high: the value of the input above.
-
-    Returns:
-        An input between the middles of the two intervals; `middle` where all values are
-        alike, or one is not finite.
-    """
-    # Halved, so that no difference of finite numbers overflows.
-    fall_below = 0.5 * best - 0.5 * low
-    fall_above = 0.5 * best - 0.5 * high
-    largest = max(fall_below, fall_above)
-    if not (np.isfinite(fall_below) and np.isfinite(fall_above) and largest > 0.0):
-        return middle
-    down, up = middle - lower, upper - middle
-    towards_upper = fall_below / largest * up
-    towards_lower = fall_above / largest * down
-    share = towards_upper / (towards_upper + towards_lower)
-    return middle + 0.5 * (share * up - (1.0 - share) * down)
-
-
-@njit
-def _interpolate(
-    table: FloatArray,
-    index: CellArray,
-    degree: FloatArray,
-    best: IntArray,
-    values: FloatArray,
-    below: IntArray,
-    above: IntArray,
-    inputs: FloatArray,
-) -> None:
-    """Write the input between the best action of each state and its neighbours.
-
-    Args:
-        table: `(n_cells, n_actions)`.
-        index: cells of the states, `(n, k)`.
-        degree: their degrees, `(n, k)`.
-        best: the best action of each state, `(n,)`.
-        values: inputs of the actions, `(n_actions, n_inputs)`.
-        below: see `InputGrid`.
-        above: see `InputGrid`.
-        inputs: receives the result, `(n, n_inputs)`.
-    """
-    for j in range(index.shape[0]):
-        u = best[j]
-        top = weighted_value(table, index[j], degree[j], u)
-        for i in range(values.shape[1]):
-            middle, lower, upper = values[u, i], below[u, i], above[u, i]
-            inputs[j, i] = middle
-            if lower >= 0 and upper >= 0:
-                inputs[j, i] = vertex(
-                    values[lower, i],
-                    middle,
-                    values[upper, i],
-                    weighted_value(table, index[j], degree[j], lower),
-                    top,
-                    weighted_value(table, index[j], degree[j], upper),
-                )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -76,7 +77,8 @@ def _numbered_inputs(env: Any) -> NDArray[Any] | None:
         env = env.envs[0]
     while isinstance(env, gym.Wrapper):
         if isinstance(env, DiscretizeAction) and env.action_space == space:
-            points = [np.ravel(env.action(u)) for u in range(int(space.n))]
+            point: Callable[[int], Any] = env.action
+            points = [np.ravel(point(u)) for u in range(int(space.n))]
             return np.array(points)
         env = env.env
     return None

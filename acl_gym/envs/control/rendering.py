@@ -34,9 +34,7 @@ class Painter(ABC, Generic[System]):
         self.system = system
 
     @abstractmethod
-    def draw(
-        self, pygame: Any, canvas: Any, state: FloatArray, action: Any
-    ) -> None:
+    def draw(self, pygame: Any, canvas: Any, state: FloatArray, action: Any) -> None:
         """Draw a state.
 
         Args:

@@ -21,9 +21,7 @@ _TORQUE = (213, 94, 0)
 class PendulumPainter(Painter[Pendulum]):
     """Draws the pole, the goal region behind it, and an arc for the torque."""
 
-    def draw(
-        self, pygame: Any, canvas: Any, state: FloatArray, action: Any
-    ) -> None:
+    def draw(self, pygame: Any, canvas: Any, state: FloatArray, action: Any) -> None:
         """See `Painter.draw`."""
         size = canvas.get_width()
         pivot = np.array([0.5, 0.5]) * size

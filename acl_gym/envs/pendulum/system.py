@@ -95,6 +95,7 @@ class Pendulum(BlockSystem):
         weight = _weight_matrix(self.state_weight)
         canonical: dict[str, Any] = {
             "torques": tuple(torques.tolist()),
+            "continuous": self.continuous,
             "goal_bounds": tuple(bounds.tolist()),
             "state_weight": tuple(map(tuple, weight.tolist())),
             "substeps": int(self.substeps),

@@ -18,9 +18,7 @@ _INPUT = (213, 94, 0)
 class PlantPainter(Painter[Plant]):
     """Draws a bar for each variable with its goal and value; below, the inputs."""
 
-    def draw(
-        self, pygame: Any, canvas: Any, state: FloatArray, action: Any
-    ) -> None:
+    def draw(self, pygame: Any, canvas: Any, state: FloatArray, action: Any) -> None:
         """See `Painter.draw`."""
         canvas.fill(_PAPER)
         system = self.system

@@ -145,10 +145,12 @@ def evaluate(
         seed = how.get("seed", 0)
     if max_steps is None:
         max_steps = how.get("max_steps")
-    with bad_arguments():
-        # So that it knows the inputs of its actions, and that they fit.
-        agent.set_env(environment.vector(1))
-    policy = agent.interpolated_policy() if interpolate else agent
+    policy = agent
+    if interpolate:
+        with bad_arguments():
+            # So that it knows the inputs of its actions, and that they fit.
+            agent.set_env(environment.vector(1))
+            policy = agent.interpolated_policy()
     result, settings = _evaluate(
         agent, policy, walked, episodes, how.get("episodes"), max_steps, seed
     )

@@ -9,10 +9,11 @@ import numpy as np
 
 from acl_gym.utils import validation
 from acl_gym.utils.boxes import INFINITE
+from acl_gym.utils.parameters import Fixed
 from acl_gym.utils.typing import FloatArray, IntArray
 
 
-class InputGrid:
+class InputGrid(Fixed):
     """The inputs of numbered actions, ordered along each input.
 
     The actions may be numbered in any order, but together their inputs must be all
@@ -26,12 +27,14 @@ class InputGrid:
         values: `(n_actions, n_inputs)`, float64, read-only.
         axes: of each input its values, increasing.
         below: the action whose input is the next lower one, all others alike,
-            `(n_actions, n_inputs)`; -1 where there is none.
+            `(n_actions, n_inputs)`; -1 where there is none. Read-only, as `above`.
         above: the same for the next higher one.
 
     Raises:
         ValueError: `values` are not numbers in such a shape, or no grid.
     """
+
+    _fixed = ("values", "axes", "below", "above")
 
     values: FloatArray
     axes: tuple[FloatArray, ...]
@@ -88,4 +91,5 @@ class InputGrid:
             there[axis] += step
             inside = (there[axis] >= 0) & (there[axis] < count)
             found[inside, axis] = on_grid[tuple(there[:, inside])]
+        found.setflags(write=False)  # kernels address by it
         return found

@@ -92,7 +92,7 @@ def test_continuous_actions_are_discretised() -> None:
     between = figures("evaluate", "p.npz", "--interpolate")
     box_env = WaitingVectorEnv.make("Pendulum-v1", 100)
     policy = agent.interpolated_policy()
-    assert policy.grid.values.ravel() == pytest.approx([-4 / 3, 0, 4 / 3])
+    assert policy.grid.values.ravel() == pytest.approx([-4 / 3, 0, 4 / 3], abs=1e-6)
     expected = evaluate_policy_cost(policy, box_env, max_steps=20, seed=0)
     assert between["policy_cost"] == expected.cost != evaluated["policy_cost"]
     assert (between["interpolated"], between["discretize"]) == (True, [3])

@@ -158,7 +158,7 @@ def test_shapes_state_and_numbers() -> None:
         == "InterpolatedPolicy(Fuzzy(2 cells, circular=[]), between 2 x 2 actions)"
     )
     for bad in ([np.nan], [[0.0, 1.0]], "up"):
-        with pytest.raises(ValueError, match="observation|states"):
+        with pytest.raises(ValueError, match=r"observation|states"):
             policy.predict(bad)
 
 

@@ -101,8 +101,9 @@ def _spread(low: float, high: float, count: int) -> FloatArray:
 
 def _checked_counts(counts: Any, n_inputs: int) -> tuple[int, ...]:
     """One count for each input."""
-    listed = isinstance(counts, Sequence | np.ndarray) and not isinstance(counts, str)
-    each = list(counts) if listed else [counts] * n_inputs
+    each = validation.elements(counts)
+    if each is None:
+        each = [counts] * n_inputs
     if len(each) != n_inputs:
         raise ValueError(
             f"counts must be one integer, or one for each of the {n_inputs} inputs, got "

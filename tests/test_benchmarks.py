@@ -131,6 +131,17 @@ def test_returning_figures(tmp_path: Path) -> None:
     assert (tmp_path / "growing.png").stat().st_size > 100_000
 
 
+def test_continuous_actions() -> None:
+    arguments = ["--seeds", "1", "--actions", "3", "--study", "pendulum-plan", "rules"]
+    rows = output_of("continuous_actions.py", *arguments)["rows"]
+    planned = {r["policy"]: r for r in rows if r["study"] == "pendulum-plan"}
+    assert planned["interpolated"]["cost"] < planned["greedy"]["cost"] < 40.0
+    # The formula of the benchmark is that of the package, but for rounding.
+    costs = {(r.get("agent"), r["policy"]): r["cost"] for r in rows}
+    assert len(costs) == len(rows)
+    assert costs["pendulum-acl", "tau"] > costs["pendulum-acl", "greedy"]
+
+
 def test_prior_knowledge() -> None:
     """One run of each kind: what is told shows before anything is learned."""
     arguments = ["--tasks", "pendulum", "--agents", "ReturningACL", "--ways", "initial"]

@@ -374,6 +374,34 @@ def draw(rows: list[dict[str, Any]]) -> Figure:
     return figure
 
 
+def draw_maps() -> Figure:
+    """The torque over the state: three torques of Q(0.5), and what lies between them."""
+    study, count = STUDIES["pendulum-q"], 3
+    env = ActionGrid(study.make(study.slots), count)
+    greedy = study.learn(env, 0, study.steps)
+    between = InterpolatedPolicy(greedy, env.values)
+    figure = Figure(figsize=(9, 3.7), layout="constrained")
+    FigureCanvasAgg(figure)
+    panels = figure.subplots(1, 2, sharey=True)
+    angle, speed = np.linspace(0, 2 * np.pi, 301), np.linspace(-9, 9, 301)
+    states = np.stack(np.meshgrid(angle, speed), axis=-1).reshape(-1, 2)
+    for panel, model, title in (
+        (panels[0], Chosen(greedy, env.values), f"{GREEDY}: one of three torques"),
+        (panels[1], between, f"{BETWEEN} between the same three"),
+    ):
+        torque = model.predict(states)[0].reshape(301, 301)
+        cost = result(model, study.make(EPISODES))["cost"]
+        image = panel.pcolormesh(
+            angle, speed, torque, cmap="PuOr", shading="nearest", rasterized=True
+        )
+        panel.set(
+            xlabel="angle, upright at pi (rad)", title=f"{title}, cost {cost:.1f}"
+        )
+    panels[0].set_ylabel("angular velocity (rad/s)")
+    figure.colorbar(image, ax=panels, label="torque (N m)")
+    return figure
+
+
 def main(arguments: list[str] | None = None) -> int:
     """Measure, print, keep and draw; returns the exit code."""
     parser = argparse.ArgumentParser(
@@ -399,7 +427,13 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument(
         "--draw", type=Path, help="draw the rows of --file, measure nothing"
     )
+    parser.add_argument(
+        "--maps", type=Path, help="draw two policies over the state, measure nothing"
+    )
     options = parser.parse_args(arguments)
+    if options.maps is not None:
+        draw_maps().savefig(options.maps, dpi=130)
+        return 0
     rows: list[dict[str, Any]] = []
     if options.seeds < 1 or min(options.actions or COUNTS) < 3:
         parser.error("--seeds must be at least 1, and --actions at least 3.")

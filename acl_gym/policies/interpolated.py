@@ -31,13 +31,14 @@ class InterpolatedPolicy(Fixed):
 
     with d = v0 - v and h the distance to the neighbour: the mean of the three inputs,
     weighted by differences of their levels, and exact where values are quadratic in the
-    input, as those of a quadratic cost nearly are. It lies no farther from u0 than halfway to a
-    neighbour, depends on differences only, and so holds alike for levels of pheromone,
-    action values and expected costs of any sign. It changes with the state as the values
-    do, but where the best action changes from one point to the next of the same values.
+    input. It lies no farther from u0 than halfway to a neighbour. It depends on
+    differences of values only, so that it holds alike for levels of pheromone, action
+    values and expected costs of any sign. Where two neighbours are equally good it lies
+    halfway between them, whichever is u0, so that it does not jump where the best action
+    changes to a neighbour, but by half a step at an end of the grid.
 
-    Along each input by itself. Where u0 is at the end of the grid, where all three values
-    are the same, or where one is infinite, the input is that of u0.
+    Each input is found by itself. Where u0 is at an end of the grid, where all three
+    values are the same, or where one is infinite, the input is that of u0.
     docs/continuous-actions.md compares this with other rules, and with more actions.
 
     Args:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+from pathlib import Path
 from typing import Any
 
 import gymnasium as gym
@@ -24,6 +25,7 @@ from acl_gym import (
 )
 from acl_gym.colony.interpolation import vertex
 from acl_gym.policies import TablePolicy
+from acl_gym.utils import archives
 from tests.export.policies import hard_observations, random_policy
 
 ONE_CELL = Crisp([[0.0]])
@@ -121,6 +123,16 @@ def test_a_quadratic_value_has_its_maximum_found() -> None:
         nearest = inputs[np.argmin(np.abs(inputs - peak))]
         if abs(peak - nearest) < 1e-9 or nearest not in inputs[[0, -1]]:
             assert policy.predict([0.0])[0] == pytest.approx(peak, abs=1e-12)
+
+
+def test_it_does_not_jump_from_one_neighbour_to_the_next() -> None:
+    """Values -(u - x)^2, linear in x but for what is the same for all u: u = x is best."""
+    inputs, states = np.linspace(-0.5, 1.5, 9), np.linspace(0.0, 1.0, 501)
+    table = -((inputs - np.array([[0.0], [1.0]])) ** 2)
+    greedy = TablePolicy(Fuzzy([[0.0, 1.0]]), table)
+    assert len(np.unique(greedy.predict(states[:, None])[0])) == 5
+    found, _ = InterpolatedPolicy(greedy, inputs).predict(states[:, None])
+    np.testing.assert_allclose(found[:, 0], states, atol=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -225,3 +237,50 @@ def test_actions_without_known_inputs() -> None:
     with pytest.raises(ValueError, match="inputs of the actions must be known"):
         agent.interpolated_policy()
     assert agent.interpolated_policy([1, 2, 3, 4]).grid.counts == (4,)
+
+
+def changed(agent: Any, path: Path, monkeypatch: Any, change: Any) -> Path:
+    """The file of an agent, its header changed before it is written."""
+    write = archives.save
+
+    def save(path: Path, header: dict[str, Any], arrays: Any) -> Any:
+        change(header)
+        return write(path, header, arrays)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(archives, "save", save)
+        return Path(agent.save(path))
+
+
+def test_older_files_know_no_inputs(tmp_path: Path, monkeypatch: Any) -> None:
+    env = ActionGrid(gym.make_vec("acl_gym/Pendulum-v0", 1, continuous=True), 3)
+    agent = QLearning(env, max_steps=5, seed=0)
+    path = changed(agent, tmp_path / "old", monkeypatch, lambda h: h.pop("signals"))
+    loaded = QLearning.load(path)
+    with pytest.raises(ValueError, match="must be known"):
+        loaded.interpolated_policy()
+    loaded.set_env(env)
+    assert loaded.interpolated_policy().grid.counts == (3,)
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [
+        {"values": [[0.0]]},
+        {"values": [[0.0], [float("nan")], [1.0]]},
+        {"values": "abc"},
+        {"dtype": "int64"},
+        {"inputs": []},
+        {"more": 1},
+    ],
+)
+def test_damaged_files_are_refused(
+    damage: dict[str, Any], tmp_path: Path, monkeypatch: Any
+) -> None:
+    env = ActionGrid(gym.make_vec("acl_gym/Pendulum-v0", 1, continuous=True), 3)
+    agent = QLearning(env, max_steps=5, seed=0)
+    path = changed(
+        agent, tmp_path / "bad", monkeypatch, lambda h: h["signals"].update(damage)
+    )
+    with pytest.raises(ValueError, match="damaged"):
+        QLearning.load(path)

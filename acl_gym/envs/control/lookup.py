@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from acl_gym.envs.control.signals import Signals
 from acl_gym.envs.control.system import ControlSystem
+from acl_gym.envs.wrappers.action_grid import ActionGrid
 
 
 def system_of(env: Any) -> ControlSystem | None:
@@ -69,9 +70,8 @@ def _numbered_inputs(env: Any) -> NDArray[Any] | None:
     """The inputs of each action, `(n_actions, n_inputs)`, where a wrapper numbers them."""
     space = _space(env, "action")
     while isinstance(env, VectorWrapper):
-        values = getattr(env, "input_values", None)
-        if isinstance(values, np.ndarray) and env.single_action_space == space:
-            return values
+        if isinstance(env, ActionGrid) and env.single_action_space == space:
+            return env.values
         env = env.env
     if isinstance(env, SyncVectorEnv):
         env = env.envs[0]

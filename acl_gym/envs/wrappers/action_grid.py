@@ -75,11 +75,6 @@ class ActionGrid(VectorActionWrapper[Any, Any, Any, Any]):
         self.single_action_space = spaces.Discrete(len(rows))
         self.action_space = batch_space(self.single_action_space, self.num_envs)
 
-    @property
-    def input_values(self) -> NDArray[Any]:
-        """See `values`; what `acl_gym.envs.control.lookup.signals_of` looks for."""
-        return self.values
-
     def actions(self, actions: ArrayLike) -> NDArray[Any]:
         """The inputs of numbered actions, `(num_envs, n_inputs)`.
 

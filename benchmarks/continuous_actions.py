@@ -372,7 +372,8 @@ def draw(rows: list[dict[str, Any]]) -> Figure:
         panel.minorticks_off()
         panel.set_title(study.title.replace(", ", ",\n", 1), fontsize=9)
         panel.grid(alpha=0.3)
-    panels[0].legend()
+    lines, labels = panels[0].get_legend_handles_labels()
+    figure.legend(lines, labels, loc="outside upper center", ncols=2)
     return figure
 
 
@@ -396,9 +397,8 @@ def draw_maps() -> Figure:
         image = panel.pcolormesh(
             angle, speed, torque, cmap="PuOr", shading="nearest", rasterized=True
         )
-        panel.set(
-            xlabel="angle, upright at pi (rad)", title=f"{title}, cost {cost:.1f}"
-        )
+        panel.set_xlabel("angle, upright at pi (rad)")
+        panel.set_title(f"{title}, cost {cost:.1f}", fontsize=10)
     panels[0].set_ylabel("angular velocity (rad/s)")
     figure.colorbar(image, ax=panels, label="torque (N m)")
     return figure

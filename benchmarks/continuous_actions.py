@@ -39,7 +39,9 @@ from acl_gym.policies import InterpolatedPolicy, TablePolicy
 from acl_gym.utils.text import replace_unprintable_letters
 
 COUNTS = (3, 5, 7, 9, 15, 21)
-RULE_COUNTS = (3, 5, 9)
+DEFAULT_COUNTS = {"rules": (3, 5, 9), "mountain-car": (2, *COUNTS)}
+"""Where they are others than `COUNTS`: full force only is enough for the car."""
+
 GREEDY, BETWEEN = "greedy", "interpolated"
 COLOURS = {GREEDY: "#0072B2", BETWEEN: "#D55E00"}
 
@@ -421,8 +423,7 @@ def main(arguments: list[str] | None = None) -> int:
         "--actions",
         type=int,
         nargs="+",
-        help=f"numbers of actions (default: {' '.join(map(str, COUNTS))}; of rules "
-        f"{' '.join(map(str, RULE_COUNTS))})",
+        help=f"numbers of actions (default: {' '.join(map(str, COUNTS))}, with exceptions)",
     )
     parser.add_argument("--json", action="store_true", help="print every row as JSON")
     parser.add_argument("--file", type=Path, help="keep the rows in this file")
@@ -446,7 +447,7 @@ def main(arguments: list[str] | None = None) -> int:
         rows = json.loads(options.file.read_text())["rows"]
     if options.draw is None:
         for name in options.study:
-            counts = options.actions or (RULE_COUNTS if name == "rules" else COUNTS)
+            counts = options.actions or DEFAULT_COUNTS.get(name, COUNTS)
             rows = [
                 row
                 for row in rows

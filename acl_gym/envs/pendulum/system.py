@@ -153,22 +153,17 @@ class Pendulum(BlockSystem):
         reached: BoolArray,
     ) -> None:
         """One sampling time; see `ControlSystem.advance`."""
-        if not self.continuous:
-            super().advance(states, actions, uniforms, rewards, reached)
-            return
-        # The kernels look up what each action does: here each slot has one of its own.
-        torques = np.ascontiguousarray(actions[:, 0])
-        _, *dynamics = self._dynamics
-        *cost, _, bound_theta, bound_omega = self._goal_and_cost
-        move = self.block_kernels[threads.worth_it(torques.size)]
-        move(
-            states,
-            np.arange(torques.size),
-            (self.motor_gain / self.inertia * torques, *dynamics),
-            (*cost, self.torque_weight * torques**2, bound_theta, bound_omega),
-            rewards,
-            reached,
-        )
+        dynamics, goal_and_cost = self._dynamics, self._goal_and_cost
+        if self.continuous:
+            # Kernels look up what each action does: here each slot has one of its own.
+            torques = np.ascontiguousarray(actions[:, 0])
+            actions = np.arange(torques.size)
+            *cost, _, bound_theta, bound_omega = goal_and_cost
+            dynamics = (self.motor_gain / self.inertia * torques, *dynamics[1:])
+            of_torques = self.torque_weight * torques**2
+            goal_and_cost = (*cost, of_torques, bound_theta, bound_omega)
+        move = self.block_kernels[threads.worth_it(actions.size)]
+        move(states, actions, dynamics, goal_and_cost, rewards, reached)
 
     @property
     def signals(self) -> Signals:

@@ -44,6 +44,7 @@ if TYPE_CHECKING:
     from acl_gym.envs.graph.cities import TravellingSalesmanInstance
     from acl_gym.envs.learned import LearnedVectorEnv, Transitions
     from acl_gym.envs.plant import plant
+    from acl_gym.envs.wrappers.action_grid import ActionGrid
     from acl_gym.envs.wrappers.changing import ChangingVectorEnv, Drift, Jump
     from acl_gym.envs.wrappers.inner_loop import InnerLoop
     from acl_gym.envs.wrappers.scaling import ScaledObservation, ScaledVectorObservation
@@ -61,7 +62,7 @@ if TYPE_CHECKING:
     from acl_gym.partitions.automatic import automatic_partition
     from acl_gym.planning.q_iteration import fuzzy_q_iteration
     from acl_gym.planning.value_iteration import value_iteration
-    from acl_gym.policies import SoftPolicy
+    from acl_gym.policies import InterpolatedPolicy, SoftPolicy
     from acl_gym.sb3.adapter import VectorEnvAdapter
     from acl_gym.schedules import Exponential, Harmonic, Linear, Schedule
     from acl_gym.utils.threads import get_num_threads, set_num_threads
@@ -72,6 +73,7 @@ __version__ = "0.1.0"
 # take seconds to load, which `gym.make` of another environment should not cost.
 _PUBLIC = {
     "ACL": "acl_gym.agents.acl",
+    "ActionGrid": "acl_gym.envs.wrappers.action_grid",
     "AntColonySystem": "acl_gym.agents.ant_system",
     "AntSystem": "acl_gym.agents.ant_system",
     "CSVLog": "acl_gym.callbacks",
@@ -91,6 +93,7 @@ _PUBLIC = {
     "Fuzzy": "acl_gym.partitions",
     "Harmonic": "acl_gym.schedules",
     "InnerLoop": "acl_gym.envs.wrappers",
+    "InterpolatedPolicy": "acl_gym.policies",
     "InverseCost": "acl_gym.deposits",
     "Jump": "acl_gym.envs.wrappers.changing",
     "LearnedVectorEnv": "acl_gym.envs.learned",
@@ -140,6 +143,7 @@ _PUBLIC = {
 
 __all__ = [
     "ACL",
+    "ActionGrid",
     "AntColonySystem",
     "AntSystem",
     "CSVLog",
@@ -159,6 +163,7 @@ __all__ = [
     "Fuzzy",
     "Harmonic",
     "InnerLoop",
+    "InterpolatedPolicy",
     "InverseCost",
     "Jump",
     "LearnedVectorEnv",

@@ -1,8 +1,9 @@
 """Why some learned policies hover beside the goal, and what helps.
 
 Trains fuzzy colonies on the pendulum. After every trial of the second half it evaluates
-the greedy policy, eq. (4.16), and the soft one (`ACL.soft_policy`), and the greedy policy
-of colonies with a finer partition around the goal. Draws the worst greedy policy near the
+the greedy policy, eq. (4.16), the soft one (`ACL.soft_policy`), the one that sets torques
+between the three (`ACL.interpolated_policy`), and the greedy policy of colonies with a finer
+partition around the goal, also interpolated. Draws the worst greedy policy near the
 goal and how often each kind of policy fails, and prints the numbers in docs/hovering.md.
 """
 
@@ -30,11 +31,19 @@ from acl_gym.utils.text import replace_unprintable_letters
 
 TRIALS = 100
 FIRST_TRIAL = 51
-COLOURS = {"greedy": "#0072B2", "soft": "#D55E00", "refined": "#009E73"}
+COLOURS = {
+    "greedy": "#0072B2",
+    "soft": "#D55E00",
+    "interpolated": "#CC79A7",
+    "refined": "#009E73",
+    "refined, interpolated": "#E69F00",
+}
 LABELS = {
     "greedy": "greedy",
     "soft": "soft, exponent 10",
+    "interpolated": "interpolated torque",
     "refined": "greedy, finer cells at the goal",
+    "refined, interpolated": "interpolated, finer cells",
 }
 
 
@@ -60,6 +69,7 @@ def study(seeds: int) -> Outcome:
 
     for seed in tqdm(range(seeds), desc="pairs of colonies"):
         env = gym.make_vec("acl_gym/Pendulum-v0", num_envs=250)
+        box = gym.make_vec("acl_gym/Pendulum-v0", num_envs=1, continuous=True)
         grid = Fuzzy.from_box(env.single_observation_space, (40, 41), circular=[0])
         fine = grid.refine(0, math.pi + np.array([-0.1, -0.05, 0.05, 0.1]))
         fine = fine.refine(1, [-0.3, -0.15, 0.15, 0.3])
@@ -71,7 +81,9 @@ def study(seeds: int) -> Outcome:
             refined.learn(trials=1)
             success = evaluate("greedy", colony.policy, env)
             evaluate("soft", colony.soft_policy(seed=trial), env)
+            evaluate("interpolated", colony.interpolated_policy(), box)
             evaluate("refined", refined.policy, env)
+            evaluate("refined, interpolated", refined.interpolated_policy(), box)
             if worst is None or success < worst[0]:
                 worst = success, f"seed {seed}, trial {trial}", colony.policy.copy()
     if worst is None:

@@ -131,6 +131,19 @@ def test_returning_figures(tmp_path: Path) -> None:
     assert (tmp_path / "growing.png").stat().st_size > 100_000
 
 
+def test_continuous_actions() -> None:
+    studies = ["--study", "pendulum-plan", "pendulum-acl", "rules"]
+    arguments = ["--seeds", "1", "--actions", "3", *studies]
+    rows = output_of("continuous_actions.py", *arguments)["rows"]
+    planned = {r["policy"]: r for r in rows if r["study"] == "pendulum-plan"}
+    assert planned["interpolated"]["cost"] < planned["greedy"]["cost"] < 40.0
+    costs = {(r.get("agent", r["study"]), r["policy"]): r["cost"] for r in rows}
+    assert costs["pendulum-acl", "tau"] > costs["pendulum-acl", "greedy"]
+    # The formula of the benchmark is that of the package, but for rounding.
+    formula = costs["pendulum-acl", "parabola (InterpolatedPolicy)"]
+    assert formula == pytest.approx(costs["pendulum-acl", "interpolated"], rel=1e-3)
+
+
 def test_prior_knowledge() -> None:
     """One run of each kind: what is told shows before anything is learned."""
     arguments = ["--tasks", "pendulum", "--agents", "ReturningACL", "--ways", "initial"]

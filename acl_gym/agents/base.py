@@ -17,13 +17,12 @@ from acl_gym.callbacks.base import Callbacks
 from acl_gym.colony.greedy import greedy_actions
 from acl_gym.envs.control.environments import ControlVectorEnv
 from acl_gym.envs.control.lookup import signals_of
-from acl_gym.envs.control.signals import Signals
 from acl_gym.evaluation.rollout import Rollout
 from acl_gym.evaluation.steps import Outcome
 from acl_gym.export import Source
 from acl_gym.partitions import Partition, checked_partition, locate_checked
 from acl_gym.partitions.automatic import automatic_partition
-from acl_gym.policies import TablePolicy, random_ranks
+from acl_gym.policies import InterpolatedPolicy, TablePolicy, random_ranks
 from acl_gym.utils import validation
 from acl_gym.utils.parameters import fixed
 from acl_gym.utils.pictures import guarded
@@ -107,7 +106,6 @@ class TabularAgent(SavedAgent):
             max_steps = time_limit(env) or DEFAULT_MAX_STEPS
         self._max_steps = validation.integer("max_steps", max_steps, at_least=1)
         self.env: VectorEnv[Any, Any, Any] | None = None
-        self._signals: Signals | None = None
         self._rollout: Rollout | None = None
         self.first_action = 0
         if n_actions is not None:
@@ -353,6 +351,26 @@ class TabularAgent(SavedAgent):
             self.first_action,
             self._signals,
         )
+
+    def interpolated_policy(
+        self, inputs: ArrayLike | None = None
+    ) -> InterpolatedPolicy:
+        """A policy of real inputs, between the best action and its neighbours.
+
+        For an environment whose actions are a Box, where this agent has learned in an
+        `ActionGrid` around it: `predict` returns floats.
+
+        Args:
+            inputs: of each action, `(n_actions,)` or `(n_actions, n_inputs)`; None takes
+                what the environment tells, also of a file that was trained there.
+
+        Returns:
+            A policy over a copy of the table as it is now.
+
+        Raises:
+            ValueError: the inputs are not known, or do not form a grid.
+        """
+        return InterpolatedPolicy(self.policy.copy(), inputs)
 
     def _source(self, inputs: ArrayLike | None = None) -> Source:
         if self._rollout is not None and self._rollout.action_mask is not None:

@@ -6,6 +6,7 @@ import inspect
 import os
 from abc import abstractmethod
 from collections.abc import Callable, Mapping
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any, BinaryIO, ClassVar, NamedTuple, Self, overload
 
@@ -13,6 +14,7 @@ import numpy as np
 from gymnasium.vector import VectorEnv
 from numpy.typing import ArrayLike, NDArray
 
+from acl_gym.envs.control.signals import Signals
 from acl_gym.partitions import (
     given_partition,
     partition_from_settings,
@@ -81,6 +83,8 @@ class SavedAgent(PartitionPolicy):
     history: list[Row]
     metadata: dict[str, Any]
     in_trial: bool
+    _signals: Signals | None = None
+    """What observations and actions mean, if known."""
     rng: np.random.Generator
     _predict_rng: np.random.Generator
     _ranks: RankArray
@@ -187,6 +191,7 @@ class SavedAgent(PartitionPolicy):
             "partition": partition_to_settings(self.partition),
             "n_actions": self.n_actions,
             "first_action": self.first_action,
+            "signals": None if self._signals is None else asdict(self._signals),
             "num_timesteps": self.num_timesteps,
             "trials": self.trials,
             "seconds": self.seconds,
@@ -335,6 +340,11 @@ class SavedAgent(PartitionPolicy):
                 f"first_action must be an integer, got {validation.shown(first_action)}"
             )
         self.first_action = first_action
+        signals = header.get("signals")  # older files have none
+        if signals is not None:
+            self._signals = Signals(**signals)
+            if len(self._signals.values) != self.n_actions:
+                raise ValueError("signals must have values for each action")
         for name in ("num_timesteps", "trials"):
             count = validation.integer(name, header[name], at_least=0, at_most=2**62)
             setattr(self, name, count)

@@ -7,7 +7,7 @@ import math
 import os
 import re
 import sys
-from dataclasses import dataclass, field, fields, is_dataclass
+from dataclasses import dataclass, field, fields, is_dataclass, replace
 from difflib import get_close_matches
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
@@ -101,8 +101,25 @@ class Environment:
                 f"{self.module} was imported, but registers no {self.name!r}."
             )
 
-    def vector(self, slots: int) -> VectorEnv[Any, Any, Any]:
+    def with_real_inputs(self) -> Environment:
+        """The same without numbered actions, for a policy that sets real inputs.
+
+        Raises:
+            BadArgumentError: its actions were not numbered by `bins`.
+        """
+        if self.bins is None:
+            raise BadArgumentError(
+                f"--interpolate is for agents that were trained with --discretize, but "
+                f"{self.name} was not; leave it out, or train with --discretize 5."
+            )
+        return replace(self, bins=None)
+
+    def vector(self, slots: int, real_inputs: bool = False) -> VectorEnv[Any, Any, Any]:
         """Make it with some slots; one of this package natively.
+
+        Args:
+            slots: how many.
+            real_inputs: whether its actions may be a Box.
 
         Raises:
             BadArgumentError: it cannot be made with these arguments, or its actions are
@@ -120,7 +137,8 @@ class Environment:
                 )
             else:
                 env = WaitingVectorEnv([self.single] * slots)
-            self._check_actions(env.single_action_space)
+            if not (real_inputs and isinstance(env.single_action_space, spaces.Box)):
+                self._check_actions(env.single_action_space)
         return env
 
     def single(self, render_mode: str | None = None) -> gym.Env[Any, Any]:

@@ -29,6 +29,7 @@ Examples:
   acl-gym evaluate pendulum.npz --episodes 1000 --seed 7   random starts
   acl-gym evaluate swing_up.npz --env-id acl_gym/Pendulum-v0 --json
   acl-gym evaluate mine.npz --env-id my_module:MyEnv-v0
+  acl-gym evaluate Pendulum-v1.npz --interpolate           real inputs
 """
 
 MOST_EPISODES = 100_000
@@ -69,6 +70,14 @@ def evaluate(
             show_default=False,
         ),
     ] = None,
+    interpolate: Annotated[
+        bool,
+        typer.Option(
+            "--interpolate",
+            help="Evaluate the policy of real inputs between the values of --discretize "
+            "(docs/continuous-actions.md).",
+        ),
+    ] = False,
     episodes: Annotated[
         int | None,
         typer.Option(
@@ -131,17 +140,27 @@ def evaluate(
 
     agent = load_agent(file)
     environment, how = _chosen(file, agent.metadata, typed, arguments, discretize)
+    walked = environment.with_real_inputs() if interpolate else environment
     if seed is None:
         seed = how.get("seed", 0)
     if max_steps is None:
         max_steps = how.get("max_steps")
+    policy = agent
+    if interpolate:
+        with bad_arguments():
+            # So that it knows the inputs of its actions, and that they fit.
+            agent.set_env(environment.vector(1))
+            policy = agent.interpolated_policy()
     result, settings = _evaluate(
-        agent, environment, episodes, how.get("episodes"), max_steps, seed
+        agent, policy, walked, episodes, how.get("episodes"), max_steps, seed
     )
     if render or video is not None:
         shown = episodes or 1
-        showing.play(agent, environment, shown, settings["max_steps"], seed, video)
+        showing.play(policy, walked, shown, settings["max_steps"], seed, video)
     settings = {"file": file, **settings}
+    if interpolate:
+        settings["discretize"] = list(environment.bins or ())
+        settings["interpolated"] = True
     if video is not None:
         settings["video"] = str(video)
     solutions = {"solution": solution(agent)} if seeks_best(agent) else {}
@@ -207,6 +226,7 @@ def _recorded(file: str, metadata: dict[str, Any]) -> dict[str, Any]:
 
 def _evaluate(
     agent: Any,
+    policy: Any,
     environment: Environment,
     episodes: int | None,
     recorded: int | None,
@@ -220,7 +240,7 @@ def _evaluate(
     from acl_gym.envs.control.environments import ControlVectorEnv
     from acl_gym.evaluation import evaluate_policy_cost
 
-    base = environment.vector(1).unwrapped
+    base = environment.vector(1, real_inputs=True).unwrapped
     states, count = None, episodes or recorded or FOREIGN_EPISODES
     if isinstance(base, ControlVectorEnv):
         states = base.system.evaluation_states()
@@ -228,12 +248,13 @@ def _evaluate(
             rng = np.random.default_rng(seed)
             states = base.system.sample_states(rng, episodes).T.copy()
         count = len(states)
-    env = environment.vector(count)
-    with bad_arguments():
-        agent.set_env(env)
+    env = environment.vector(count, real_inputs=policy is not agent)
+    if policy is agent:
+        with bad_arguments():
+            agent.set_env(env)
     max_steps = max_steps or default_steps(env)
     result = evaluate_policy_cost(
-        agent,
+        policy,
         env,
         states,
         max_steps=max_steps,

@@ -65,7 +65,7 @@ def play(
     """Show episodes in a window, or write them to one film.
 
     Args:
-        agent: whose greedy policy is followed.
+        agent: an agent, whose greedy policy is followed, or a policy.
         environment: where.
         episodes: how many; the first starts from a telling state in our systems, such
             as a pendulum at rest, the others from random ones.
@@ -114,9 +114,8 @@ def _frames(
         for _ in range(max_steps):
             mask = info.get("action_mask")
             masks = None if mask is None else np.asarray(mask, dtype=np.bool_)[None]
-            actions, _ = agent.predict(
-                np.asarray(observation)[None], action_masks=masks
-            )
+            allowed = {} if masks is None else {"action_masks": masks}
+            actions, _ = agent.predict(np.asarray(observation)[None], **allowed)
             observation, _, terminated, truncated, info = env.step(actions[0])
             yield env.render() if env.render_mode != "human" else None
             if terminated or truncated:

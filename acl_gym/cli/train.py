@@ -147,7 +147,8 @@ def train(
             metavar="N|N,N,...",
             help="For continuous actions: the number of values of each dimension, one "
             "for all or one for each. They lie in the middle of equal parts of the range "
-            "(gymnasium.wrappers.DiscretizeAction).",
+            "(gymnasium.wrappers.DiscretizeAction). acl-gym evaluate --interpolate then "
+            "sets inputs between them.",
             show_default=False,
         ),
     ] = None,

@@ -68,7 +68,8 @@ class Quadratic(Cost):
     Attributes:
         goal: x_g, `(d,)`.
         state_weight: Q, the diagonal `(d,)` or the matrix `(d, d)`.
-        inputs: u of each action, `(n_actions, m)`; None: actions cost nothing.
+        inputs: u of each action, `(n_actions, m)`; None: actions cost nothing. Where a
+            policy sets real inputs, its own are weighed.
         input_weight: R, the diagonal `(m,)` or the matrix `(m, m)`.
         periods: for each variable its period if circular, else None; an error is then
             measured the short way round.
@@ -117,8 +118,12 @@ class Quadratic(Cost):
         if self.inputs is not None:
             inputs = np.asarray(self.inputs, dtype=np.float64)
             weight = _weight("input_weight", self.input_weight, inputs.shape[1])
-            of_action = np.einsum("ui,ij,uj->u", inputs, weight, inputs)
-            stage += of_action[episodes.actions]
+            actions = episodes.actions
+            if actions.dtype.kind == "f":  # the inputs themselves
+                stage += np.einsum("tni,ij,tnj->tn", actions, weight, actions)
+            else:
+                of_action = np.einsum("ui,ij,uj->u", inputs, weight, inputs)
+                stage += of_action[actions]
         return np.asarray(np.sum(stage, axis=0, where=episodes.taken()))
 
 

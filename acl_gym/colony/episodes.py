@@ -17,13 +17,13 @@ class Episode:
 
     Attributes:
         observations: from the first to the last, `(L + 1, ...)`.
-        actions: indices, `(L,)`.
+        actions: indices, `(L,)`; where a policy sets real inputs, `(L, n_inputs)`.
         stage_costs: -(reward) of each step, `(L,)`.
         terminated: whether it ended in a terminal state.
     """
 
     observations: NDArray[Any]
-    actions: IntArray
+    actions: NDArray[Any]
     stage_costs: FloatArray
     terminated: bool
 
@@ -36,14 +36,15 @@ class Episodes:
 
     Attributes:
         observations: `(longest + 1, n, ...)`.
-        actions: indices, `(longest, n)`.
+        actions: indices, `(longest, n)`; where a policy sets real inputs,
+            `(longest, n, n_inputs)`.
         stage_costs: `(longest, n)`.
         lengths: L of each ant, `(n,)`.
         terminated: whether each ended in a terminal state, `(n,)`.
     """
 
     observations: NDArray[Any]
-    actions: IntArray
+    actions: NDArray[Any]
     stage_costs: FloatArray
     lengths: IntArray
     terminated: BoolArray

@@ -237,12 +237,14 @@ def mark_greedy(
     Exact if the actions were chosen on this `table`: the sums are those of selection.
     """
     for j in range(actions.size):
-        value = _value(table, index[j], degree[j], actions[j])
+        value = weighted_value(table, index[j], degree[j], actions[j])
         greedy[j] = value >= best_value(table, index, degree, j, allowed, LOOP, LOOP)
 
 
 @njit(inline="always")
-def _value(table: FloatArray, cells: CellArray, degrees: FloatArray, u: int) -> float:
+def weighted_value(
+    table: FloatArray, cells: CellArray, degrees: FloatArray, u: int
+) -> float:
     """The sum over a state's cells of degree times table entry."""
     total = 0.0
     for c in range(cells.size):
@@ -265,7 +267,7 @@ def _values(
         values[u] = 0.0 if allowed.size == 0 or allowed[j, u] else -np.inf
     if weights is None:
         for u in range(values.size):
-            values[u] += _value(table, cells, degrees, u)
+            values[u] += weighted_value(table, cells, degrees, u)
     else:
         for c in range(cells.size):
             cell, counts = cells[c], False
@@ -376,7 +378,7 @@ def _greedy(
         for u in range(table.shape[1]):
             if allowed.size > 0 and not allowed[j, u]:
                 continue
-            value = _value(table, index[j], degree[j], u)
+            value = weighted_value(table, index[j], degree[j], u)
             tied = value == best and action >= 0 and rank[u] < rank[action]
             if action < 0 or value > best or tied:
                 best = value

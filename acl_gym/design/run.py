@@ -6,7 +6,6 @@ import json
 import math
 import time
 from collections.abc import Callable
-from contextlib import AbstractContextManager, nullcontext
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -127,19 +126,18 @@ def design(
     else:
         env = as_vector_env(plant)
     system: Any = env.system
-    with _threads_for(env):
-        learned = learn(
-            env,
-            draw_starts(system, CHOOSING, seed, 1),
-            seed=seed,
-            seconds=seconds,
-            steps=steps,
-            stop=stop,
-            tell=tell,
-        )
-        on_learned()
-        folder.mkdir(exist_ok=True)
-        measured = _measured(learned, env, folder, seed)
+    learned = learn(
+        env,
+        draw_starts(system, CHOOSING, seed, 1),
+        seed=seed,
+        seconds=seconds,
+        steps=steps,
+        stop=stop,
+        tell=tell,
+    )
+    on_learned()
+    folder.mkdir(exist_ok=True)
+    measured = _measured(learned, env, folder, seed)
     repeated = _command(command, source, folder, seed, learned)
     return _written(folder, source, env, learned, measured, repeated, seed, begun)
 
@@ -255,8 +253,6 @@ def is_learned(env: Any) -> bool:
     with equations should not cost.
     """
     return hasattr(env, "transitions")
-
-
 
 
 def draw_starts(plant: Plant, count: int, seed: int, stream: int) -> FloatArray:

@@ -14,8 +14,8 @@ from acl_gym.colony.costs import Cost, as_cost, solution_costs
 from acl_gym.colony.episodes import Episode
 from acl_gym.envs.control.environments import ControlVectorEnv
 from acl_gym.envs.control.single import ControlEnv
-from acl_gym.evaluation.predictions import chosen_actions, require_predictor
-from acl_gym.evaluation.rollout import Rollout
+from acl_gym.evaluation.inputs import walker
+from acl_gym.evaluation.predictions import require_predictor
 from acl_gym.evaluation.rows import rows_of
 from acl_gym.evaluation.slots import rows_of_states, with_slots_for
 from acl_gym.utils.pictures import guarded, table
@@ -110,7 +110,9 @@ def evaluate_policy_cost(
     """Run the policy of `model` once from each initial state, without exploration.
 
     Args:
-        model: an agent or policy with `predict(observation, deterministic=True)`.
+        model: an agent or policy with `predict(observation, deterministic=True)`; one
+            that returns floats, such as `agent.interpolated_policy()`, where the actions
+            of `env` are a bounded Box of one axis.
         env: where to run it. An unwrapped environment of this package is left alone: a
             copy with one slot per state is run. Any other must have that many slots
             already; it is run itself, and left as after a reset.
@@ -154,7 +156,7 @@ def evaluate_policy_cost(
             f"a wrapped env must have one slot for each of the {len(states)} states, "
             f"got {env.num_envs} slots."
         )
-    rollout = Rollout(env, 300 if max_steps is None else max_steps)
+    rollout, choose, real = walker(env, 300 if max_steps is None else max_steps)
     episode_cost = as_cost(cost)
     observation = rollout.start(
         seed=seed, states=states, record=episode_cost is not None
@@ -162,11 +164,14 @@ def evaluate_policy_cost(
     memory = None
     while rollout.ants.size:
         seen = rows_of(observation, rollout.ants)
-        actions, memory = chosen_actions(model, seen, rollout, memory)
+        actions, memory = choose(model, seen, rollout, memory)
         observation = rollout.step(actions).observation
     costs = rollout.cost
     if episode_cost is not None:
-        costs = solution_costs(episode_cost, rollout.episodes())
+        episodes = rollout.episodes()
+        if real is not None:
+            episodes = real.with_inputs(episodes)
+        costs = solution_costs(episode_cost, episodes)
     rollout.release()
     return PolicyCost(costs, rollout.success, rollout.length, -rollout.cost)
 

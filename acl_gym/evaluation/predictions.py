@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acl_gym.evaluation.rollout import Rollout
-from acl_gym.policies import PartitionPolicy
+from acl_gym.policies import InterpolatedPolicy, PartitionPolicy
 from acl_gym.utils import validation
-from acl_gym.utils.typing import IntArray, Predictor
+from acl_gym.utils.typing import FloatArray, IntArray, Predictor
 
 
 def require_predictor(model: Any) -> None:
@@ -30,6 +30,13 @@ def chosen_actions(
     model: Predictor, observation: Any, rollout: Rollout, memory: Any
 ) -> tuple[NDArray[np.int64], Any]:
     """Indices of the actions that `model` takes in the active slots, and its state."""
+    if isinstance(model, InterpolatedPolicy):
+        raise ValueError(
+            "an InterpolatedPolicy chooses real inputs, but env has Discrete actions; "
+            "evaluate it where actions are a Box, without ActionGrid or "
+            'DiscretizeAction, such as gym.make_vec("acl_gym/Pendulum-v0", num_envs=1, '
+            "continuous=True), or evaluate the agent itself."
+        )
     allowed = rollout.allowed()
     if isinstance(model, PartitionPolicy):
         starts = np.full(rollout.ants.size, rollout.steps == 0)
@@ -55,12 +62,7 @@ def checked_actions(
     Raises:
         ValueError: they are not integers of the action space, one for each slot.
     """
-    if not isinstance(found, tuple) or len(found) != 2:
-        raise ValueError(
-            "model.predict must return (actions, state), got "
-            f"{validation.shown(found)}; return (actions, None) where it has no state."
-        )
-    array = validation.as_array(found[0])
+    array = _first_of_pair(found)
     if array is None or array.dtype.kind not in "iu":
         what = validation.shown(found[0]) if array is None else f"dtype {array.dtype}"
         raise ValueError(
@@ -83,3 +85,63 @@ def checked_actions(
             "environment."
         )
     return array.astype(np.int64)
+
+
+def checked_inputs(
+    found: Any, slots: IntArray, low: FloatArray, high: FloatArray
+) -> FloatArray:
+    """The real inputs that `predict` returned, if they are one row for each slot.
+
+    Args:
+        found: what it returned.
+        slots: whose observations it was given, `(m,)`.
+        low: lower bounds of the inputs, `(n_inputs,)`.
+        high: upper bounds.
+
+    Returns:
+        `(m, n_inputs)`, float64, within the bounds.
+
+    Raises:
+        ValueError: they are not finite floats within the bounds, a row for each slot.
+    """
+    array, shape = _first_of_pair(found), (slots.size, low.size)
+    if array is None or array.dtype.kind != "f":
+        what = validation.shown(found[0]) if array is None else f"dtype {array.dtype}"
+        raise ValueError(
+            "model.predict must return floats where actions are a Box, got "
+            f"{what}; evaluate agent.interpolated_policy(), or wrap env in "
+            "acl_gym.ActionGrid as for learning."
+        )
+    if array.shape == (slots.size,) and low.size == 1:
+        array = array[:, None]
+    if array.shape != shape:
+        raise ValueError(
+            f"model.predict must return inputs of shape {shape}, a row for each "
+            f"observation, got {array.shape}; check that it handles batches."
+        )
+    inputs = array.astype(np.float64)
+    # Rounding to a narrower type may lead as far beyond a bound.
+    slack = np.finfo(array.dtype).eps * np.maximum(np.abs(low), np.abs(high))
+    good = (inputs >= low - slack) & (inputs <= high + slack)
+    if not good.all():  # NaN is not good either
+        j, i = np.argwhere(~good)[0]
+        raise ValueError(
+            f"model.predict must return inputs within [{low[i]:g}, {high[i]:g}], got "
+            f"{inputs[j, i]:g} as input {i} in slot {slots[j]}; check that the model is "
+            "of this environment."
+        )
+    return np.clip(inputs, low, high)
+
+
+def _first_of_pair(found: Any) -> NDArray[Any] | None:
+    """The actions in what `predict` returned, None where they are no array.
+
+    Raises:
+        ValueError: it is not a pair of actions and state.
+    """
+    if not isinstance(found, tuple) or len(found) != 2:
+        raise ValueError(
+            "model.predict must return (actions, state), got "
+            f"{validation.shown(found)}; return (actions, None) where it has no state."
+        )
+    return validation.as_array(found[0])

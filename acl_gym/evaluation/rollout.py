@@ -70,8 +70,8 @@ class Rollout:
             remedy = "number its actions with gymnasium.wrappers.TransformAction"
             if isinstance(space, spaces.Box):
                 remedy = (
-                    "wrap each single environment in "
-                    "gymnasium.wrappers.DiscretizeAction(env, bins=5)"
+                    "wrap it in acl_gym.ActionGrid(env, 5), or each single environment "
+                    "in gymnasium.wrappers.DiscretizeAction(env, bins=5)"
                 )
             raise ValueError(
                 "env must have Discrete actions, got "

@@ -8,6 +8,7 @@ from weakref import WeakSet
 from gymnasium.vector import VectorEnv
 
 from acl_gym.envs.control.environments import ControlVectorEnv
+from acl_gym.envs.wrappers.action_grid import ActionGrid
 from acl_gym.utils import validation
 from acl_gym.utils.typing import FloatArray
 from acl_gym.utils.vector_envs import require_vector_env
@@ -58,7 +59,8 @@ def with_slots_for(
 
     Returns:
         A new environment of the same system, whose random numbers continue a copy of
-        the stream of `env`; or `env` itself if it is wrapped or of another package, or
+        the stream of `env`, in an `ActionGrid` if that is all `env` is wrapped in; or
+        `env` itself if it is wrapped or of another package, or
         is such a new environment with the right number of slots.
 
     Raises:
@@ -66,6 +68,9 @@ def with_slots_for(
     """
     require_vector_env(env)
     base = env.unwrapped
+    if isinstance(env, ActionGrid) and env.env is base:
+        inside = with_slots_for(base, states)
+        return env if inside is base else ActionGrid(inside, env.counts)
     if base is not env or not isinstance(base, ControlVectorEnv):
         return env
     if states is None:

@@ -6,17 +6,19 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from gymnasium import spaces
 from gymnasium.vector import VectorEnv
 from numpy.typing import NDArray
 
+from acl_gym.evaluation.inputs import walker
 from acl_gym.evaluation.predictions import (
     checked_actions,
-    chosen_actions,
+    checked_inputs,
     require_predictor,
 )
-from acl_gym.evaluation.rollout import Rollout
 from acl_gym.evaluation.slots import control_env, rows_of_states, with_slots_for
 from acl_gym.policies import PartitionPolicy
+from acl_gym.utils.boxes import input_bounds
 from acl_gym.utils.typing import FloatArray, Predictor
 
 
@@ -26,13 +28,14 @@ class Trajectory:
 
     Attributes:
         states: x(0) .. x(n), `(n + 1, state_size)`.
-        actions: u(0) .. u(n - 1) as indices, `(n,)`.
+        actions: u(0) .. u(n - 1) as indices, `(n,)`, or as real inputs,
+            `(n, n_inputs)`.
         costs: stage costs of the steps, `(n,)`.
         success: whether it reached the goal.
     """
 
     states: FloatArray
-    actions: NDArray[np.int64]
+    actions: NDArray[Any]
     costs: FloatArray
     success: bool
 
@@ -64,18 +67,18 @@ def record_trajectory(
     states_of_one = np.asarray(state)[None]
     env = with_slots_for(env, states_of_one)
     base = control_env(env)
-    rollout = Rollout(
+    rollout, choose, real = walker(
         env, base.system.evaluation_steps if max_steps is None else max_steps
     )
     observation = rollout.start(states=states_of_one)
     states, actions, costs = [base.states[0]], [], []
     memory = None
     while rollout.ants.size:
-        action, memory = chosen_actions(model, observation, rollout, memory)
+        action, memory = choose(model, observation, rollout, memory)
         step = rollout.step(action)
         observation = step.observation
         states.append(base.states[0])
-        actions.append(int(action[0]))
+        actions.append(int(action[0]) if real is None else real.taken[-1][0])
         costs.append(float(step.cost[0]))
     rollout.release()
     return Trajectory(
@@ -88,8 +91,10 @@ def record_trajectory(
 
 def actions_in(
     model: Predictor, env: VectorEnv[Any, Any, Any], states: FloatArray
-) -> NDArray[np.int64]:
+) -> NDArray[Any]:
     """The action of the policy in each of some states, `(n,)`.
+
+    Where the actions of `env` are a Box, the inputs that it sets, `(n, n_inputs)`.
 
     Args:
         model: see `evaluate_policy_cost`.
@@ -110,5 +115,7 @@ def actions_in(
         found = model.predict(observation, None, np.ones(len(observation), np.bool_))
     else:
         found = model.predict(observation, deterministic=True)
-    first, count = int(space.start), int(space.n)
-    return checked_actions(found, np.arange(env.num_envs), first, count)
+    slots = np.arange(env.num_envs)
+    if isinstance(space, spaces.Box):
+        return checked_inputs(found, slots, *input_bounds("the actions of env", space))
+    return checked_actions(found, slots, int(space.start), int(space.n))

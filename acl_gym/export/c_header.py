@@ -83,6 +83,8 @@ def c_header(source: Source, name: str, precision: str, file_name: str) -> str:
     else:
         _add_columns(tables, source)
     signals = source.signals
+    if source.grid is not None:
+        _add_neighbours(tables, source)
     if signals is not None:
         tables.add_inputs(np.array(signals.values), ", ".join(signals.inputs))
     dimensions = len(source.cells)
@@ -109,6 +111,8 @@ def c_header(source: Source, name: str, precision: str, file_name: str) -> str:
         first_action=source.first_action,
         circular=any(source.periods),
         inputs=signals is not None,
+        between=source.grid is not None,
+        n_inputs=0 if source.grid is None else source.grid.n_inputs,
         tables=tables.texts,
         bytes=f"{tables.bytes:,}",
         stack=_stack(source, number),
@@ -177,6 +181,8 @@ class _Tables:
 
 def _check_size(source: Source) -> None:
     size = source.table.size if source.kind == "fuzzy" else len(source.table)
+    if source.grid is not None and source.kind != "fuzzy":
+        size += len(source.table) * source.grid.n_inputs
     if source.kind != "discrete":
         size += sum(line.size for line in source.lines)
     if size > MOST_NUMBERS:
@@ -256,6 +262,27 @@ def _add_levels(tables: _Tables, source: Source) -> str:
     )
 
 
+def _add_neighbours(tables: _Tables, source: Source) -> None:
+    """What real inputs are found from: of each cell itself, or of neighbouring actions."""
+    grid = source.grid
+    if grid is None:
+        return
+    if source.kind == "fuzzy":
+        own = np.arange(source.n_actions)[:, None]
+        for name, other in (("below", grid.below), ("above", grid.above)):
+            tables.add_integers(
+                name,
+                np.where(other < 0, own, other).ravel(),
+                f"the action {name} along each input; the same where there is none",
+                grid.n_inputs,
+            )
+    else:
+        inputs = tables.number.rounded(source.cell_inputs.ravel())
+        tables.add_reals(
+            "cell_inputs", inputs, "the inputs of each cell", grid.n_inputs
+        )
+
+
 def _stack(source: Source, number: Number) -> int:
     """Bytes of the arrays and numbers that the functions declare."""
     d, n_actions = len(source.cells), source.n_actions
@@ -266,6 +293,8 @@ def _stack(source: Source, number: Number) -> int:
         return 8
     if source.kind == "crisp":
         return locate + number.bytes + 16
+    if source.grid is not None:
+        locate += 10 * number.bytes + 16  # the parabola
     return locate + d * (8 + number.bytes) + (n_actions + 2) * number.bytes + 32
 
 
@@ -281,6 +310,9 @@ def _work(source: Source, number: Number) -> str:
     multiplications = sum(period > 0 for period in source.periods)
     if source.kind == "fuzzy":
         multiplications += 2**d * (d + source.n_actions)
+        if source.grid is not None:
+            divisions += 3 * source.grid.n_inputs
+            multiplications += 9 * source.grid.n_inputs
     calls = ""
     if angles:
         plural = "s" if len(angles) > 1 else ""

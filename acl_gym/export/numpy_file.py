@@ -40,6 +40,23 @@ def act(observation):
 It gives what `predict` gives, for all finite observations.
 """
 
+NUMPY_INPUT_CODE = (
+    NUMPY_CODE.rpartition("\n    return")[0]
+    + """
+    u = np.lexsort((ranks, -values))[0]
+    lower, upper, given = p["below"][u], p["above"][u], p["input_values"]
+    inputs = given[u].copy()
+    for i in np.flatnonzero((lower >= 0) & (upper >= 0)):
+        fall_below, fall_above = values[u] - values[[lower[i], upper[i]]]
+        down, up = inputs[i] - given[lower[i], i], given[upper[i], i] - inputs[i]
+        total = fall_below * up + fall_above * down
+        if total > 0:
+            inputs[i] += (fall_below * up**2 - fall_above * down**2) / (2 * total)
+    return inputs
+"""
+)
+"""The same for a policy of real inputs, to rounding; see `InterpolatedPolicy.to_numpy`."""
+
 
 def numpy_arrays(source: Source) -> dict[str, NDArray[Any]]:
     """The arrays of a policy that `NUMPY_CODE` evaluates.
@@ -56,6 +73,8 @@ def numpy_arrays(source: Source) -> dict[str, NDArray[Any]]:
         - `table`, `ranks`: values and preferences, an axis for each variable as long
           as its centres, and one for the actions;
         - `first_action`: the number of the first action;
+        - `below`, `above`, for a policy of real inputs: the next action along each
+          input, `(n_actions, n_inputs)`, -1 where there is none;
         - if known: `observations`, `inputs`, names with units, and `input_values`,
           `(n_actions, n_inputs)`.
     """
@@ -79,6 +98,8 @@ def numpy_arrays(source: Source) -> dict[str, NDArray[Any]]:
         "ranks": ranks,
         "first_action": np.array(source.first_action),
     }
+    if source.grid is not None:
+        arrays |= {"below": source.grid.below, "above": source.grid.above}
     if source.signals is not None:
         arrays["observations"] = np.array(source.signals.observations, dtype=np.str_)
         arrays["inputs"] = np.array(source.signals.inputs, dtype=np.str_)

@@ -9,9 +9,11 @@ from typing import Self
 import numpy as np
 
 from acl_gym.colony.greedy import greedy_actions
+from acl_gym.colony.interpolation import interpolated_inputs
 from acl_gym.envs.control.signals import Signals
 from acl_gym.partitions import Discrete, Grid, Partition
 from acl_gym.utils.angles import Angles
+from acl_gym.utils.input_grid import InputGrid
 from acl_gym.utils.typing import FloatArray, IntArray, RankArray
 
 
@@ -30,6 +32,8 @@ class Source:
         ranks: `(n_cells, n_actions)`, the order in which tied actions are preferred.
         first_action: the action that column 0 stands for.
         signals: what observations and actions mean; None if unknown.
+        grid: where the policy chooses real inputs between its actions, the grid of
+            these; `signals` are then known.
     """
 
     kind: str
@@ -41,6 +45,7 @@ class Source:
     ranks: RankArray
     first_action: int
     signals: Signals | None
+    grid: InputGrid | None = None
 
     @classmethod
     def of(
@@ -107,6 +112,27 @@ class Source:
     def n_actions(self) -> int:
         """The number of actions."""
         return int(self.table.shape[1])
+
+    def between(self, grid: InputGrid, signals: Signals) -> Self:
+        """The same, but with real inputs between the actions.
+
+        Args:
+            grid: the inputs of the actions.
+            signals: with the same inputs.
+        """
+        if len(signals.observations) != self.angles.n_observed:
+            signals = replace(signals, observations=())
+        return replace(self, grid=grid, signals=signals)
+
+    @cached_property
+    def cell_inputs(self) -> FloatArray:
+        """The real inputs that are chosen in each cell by itself, `(n_cells, n_inputs)`."""
+        if self.grid is None:
+            raise ValueError("only policies between actions have real inputs.")
+        index = np.arange(len(self.table), dtype=np.int32)[:, None]
+        return interpolated_inputs(
+            self.table, index, np.ones(index.shape), self.best_columns, self.grid
+        )
 
     @cached_property
     def best_columns(self) -> IntArray:

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from gymnasium import spaces
 from gymnasium.vector import VectorEnv
 
 from acl_gym.colony.greedy import ALL, LOOP, best_value
@@ -123,7 +124,13 @@ def _try_all(env: ControlVectorEnv, partition: Partition) -> _Model:
             f"cell_states must give a state for each of the {partition.n_cells} cells, "
             f"got {len(states)}."
         )
-    n_actions = int(env.system.action_space.n)
+    space = env.system.action_space
+    if not isinstance(space, spaces.Discrete):
+        raise ValueError(
+            "env must have Discrete actions, all of which are tried, got "
+            f"{validation.shown(space)}; make it with a list of inputs, one an action."
+        )
+    n_actions = int(space.n)
     shape = (len(states), n_actions)
     k = partition.cells_per_state
     validation.check_memory(

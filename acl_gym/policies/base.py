@@ -126,6 +126,26 @@ class PartitionPolicy(Fixed, ABC):
             ValueError: an observation is not finite or has the wrong shape, or a mask
                 has the wrong shape or allows nothing.
         """
+        index, degree, single = self.located(observation)
+        allowed = self._checked_masks(action_masks, len(index))
+        columns, state = self._act_in_state(
+            state, episode_start, index, degree, deterministic, allowed
+        )
+        actions = columns + self.first_action
+        return (actions.reshape(()).view(Action) if single else actions), state
+
+    def located(self, observation: ArrayLike) -> tuple[CellArray, FloatArray, bool]:
+        """The cells of observations, their degrees, and whether it is a single one.
+
+        Args:
+            observation: one observation or a batch of them.
+
+        Returns:
+            `(index, degree, single)`, the first two `(n, k)`.
+
+        Raises:
+            ValueError: an observation is not finite or has the wrong shape.
+        """
         batch = validation.as_array(observation)
         if batch is None or batch.dtype == object:
             raise ValueError(
@@ -136,12 +156,7 @@ class PartitionPolicy(Fixed, ABC):
         if single:
             batch = batch[None]
         index, degree = locate_all(self.partition, batch, self._n_cells)
-        allowed = self._checked_masks(action_masks, len(index))
-        columns, state = self._act_in_state(
-            state, episode_start, index, degree, deterministic, allowed
-        )
-        actions = columns + self.first_action
-        return (actions.reshape(()).view(Action) if single else actions), state
+        return index, degree, single
 
     def to_numpy(self, path: str | Path) -> Path:
         """Write the greedy policy to a file for NumPy, without this package.

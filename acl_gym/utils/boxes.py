@@ -1,4 +1,4 @@
-"""The bounds that a Box declares, which may be none."""
+"""The bounds that a Box declares, which may be none, and real inputs within bounds."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from gymnasium import spaces
 
+from acl_gym.utils import validation
 from acl_gym.utils.typing import FloatArray
 
 INFINITE = 1e30
@@ -38,4 +39,35 @@ def declared_bounds(space: spaces.Box) -> tuple[FloatArray, FloatArray]:
         no_high |= space.high == extremes.max
     low[no_low | (low < -INFINITE)] = -np.inf
     high[no_high | (high > INFINITE)] = np.inf
+    return low, high
+
+
+def input_bounds(name: str, space: Any) -> tuple[FloatArray, FloatArray]:
+    """The bounds of real inputs: of a bounded Box of one axis.
+
+    Args:
+        name: what the space is called in messages, such as "env's actions".
+        space: the candidate.
+
+    Returns:
+        `(low, high)`, float64 arrays `(n_inputs,)`.
+
+    Raises:
+        ValueError: it is no such box, or the ends of an input are not low < high.
+    """
+    kind = getattr(space, "dtype", None)
+    fits = isinstance(space, spaces.Box) and len(space.shape) == 1 and space.shape[0]
+    if not fits or kind is None or kind.kind != "f":
+        raise ValueError(
+            f"{name} must be a Box of floats with one axis, got "
+            f"{validation.shown(space)}; reshape them with "
+            "gymnasium.wrappers.TransformAction."
+        )
+    low, high = declared_bounds(space)
+    if not (np.isfinite(low).all() and np.isfinite(high).all() and (low < high).all()):
+        raise ValueError(
+            f"{name} must have finite bounds, low < high, for each input, got low = "
+            f"{low.tolist()} and high = {high.tolist()}; bound them with "
+            "gymnasium.wrappers.RescaleAction or ClipAction, or with another Box."
+        )
     return low, high

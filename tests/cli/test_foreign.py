@@ -88,9 +88,22 @@ def test_continuous_actions_are_discretised() -> None:
     expected = evaluate_policy_cost(agent, env, max_steps=20, seed=0)
     evaluated = figures("evaluate", "p.npz")
     assert evaluated["policy_cost"] == trained["policy_cost"] == expected.cost
+    # Between the values, in the environment as it is.
+    between = figures("evaluate", "p.npz", "--interpolate")
+    box_env = WaitingVectorEnv.make("Pendulum-v1", 100)
+    policy = agent.interpolated_policy()
+    assert policy.grid.values.ravel() == pytest.approx([-4 / 3, 0, 4 / 3], abs=1e-6)
+    expected = evaluate_policy_cost(policy, box_env, max_steps=20, seed=0)
+    assert between["policy_cost"] == expected.cost != evaluated["policy_cost"]
+    assert (between["interpolated"], between["discretize"]) == (True, [3])
     more = figures("train", "--resume", "p.npz", "--trials", "1", "--discretize", "3")
     assert (more["trials"], more["discretize"]) == (3, [3])
     refused(2, "train", "--resume", "p.npz", "--discretize", "4")
+
+
+def test_only_discretised_actions_can_be_interpolated() -> None:
+    figures(*SMALL, "--trials", "1", "--out", "s")
+    assert "--discretize 5" in refused(2, "evaluate", "s.npz", "--interpolate")
 
 
 def test_each_dimension_has_its_own_number(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -224,15 +224,24 @@ def test_inputs_of_the_system_and_of_the_user(colony: ACL, tmp_path: Path) -> No
     assert sorted(p.name for p in tmp_path.iterdir()) == ["a.h", "b.h"]
 
 
-def test_an_agent_without_an_environment_names_no_inputs(
+def test_an_agent_without_an_environment_names_the_inputs_of_its_file(
     colony: ACL, tmp_path: Path
 ) -> None:
     colony.save(tmp_path / "agent")
-    text = ACL.load(tmp_path / "agent").policy.to_c(tmp_path / "p.h").read_text()
+    loaded = ACL.load(tmp_path / "agent")
+    text = loaded.policy.to_c(tmp_path / "p.h").read_text()
+    assert "policy_inputs[3][1]" in text
+    assert text == colony.policy.to_c(tmp_path / "p.h").read_text()
+    again = ACL.load(tmp_path / "agent", colony.env).to_c(tmp_path / "q.h").read_text()
+    assert again.replace("q.h", "p.h") == text
+
+
+def test_an_agent_that_never_had_an_environment_names_no_inputs(
+    colony: ACL, tmp_path: Path
+) -> None:
+    agent = ACL(None, colony.partition, n_actions=3)
+    text = agent.policy.to_c(tmp_path / "p.h").read_text()
     assert "inputs" not in text
-    env = colony.env
-    again = ACL.load(tmp_path / "agent", env).to_c(tmp_path / "q.h").read_text()
-    assert again.replace("q.h", "p.h") == colony.to_c(tmp_path / "p.h").read_text()
 
 
 def test_the_stated_memory_is_that_of_the_tables(tmp_path: Path) -> None:

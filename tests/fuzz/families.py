@@ -326,6 +326,14 @@ CONSTRUCTORS: dict[str, Callable[[], tuple[Callable[..., Any], dict[str, Any]]]]
         acl_gym.ScaledVectorObservation,
         {"env": pendulum(), "circular": [0]},
     ),
+    "ActionGrid": lambda: (
+        acl_gym.ActionGrid,
+        {"env": pendulum(continuous=True), "counts": 3},
+    ),
+    "step_inputs": lambda: (
+        partial(_stepped, continuous=True),
+        {"actions": np.zeros((3, 1))},
+    ),
     "perturbed": lambda: (
         lambda **given: perturbed(pendulum(), given),
         {"slips": 0.1, "noise": (0.1, 0.1), "rounded": (3, 3), "hidden": (1,)},
@@ -360,6 +368,18 @@ CONSTRUCTORS: dict[str, Callable[[], tuple[Callable[..., Any], dict[str, Any]]]]
     "set_random_seed": lambda: (colony().set_random_seed, {"seed": 0}),
     "set_env": lambda: (colony().set_env, {"env": pendulum()}),
     "soft_policy": lambda: (colony().soft_policy, {"exponent": 2.0, "seed": 0}),
+    "InterpolatedPolicy": lambda: (
+        acl_gym.InterpolatedPolicy,
+        {"policy": TablePolicy(grid(), _TABLE), "inputs": np.arange(3.0)},
+    ),
+    "interpolated_policy": lambda: (
+        colony().interpolated_policy,
+        {"inputs": np.arange(3.0)},
+    ),
+    "predict_inputs": lambda: (
+        colony().interpolated_policy().predict,
+        {"observation": np.zeros((2, 2)), "state": None, "episode_start": None},
+    ),
     "set_num_threads": lambda: (acl_gym.set_num_threads, {"count": 1}),
     "predict": lambda: (
         colony().predict,
@@ -405,8 +425,8 @@ def _few_steps(function: Callable[..., Any], name: str) -> Callable[..., Any]:
     return call
 
 
-def _stepped(actions: Any) -> Any:
-    env = pendulum()
+def _stepped(actions: Any, **parameters: Any) -> Any:
+    env = pendulum(**parameters)
     env.reset(seed=0)
     return env.step(actions)
 
@@ -676,6 +696,8 @@ def replaced(rng: Rng) -> Call:
     ]
     agent = makers[rng.integers(3)]()
     things: list[Any] = [agent, agent.partition, agent.policy, agent.env, agent.rollout]
+    between = agent.interpolated_policy()
+    things += [between, between.grid]
     if isinstance(agent, ACL):
         things += [agent.pheromone, agent.soft_policy(seed=0)]
     thing = things[rng.integers(len(things))]
@@ -686,6 +708,7 @@ def replaced(rng: Rng) -> Call:
         setattr(thing, name, value)
         if agent.max_steps < 100:
             agent.learn(trials=1)
+        between.predict(np.zeros((2, 2)))
         return agent.predict(np.zeros((2, 2)))
 
     return Call(f"{type(thing).__name__}.{name} = {_shown(value)}", use, "crash-free")

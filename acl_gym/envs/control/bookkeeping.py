@@ -8,11 +8,13 @@ from typing import Any, Protocol
 
 import gymnasium as gym
 import numpy as np
+from gymnasium import spaces
 from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
 from acl_gym.envs.control.system import ControlSystem
 from acl_gym.utils import validation
+from acl_gym.utils.boxes import input_bounds
 from acl_gym.utils.compiling import njit
 from acl_gym.utils.typing import BoolArray, FloatArray, IntArray
 
@@ -35,6 +37,29 @@ def made_system(kind: type[ControlSystem], parameters: dict[str, Any]) -> Contro
                     f"{', '.join(known) or 'none'}.{hint}"
                 )
     return kind(**parameters)
+
+
+def real_input_bounds(system: ControlSystem) -> tuple[FloatArray, FloatArray] | None:
+    """The bounds of the inputs of a system whose actions are a Box, else None.
+
+    Raises:
+        ValueError: the Box is not bounded, or has not one axis of floats.
+    """
+    space = system.action_space
+    if isinstance(space, spaces.Discrete):
+        return None
+    return input_bounds(f"the actions of {type(system).__name__}", space)
+
+
+def n_actions_of(system: ControlSystem) -> int:
+    """The number of actions; 0 where the inputs are real."""
+    space = system.action_space
+    return int(space.n) if isinstance(space, spaces.Discrete) else 0
+
+
+def drawn_action(action: Any) -> int | FloatArray:
+    """An action as painters take it: its number, or its inputs."""
+    return int(action) if np.ndim(action) == 0 else np.asarray(action)
 
 
 class Seeded(Protocol):
@@ -149,6 +174,43 @@ def checked_actions(actions: Any, count: int, n_actions: int) -> IntArray:
             f"in slot {slot}."
         )
     return checked
+
+
+def checked_inputs(
+    inputs: Any, count: int, low: FloatArray, high: FloatArray
+) -> FloatArray:
+    """Return real inputs as a new float64 array `(count, n_inputs)` within bounds.
+
+    What lies beyond a bound is set to it, as an actuator saturates.
+
+    Args:
+        inputs: a row for each slot.
+        count: how many slots there are.
+        low: of each input, `(n_inputs,)`.
+        high: of each input.
+
+    Raises:
+        TypeError: they are not real numbers.
+        ValueError: there is not a row for each slot, or one is NaN or infinite.
+    """
+    array = inputs if type(inputs) is np.ndarray else validation.as_array(inputs)
+    if array is None or array.dtype.kind not in "iuf":
+        raise TypeError(
+            f"actions must be real numbers of shape ({count}, {low.size}), the inputs of "
+            f"each slot, got {validation.shown(inputs)}; cast with .astype(np.float64)."
+        )
+    if array.shape != (count, low.size):
+        raise ValueError(
+            f"actions must have shape ({count}, {low.size}), a row of inputs for each "
+            f"slot, got {array.shape}."
+        )
+    if not np.isfinite(array).all():
+        slot, axis = np.argwhere(~np.isfinite(array))[0]
+        raise ValueError(
+            f"actions must be finite, got {array[slot, axis]} as input {axis} in slot "
+            f"{slot}; check what computes them."
+        )
+    return np.clip(array.astype(np.float64), low, high)
 
 
 def final_infos(

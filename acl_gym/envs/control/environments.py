@@ -21,13 +21,17 @@ from numpy.typing import ArrayLike, NDArray
 from acl_gym.envs.control.bookkeeping import (
     checked_actions,
     checked_autoreset_mode,
+    checked_inputs,
     checked_options,
     checked_render_mode,
     count_step,
     draw_uniforms,
+    drawn_action,
     final_infos,
     finish,
     made_system,
+    n_actions_of,
+    real_input_bounds,
     states_of_slots,
     warn_of_no_render_mode,
 )
@@ -43,7 +47,7 @@ Observation = NDArray[Any]
 StepResult = tuple[Observation, FloatArray, BoolArray, BoolArray, dict[str, Any]]
 
 
-class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
+class ControlVectorEnv(VectorEnv[Observation, Any, NDArray[Any]]):
     """Native vector environment over a control system: one kernel call per step.
 
     Args:
@@ -96,10 +100,11 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
             self.single_observation_space, self.num_envs
         )
         self.action_space = batch_space(self.single_action_space, self.num_envs)
-        self._n_actions = int(self.system.action_space.n)
+        self._input_bounds = real_input_bounds(self.system)
+        self._n_actions = n_actions_of(self.system)
         fps = self.metadata["render_fps"]
         self._renderer = Renderer(self.system, self.painter, fps)
-        self._actions: IntArray | None = None  # the last ones, to be drawn
+        self._actions: NDArray[Any] | None = None  # the last ones, to be drawn
 
         self._state: FloatArray | None = None  # (state_size, num_envs)
         self._steps = np.zeros(self.num_envs, dtype=np.int64)
@@ -237,7 +242,8 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
         """Apply one action to each slot.
 
         Args:
-            actions: integers of shape `(num_envs,)`.
+            actions: integers of shape `(num_envs,)`; where the actions are a Box, real
+                inputs `(num_envs, n_inputs)`, set to its bounds where they are beyond.
 
         Returns:
             `(observations, rewards, terminations, truncations, infos)`, new arrays.
@@ -249,18 +255,23 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
         Raises:
             ResetNeeded: there was no reset yet, or autoreset is disabled and a slot
                 has finished.
-            ValueError: an action has the wrong shape or is out of range.
-            TypeError: the actions are not integers.
+            ValueError: an action has the wrong shape, is out of range or not finite.
+            TypeError: the actions are not integers, or inputs no real numbers.
         """
         if self._state is None:
             raise ResetNeeded("step() needs states; call reset() first.")
+        if self._input_bounds is not None:
+            return self._step(
+                checked_inputs(actions, self._num_envs, *self._input_bounds)
+            )
         return self._step(checked_actions(actions, self._num_envs, self._n_actions))
 
-    def _step(self, actions: IntArray) -> StepResult:
+    def _step(self, actions: NDArray[Any]) -> StepResult:
         """`step` after a reset, with actions that are known to be valid.
 
         Args:
-            actions: a new int64 array `(num_envs,)`, which the environment keeps.
+            actions: a new int64 array `(num_envs,)`, which the environment keeps, or a
+                float64 array `(num_envs, n_inputs)`.
         """
         self._actions = actions
         system, n_slots, state = self._system, self._num_envs, self._states
@@ -330,7 +341,7 @@ class ControlVectorEnv(VectorEnv[Observation, IntArray, NDArray[Any]]):
                 self._states[:, slot],
                 None
                 if self._actions is None or started[slot] or idle[slot]
-                else int(self._actions[slot]),
+                else drawn_action(self._actions[slot]),
             )
             for slot in range(self.num_envs)
         )

@@ -34,16 +34,15 @@ class Painter(ABC, Generic[System]):
         self.system = system
 
     @abstractmethod
-    def draw(
-        self, pygame: Any, canvas: Any, state: FloatArray, action: int | None
-    ) -> None:
+    def draw(self, pygame: Any, canvas: Any, state: FloatArray, action: Any) -> None:
         """Draw a state.
 
         Args:
             pygame: the module.
             canvas: a square pygame surface to fill.
             state: `(state_size,)`.
-            action: the one that led to it; None at the start of an episode.
+            action: the one that led to it, or its inputs where they are real; None at
+                the start of an episode.
         """
 
     def check_table(self, table: Any) -> None:
@@ -127,12 +126,13 @@ class Renderer:
             self._painter.check_table(table)
         self._table = table
 
-    def frame(self, state: FloatArray, action: int | None) -> Frame:
+    def frame(self, state: FloatArray, action: Any) -> Frame:
         """Return the picture of a state, `(height, width, 3)`.
 
         Args:
             state: `(state_size,)`.
-            action: the one that led to it; None at the start of an episode.
+            action: the one that led to it, or its inputs where they are real; None at
+                the start of an episode.
 
         Raises:
             DependencyNotInstalled: pygame is missing.
@@ -140,12 +140,13 @@ class Renderer:
         pixels = self._pygame.surfarray.array3d(self._surface(state, action))
         return np.ascontiguousarray(pixels.transpose(1, 0, 2))
 
-    def show(self, state: FloatArray, action: int | None) -> None:
+    def show(self, state: FloatArray, action: Any) -> None:
         """Show the picture of a state in a window, no faster than real time.
 
         Args:
             state: `(state_size,)`.
-            action: the one that led to it; None at the start of an episode.
+            action: the one that led to it, or its inputs where they are real; None at
+                the start of an episode.
 
         Raises:
             DependencyNotInstalled: pygame is missing.
@@ -167,7 +168,7 @@ class Renderer:
             self._pygame.display.quit()
             self._window = None
 
-    def _surface(self, state: FloatArray, action: int | None) -> Any:
+    def _surface(self, state: FloatArray, action: Any) -> Any:
         large = self._pygame.Surface((_OVERSAMPLING * SIZE, _OVERSAMPLING * SIZE))
         self._painter.draw(self._pygame, large, state, action)
         if self._table is not None:

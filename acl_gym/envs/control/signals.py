@@ -10,6 +10,8 @@ import numpy as np
 
 from acl_gym.utils import validation
 
+_FLOATS = ("float16", "float32", "float64")
+
 
 @dataclass(frozen=True)
 class Signals:
@@ -22,14 +24,18 @@ class Signals:
             "angular velocity, rad/s"; empty if unknown.
         inputs: the same for each input of the plant.
         values: for each action the value of each input, `(n_actions, n_inputs)`.
+        dtype: the type of the inputs that the plant takes, "float64" or another of
+            NumPy's floats.
 
     Raises:
-        ValueError: `values` are not finite numbers with a column for each input.
+        ValueError: `values` are not finite numbers with a column for each input, or
+            `dtype` is no type of floats.
     """
 
     observations: tuple[str, ...]
     inputs: tuple[str, ...]
     values: tuple[tuple[float, ...], ...]
+    dtype: str = "float64"
 
     def __post_init__(self) -> None:
         values = validation.real_array("values", self.values, ndim=2)
@@ -38,6 +44,7 @@ class Signals:
                 f"values must have a column for each of the inputs {self.inputs}, got "
                 f"shape {values.shape}."
             )
+        validation.one_of("dtype", self.dtype, _FLOATS)
         object.__setattr__(self, "observations", tuple(map(str, self.observations)))
         object.__setattr__(self, "inputs", tuple(map(str, self.inputs)))
         object.__setattr__(self, "values", tuple(map(tuple, values.tolist())))

@@ -12,10 +12,14 @@ from numpy.typing import NDArray
 
 from acl_gym.envs.control.bookkeeping import (
     checked_actions,
+    checked_inputs,
     checked_options,
     checked_render_mode,
     draw_uniforms,
+    drawn_action,
     made_system,
+    n_actions_of,
+    real_input_bounds,
     warn_of_no_render_mode,
 )
 from acl_gym.envs.control.rendering import Frame, Renderer
@@ -24,7 +28,7 @@ from acl_gym.utils import validation
 from acl_gym.utils.typing import FloatArray
 
 
-class ControlEnv(gym.Env[NDArray[Any], np.int64]):
+class ControlEnv(gym.Env[NDArray[Any], Any]):
     """The single environment over a control system.
 
     It has no time limit of its own: `gym.make(id)` adds the one registered with the id,
@@ -50,7 +54,8 @@ class ControlEnv(gym.Env[NDArray[Any], np.int64]):
         self.system = made_system(self.system_type, parameters)
         self.observation_space = self.system.observation_space
         self.action_space = self.system.action_space
-        self._n_actions = int(self.system.action_space.n)
+        self._input_bounds = real_input_bounds(self.system)
+        self._n_actions = n_actions_of(self.system)
         fps = self.metadata["render_fps"]
         self._renderer = Renderer(self.system, self.painter, fps)
         self._state: FloatArray | None = None
@@ -88,15 +93,19 @@ class ControlEnv(gym.Env[NDArray[Any], np.int64]):
             state = self.system.sample_states(self.np_random, 1)
         self._state = state
         self._finished = False
-        self._action: int | None = None
+        self._action: int | FloatArray | None = None
         if self.render_mode == "human":
             self.render()
         return self.system.observe(state)[0], self._info(state)
 
     def step(
-        self, action: np.int64 | int
+        self, action: Any
     ) -> tuple[NDArray[Any], float, bool, bool, dict[str, Any]]:
         """Apply an action for one sampling time.
+
+        Args:
+            action: its number; where the actions are a Box, the inputs `(n_inputs,)`,
+                set to its bounds where they are beyond.
 
         Returns:
             `(observation, reward, terminated, truncated, info)` with reward
@@ -113,12 +122,16 @@ class ControlEnv(gym.Env[NDArray[Any], np.int64]):
                 + ("has not begun" if self._state is None else "reached its goal")
                 + "; call reset() first."
             )
-        actions = checked_actions([action], 1, self._n_actions)
+        actions: NDArray[Any]
+        if self._input_bounds is not None:
+            actions = checked_inputs([action], 1, *self._input_bounds)
+        else:
+            actions = checked_actions([action], 1, self._n_actions)
         rewards, reached = np.empty(1), np.empty(1, dtype=np.bool_)
         uniforms = draw_uniforms(self.system, self, 1)
         self.system.advance(self._state, actions, uniforms, rewards, reached)
         self._finished = bool(reached[0])
-        self._action = int(actions[0])
+        self._action = drawn_action(actions[0])
         if self.render_mode == "human":
             self.render()
         observation = self.system.observe(self._state)[0]

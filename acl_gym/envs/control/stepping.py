@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
 
 from acl_gym.envs.control.system import ControlSystem, SlotError
 from acl_gym.utils.compiling import njit
 from acl_gym.utils.typing import BoolArray, FloatArray, IntArray
+
+Scratch = tuple[FloatArray, NDArray[Any], FloatArray, BoolArray]
 
 RESTORE_ABOVE = 0.75
 """Share of walking slots above which it is faster to step all and restore the rest."""
@@ -26,10 +32,12 @@ class PartialStep:
     def __init__(self, system: ControlSystem, num_envs: int) -> None:
         self._system = system
         self._states: FloatArray = np.empty(0)
-        self._actions: IntArray = np.empty(num_envs, dtype=np.int64)
+        self._actions: NDArray[Any] = np.empty(num_envs, dtype=np.int64)
+        if isinstance(system.action_space, spaces.Box):
+            self._actions = np.empty((num_envs, *system.action_space.shape))
         self._rewards: FloatArray = np.empty(num_envs)
         self._reached: BoolArray = np.empty(num_envs, dtype=np.bool_)
-        self._scratch: tuple[FloatArray, IntArray, FloatArray, BoolArray] | None = None
+        self._scratch: Scratch | None = None
         self._before: FloatArray = np.empty((0, 0))
 
     def __call__(
@@ -39,7 +47,7 @@ class PartialStep:
         idle: BoolArray,
         states: FloatArray,
         steps: IntArray,
-        actions: IntArray,
+        actions: NDArray[Any],
         uniforms: FloatArray | None,
         rewards: FloatArray,
         terminated: BoolArray,
@@ -110,9 +118,7 @@ class PartialStep:
         )
         return n_finished
 
-    def _scratch_for(
-        self, slots: IntArray, states: FloatArray
-    ) -> tuple[FloatArray, IntArray, FloatArray, BoolArray]:
+    def _scratch_for(self, slots: IntArray, states: FloatArray) -> Scratch:
         """Return scratch arrays: those of the last step if they have the right size."""
         size, m = len(states), slots.size
         scratch = self._scratch
@@ -129,9 +135,9 @@ class PartialStep:
 def gather_slots(
     slots: IntArray,
     states: FloatArray,
-    actions: IntArray,
+    actions: NDArray[Any],
     part: FloatArray,
-    part_actions: IntArray,
+    part_actions: NDArray[Any],
 ) -> None:
     """Copy the columns of `slots` side by side."""
     for j in range(slots.size):

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from acl_gym.envs.control.signals import Signals
 from acl_gym.utils import validation
 from acl_gym.utils.compiling import njit
-from acl_gym.utils.typing import BoolArray, FloatArray, IntArray
+from acl_gym.utils.typing import BoolArray, FloatArray
 
 BLOCK = 512
 """Slots that a kernel advances at a time, so that their data stays in the nearest cache."""
@@ -69,8 +69,11 @@ class ControlSystem(ABC):
 
     @property
     @abstractmethod
-    def action_space(self) -> spaces.Discrete:
-        """The space of one action."""
+    def action_space(self) -> spaces.Discrete | spaces.Box:
+        """The space of one action: numbered actions, or real inputs within bounds.
+
+        A Box has one axis, an entry for each input.
+        """
 
     @property
     def signals(self) -> Signals | None:
@@ -137,7 +140,7 @@ class ControlSystem(ABC):
     def advance(
         self,
         states: FloatArray,
-        actions: IntArray,
+        actions: Any,
         uniforms: FloatArray | None,
         rewards: FloatArray,
         reached: BoolArray,
@@ -146,7 +149,8 @@ class ControlSystem(ABC):
 
         Args:
             states: shape `(state_size, n)`, replaced by the next states in place.
-            actions: shape `(n,)`, valid indices of actions.
+            actions: shape `(n,)`, valid indices of actions; where `action_space` is a
+                Box, the inputs, float64 `(n, n_inputs)` within its bounds.
             uniforms: shape `(draws_per_step, n)` from [0, 1), None if there are none.
             rewards: shape `(n,)`, receives -(stage cost).
             reached: shape `(n,)`, receives whether the next state is the goal.

@@ -24,6 +24,9 @@ class PendulumEnv(ControlEnv):
     | 1   | 0            |
     | 2   | 0.8          |
 
+    With `continuous=True` it is `Box(-0.8, 0.8, (1,), float64)`, the torque itself, and
+    what lies beyond is set to these bounds.
+
     ## Observation Space
     `Box` of shape `(2,)`, float64: the state itself.
 

@@ -21,9 +21,7 @@ _TORQUE = (213, 94, 0)
 class PendulumPainter(Painter[Pendulum]):
     """Draws the pole, the goal region behind it, and an arc for the torque."""
 
-    def draw(
-        self, pygame: Any, canvas: Any, state: FloatArray, action: int | None
-    ) -> None:
+    def draw(self, pygame: Any, canvas: Any, state: FloatArray, action: Any) -> None:
         """See `Painter.draw`."""
         size = canvas.get_width()
         pivot = np.array([0.5, 0.5]) * size
@@ -43,7 +41,12 @@ class PendulumPainter(Painter[Pendulum]):
         pygame.draw.polygon(canvas, _POLE, [tuple(c) for c in corners])
         pygame.draw.circle(canvas, _POLE, tuple(tip), 1.6 * width)
         pygame.draw.circle(canvas, _PIVOT, tuple(pivot), 0.8 * width)
-        torque = 0.0 if action is None else self.system.torques[action]
+        if action is None:
+            torque = 0.0
+        elif self.system.continuous:
+            torque = float(action[0])
+        else:
+            torque = self.system.torques[action]
         if torque:
             self._draw_torque(pygame, canvas, torque, size)
 

@@ -10,13 +10,14 @@ from typing import Any, ClassVar
 
 import numpy as np
 from gymnasium import spaces
+from numpy.typing import NDArray
 
 from acl_gym.envs.control import parameters, sampling
 from acl_gym.envs.control.families import BlockSystem
 from acl_gym.envs.control.signals import Signals
 from acl_gym.envs.pendulum import kernels
 from acl_gym.envs.pendulum.kernels import TWO_PI
-from acl_gym.utils import validation
+from acl_gym.utils import threads, validation
 from acl_gym.utils.typing import BoolArray, FloatArray
 
 
@@ -34,6 +35,8 @@ class Pendulum(BlockSystem):
         length: L, m, > 0.
         gravity: g, m / s^2, >= 0.
         torques: U, N m, the torque u of each action, one or more.
+        continuous: whether the torque is a real number, from the least to the largest
+            of `torques`, in place of an action for each of them.
         sampling_time: T_s, s, > 0; the torque is constant over it.
         substeps: Runge-Kutta steps in one sampling time, 1 to 10,000. Measured against
             DOP853 over the whole state space, one step of the default 0.1 s is off
@@ -57,6 +60,7 @@ class Pendulum(BlockSystem):
     length: float = 0.1
     gravity: float = 9.81
     torques: tuple[float, ...] = (-0.8, 0.0, 0.8)
+    continuous: bool = False
     sampling_time: float = 0.1
     substeps: int = 1
     omega_max: float = 9.0
@@ -77,10 +81,21 @@ class Pendulum(BlockSystem):
             "substeps", self.substeps, at_least=1, at_most=parameters.MOST_SUBSTEPS
         )
         torques = validation.real_array("torques", self.torques, ndim=1)
+        if not isinstance(self.continuous, bool):
+            raise TypeError(
+                "continuous must be True or False, got "
+                f"{validation.shown(self.continuous)}."
+            )
+        if self.continuous and torques.min() == torques.max():
+            raise ValueError(
+                "torques must hold two different ones, the ends of the range, where the "
+                f"torque is continuous, got {validation.shown(self.torques)}."
+            )
         bounds = self._checked_bounds()
         weight = _weight_matrix(self.state_weight)
         canonical: dict[str, Any] = {
             "torques": tuple(torques.tolist()),
+            "continuous": self.continuous,
             "goal_bounds": tuple(bounds.tolist()),
             "state_weight": tuple(map(tuple, weight.tolist())),
             "substeps": int(self.substeps),
@@ -122,13 +137,40 @@ class Pendulum(BlockSystem):
         )
 
     @property
-    def action_space(self) -> spaces.Discrete:
-        """One action for each torque."""
+    def action_space(self) -> spaces.Discrete | spaces.Box:
+        """One action for each torque, or all torques between the ends; float64."""
+        if self.continuous:
+            ends = np.array([[min(self.torques)], [max(self.torques)]])
+            return spaces.Box(*ends, dtype=np.float64)
         return spaces.Discrete(len(self.torques))
+
+    def advance(
+        self,
+        states: FloatArray,
+        actions: NDArray[Any],
+        uniforms: FloatArray | None,
+        rewards: FloatArray,
+        reached: BoolArray,
+    ) -> None:
+        """One sampling time; see `ControlSystem.advance`."""
+        dynamics, goal_and_cost = self._dynamics, self._goal_and_cost
+        if self.continuous:
+            # Kernels look up what each action does: here each slot has one of its own.
+            torques = np.ascontiguousarray(actions[:, 0])
+            actions = np.arange(torques.size)
+            *cost, _, bound_theta, bound_omega = goal_and_cost
+            dynamics = (self.motor_gain / self.inertia * torques, *dynamics[1:])
+            of_torques = self.torque_weight * torques**2
+            goal_and_cost = (*cost, of_torques, bound_theta, bound_omega)
+        move = self.block_kernels[threads.worth_it(actions.size)]
+        move(states, actions, dynamics, goal_and_cost, rewards, reached)
 
     @property
     def signals(self) -> Signals:
-        """Angle and angular velocity are observed, the torque is set."""
+        """Angle and angular velocity are observed, the torque is set.
+
+        Where it is continuous, `values` are those of `torques` all the same.
+        """
         return Signals(
             ("angle theta, rad, 0 hangs down", "angular velocity omega, rad/s"),
             ("torque u, N m",),

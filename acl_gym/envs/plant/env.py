@@ -123,7 +123,10 @@ def plant(
             the environment to other processes, define it at the top of a module.
         low: lower end of each state variable, `(state_size,)`.
         high: upper end of each; states are clipped to both after each step.
-        inputs: what each action sets, `(n_actions,)`, or `(n_actions, n_inputs)`.
+        inputs: what each action sets, `(n_actions,)`, or `(n_actions, n_inputs)`; or a
+            bounded `gymnasium.spaces.Box` of one axis: the actions are then real inputs,
+            `(n_inputs,)`, set to its bounds where they are beyond. `ActionGrid` gives
+            such an environment numbered actions again, for agents to learn on.
         sampling_time: s, > 0.
         goal: where an episode ends in success: a state, a pair of states (low, high), a
             function of x, `(state_size, n)`, that returns n booleans, or None: nowhere.

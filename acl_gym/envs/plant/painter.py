@@ -18,9 +18,7 @@ _INPUT = (213, 94, 0)
 class PlantPainter(Painter[Plant]):
     """Draws a bar for each variable with its goal and value; below, the inputs."""
 
-    def draw(
-        self, pygame: Any, canvas: Any, state: FloatArray, action: int | None
-    ) -> None:
+    def draw(self, pygame: Any, canvas: Any, state: FloatArray, action: Any) -> None:
         """See `Painter.draw`."""
         canvas.fill(_PAPER)
         system = self.system
@@ -49,7 +47,10 @@ class PlantPainter(Painter[Plant]):
             else:
                 column = inputs[:, i - state.size]
                 low, high = min(column.min(), 0.0), max(column.max(), 0.0)
-                value = 0.0 if action is None else column[action]
+                value = 0.0
+                if action is not None:
+                    real = system.real_inputs
+                    value = action[i - state.size] if real else column[action]
                 colour = _INPUT
             x = left + width * _share(value, low, high)
             mark = (x - 0.008 * size, top - 0.1 * height, 0.016 * size, 0.6 * height)

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 from gymnasium import spaces
+from numpy.typing import NDArray
 
 from acl_gym.envs.control import sampling
 from acl_gym.envs.control.parameters import MOST_SUBSTEPS
@@ -18,10 +19,14 @@ from acl_gym.envs.plant.dynamics import Equations, sample_count
 from acl_gym.envs.plant.models import Model, is_model
 from acl_gym.envs.plant.uncertain import PlantParameters
 from acl_gym.utils import validation
-from acl_gym.utils.typing import BoolArray, FloatArray, IntArray
+from acl_gym.utils.boxes import input_bounds
+from acl_gym.utils.typing import BoolArray, FloatArray
 
 _NOTHING = np.empty((0, 0))
 _EVALUATED = 100  # states, as many as the pendulum has
+
+_MOST_CORNERS = 8
+"""Real inputs of whose range all corners are tried; of more the two ends."""
 
 
 class Plant(ControlSystem):
@@ -37,7 +42,9 @@ class Plant(ControlSystem):
     Attributes:
         low: lower ends of the variables, `(state_size,)`.
         high: upper ends.
-        inputs: of each action, `(n_actions, n_inputs)`.
+        inputs: of each action, `(n_actions, n_inputs)`; where they are real, some from
+            their range, the ends among them.
+        real_inputs: their range, where they are real; None where actions are numbered.
         parameters: what the dynamics is given by name, and what is uncertain of it.
     """
 
@@ -70,6 +77,7 @@ class Plant(ControlSystem):
         self.low, self.high = _bounds(low, high)
         self.parameters = PlantParameters(parameters, uncertain)
         self.fully_observed = self.parameters.count == 0
+        self.real_inputs = inputs if isinstance(inputs, spaces.Box) else None
         self.inputs = _inputs(inputs)
         self.sampling_time = validation.number("sampling_time", sampling_time, above=0)
         self.substeps = validation.integer(
@@ -119,8 +127,10 @@ class Plant(ControlSystem):
         return spaces.Box(self.low, self.high, dtype=np.float64)
 
     @property
-    def action_space(self) -> spaces.Discrete:
-        """One action for each row of `inputs`."""
+    def action_space(self) -> spaces.Discrete | spaces.Box:
+        """One action for each row of `inputs`, or the range of real inputs."""
+        if self.real_inputs is not None:
+            return self.real_inputs
         return spaces.Discrete(len(self.inputs))
 
     @property
@@ -258,7 +268,7 @@ class Plant(ControlSystem):
     def advance(
         self,
         states: FloatArray,
-        actions: IntArray,
+        actions: NDArray[Any],
         uniforms: FloatArray | None,
         rewards: FloatArray,
         reached: BoolArray,
@@ -269,24 +279,30 @@ class Plant(ControlSystem):
             SlotError: a next state or a cost is not finite.
         """
         step = self.sampling_time / self.substeps
-        own = _NOTHING
+        inputs: FloatArray = self.inputs
+        given: FloatArray | None = None
+        if self.real_inputs is not None:
+            # Kernels look up what each action does: here each slot has one of its own.
+            inputs = given = actions
+            actions = np.arange(len(inputs))
+        drawn = _NOTHING
         if not self.fully_observed:
             size = self.low.size
-            states, own = states[:size], states[size:]
+            states, drawn = states[:size], states[size:]
         bad = self._equations.advance(
-            states, actions, self.inputs, step, self.substeps, own
+            states, actions, inputs, step, self.substeps, drawn
         )
         if bad >= 0:
             raise SlotError(
                 "the dynamics gave no finite next state in slot <slot>, from the state "
                 f"{states[:, bad].tolist()} with the input "
-                f"{self.inputs[actions[bad]].tolist()}{self._shown_parameters(own, bad)}"
+                f"{inputs[actions[bad]].tolist()}{self._shown_parameters(drawn, bad)}"
                 "; use more substeps or a shorter "
                 "sampling_time, or narrow low and high.",
                 bad,
             )
         kernels.settle(states, self.low, self.high, self._period)
-        self._cost.judge(states, actions, self._goal, rewards, reached)
+        self._cost.judge(states, actions, self._goal, rewards, reached, given)
 
     def evaluation_states(self) -> FloatArray:
         """The states given, or 100 initial ones drawn once, `(n, state_size)`."""
@@ -362,6 +378,12 @@ def _bounds(low: Any, high: Any) -> tuple[FloatArray, FloatArray]:
 
 
 def _inputs(values: Any) -> FloatArray:
+    """The inputs of each action; of real ones their middle and the corners."""
+    if isinstance(values, spaces.Box):
+        ends = np.stack(input_bounds("inputs", values))
+        few = ends.shape[1] <= _MOST_CORNERS
+        corners = np.array(list(itertools.product(*ends.T))) if few else ends
+        return np.concatenate([ends.mean(axis=0)[None], corners])
     array = validation.real_array("inputs", values)
     if array.ndim == 1:
         array = array[:, None]

@@ -163,6 +163,7 @@ class Cost:
         self._goal, self._inputs = goal, inputs
         self._weight = np.empty((0, 0))
         self._action_costs = np.zeros(len(inputs))
+        self._on_inputs = np.zeros((inputs.shape[1], inputs.shape[1]))
         if self._function is not None:
             return
         if isinstance(cost, str):
@@ -175,13 +176,17 @@ class Cost:
                     "or a pair of bounds then; give a function cost(x, u) instead."
                 )
             self._weight = _matrix("Q", cost[0], goal.centre.size)
-            on_inputs = _matrix("R", cost[1], inputs.shape[1])
-            self._action_costs = np.einsum("ai,ij,aj->a", inputs, on_inputs, inputs)
+            self._on_inputs = _matrix("R", cost[1], inputs.shape[1])
+            self._action_costs = self._costs_of(inputs)
         else:
             raise ValueError(
                 'cost must be "time", a pair (Q, R) of weights on error and input, or a '
                 f"function of x and u, got {validation.shown(cost)}."
             )
+
+    def _costs_of(self, inputs: FloatArray) -> FloatArray:
+        """u' R u of each row of inputs."""
+        return np.asarray(np.einsum("ai,ij,aj->a", inputs, self._on_inputs, inputs))
 
     def judge(
         self,
@@ -190,20 +195,36 @@ class Cost:
         goal: Goal,
         rewards: FloatArray,
         reached: BoolArray,
+        inputs: FloatArray | None = None,
     ) -> None:
         """Write reward and goal test of the next states.
+
+        Args:
+            states: `(state_size, n)`.
+            actions: rows of the inputs, `(n,)`.
+            goal: where an episode ends.
+            rewards: receives -(cost), `(n,)`.
+            reached: receives whether each state lies in the goal, `(n,)`.
+            inputs: `(n_actions, n_inputs)`; None takes those that it was made with.
 
         Raises:
             SlotError: a cost is not finite.
             ValueError: a function of goal or cost writes to what it is given, or does
                 not give a number for each state.
         """
+        action_costs = self._action_costs
+        if inputs is None:
+            inputs = self._inputs
+        elif self._on_inputs.any():
+            action_costs = self._costs_of(inputs)
+        else:
+            action_costs = np.full(len(inputs), action_costs[0])
         kernels.judge(
             states,
             actions,
             *goal.arguments(),
             self._weight,
-            self._action_costs,
+            action_costs,
             rewards,
             reached,
         )
@@ -211,7 +232,7 @@ class Cost:
             reached[:] = goal.function(states)
         if self._function is not None:
             # First as floats: unsigned integers have no negatives.
-            rewards[:] = self._function(states, self._inputs.T[:, actions])
+            rewards[:] = self._function(states, inputs.T[:, actions])
             np.negative(rewards, out=rewards)
         finite = np.isfinite(rewards)
         if not finite.all():
@@ -219,7 +240,7 @@ class Cost:
             raise SlotError(
                 f"the cost must be finite, got {-rewards[slot]} in slot <slot>, for the "
                 f"state {states[:, slot].tolist()} with the input "
-                f"{self._inputs[actions[slot]].tolist()}.",
+                f"{inputs[actions[slot]].tolist()}.",
                 slot,
             )
 

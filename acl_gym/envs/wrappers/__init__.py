@@ -5,6 +5,7 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from acl_gym.envs.wrappers.action_grid import ActionGrid
 from acl_gym.envs.wrappers.scaling import (
     ScaledObservation,
     ScaledVectorObservation,
@@ -33,6 +34,7 @@ _LAZY = {
 
 __all__ = [
     "PID",
+    "ActionGrid",
     "ChangingVectorEnv",
     "Drift",
     "InnerLoop",

@@ -138,6 +138,7 @@ def test_defaults_are_those_of_the_thesis() -> None:
         "length": 0.1,
         "gravity": 9.81,
         "torques": (-0.8, 0.0, 0.8),
+        "continuous": False,
         "sampling_time": 0.1,
         "substeps": 1,
         "omega_max": 9.0,

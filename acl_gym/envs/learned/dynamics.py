@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any, Self
 
 import numpy as np
+from scipy.spatial import KDTree
 
 from acl_gym.envs.learned.description import Description
 from acl_gym.envs.learned.features import Features, periods_of, variable_ends
@@ -68,6 +69,7 @@ class LearnedDynamics:
             np.ascontiguousarray(before.T), np.ascontiguousarray(inputs.T)
         )
         targets = self.features.targets(before, after)
+        self._recorded = KDTree(rows)
         usable = ~_held_at_ends(self.description, after)
         self._inputs: FloatArray | None = None
         groups = [np.ones(len(rows), np.bool_)]
@@ -183,6 +185,19 @@ class LearnedDynamics:
         rows = self.features.rows(variables, inputs)
         found = self._of_fits(rows, inputs, lambda fit, mine: fit.deviation(rows[mine]))
         return np.asarray(found.max(axis=1))
+
+    def distance(self, variables: FloatArray, inputs: FloatArray) -> FloatArray:
+        """How far the nearest recorded step is, `(n,)`.
+
+        In features of unit size: 0 is a recorded step, and 1 is as far away as a
+        deviation of one of them. Unlike `spread` it believes in no smoothness.
+
+        Args:
+            variables: `(n_variables, n)`.
+            inputs: `(n_inputs, n)`.
+        """
+        found, _ = self._recorded.query(self.features.rows(variables, inputs))
+        return np.asarray(found)
 
     def _of_fits(self, rows: FloatArray, inputs: FloatArray, of: Any) -> FloatArray:
         """What `of` a fit and a mask or slice of its rows gives, for all rows."""

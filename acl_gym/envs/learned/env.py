@@ -188,19 +188,33 @@ class LearnedVectorEnv(ControlVectorEnv):
             states: `(n, n_variables)`, an angle as one variable.
             actions: `(n,)`, or one for all.
         """
-        rows = self.system.checked_states(states)
+        return self.dynamics.spread(*self._pairs(states, actions))
+
+    def distance(self, states: Any, actions: Any) -> FloatArray:
+        """How far the nearest recorded step is, `(n,)`; see `LearnedDynamics.distance`.
+
+        Args:
+            states: `(n, n_variables)`, an angle as one variable.
+            actions: `(n,)`, or one for all.
+        """
+        return self.dynamics.distance(*self._pairs(states, actions))
+
+    def _pairs(self, states: Any, actions: Any) -> tuple[FloatArray, FloatArray]:
+        """States and inputs, variables first."""
+        rows = self.system.checked_states(states)[:, : self.system.low.size]
         numbers = validation.as_array(actions)
         if numbers is None or numbers.dtype.kind not in "iu":
             raise TypeError(
                 f"actions must be integers, got {validation.shown(actions)}."
             )
+        inputs = self.system.inputs
         chosen: IntArray = np.broadcast_to(numbers, len(rows)).astype(np.int64)
-        if ((chosen < 0) | (chosen >= len(self.system.inputs))).any():
+        if ((chosen < 0) | (chosen >= len(inputs))).any():
             raise ValueError(
-                f"actions must be 0 to {len(self.system.inputs) - 1}, got "
+                f"actions must be 0 to {len(inputs) - 1}, got "
                 f"{validation.shown(actions)}."
             )
-        return self.system.spread(rows, chosen)
+        return np.ascontiguousarray(rows.T), np.ascontiguousarray(inputs[chosen].T)
 
     def _made_anew(self, num_envs: int, parameters: dict[str, Any]) -> Self:
         """Nothing is learned again."""

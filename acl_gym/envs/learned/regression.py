@@ -150,6 +150,8 @@ class Output:
 
     Attributes:
         line: weight of each feature, and last what is added, `(n_features + 1,)`.
+        unsure: what is not known of these weights, the inverse of the normal matrix,
+            `(n_features + 1, n_features + 1)`.
         scale: deviation of what the line leaves.
         targets: what it leaves, divided by that.
     """
@@ -158,7 +160,7 @@ class Output:
         self.rows, self.folds = rows, folds
         self.every = np.ones(len(rows), np.bool_)
         self._deviation = float(targets.std()) or 1.0
-        self.line, left = _line(rows, targets)
+        self.line, left, self.unsure = _line(rows, targets)
         self.scale = max(float(left.std()), 1e-6)
         self.targets = left / self.scale
 
@@ -254,6 +256,7 @@ class Fit:
             kinds = _candidates(kind, count)
         self._lines = np.array([each.line for each in outputs])
         self._scale = np.array([each.scale for each in outputs])
+        self._unsure = np.array([each.unsure for each in outputs])
         self._certainty: Certainty = certainty_of(
             [each.rows for each in outputs], self.scales
         )
@@ -277,21 +280,29 @@ class Fit:
         return self._with_lines(rows, self.regression.of_members(rows, members))
 
     def deviation(self, rows: FloatArray) -> FloatArray:
-        """What is not known of each output, `(n, n_outputs)`."""
-        return np.asarray(self._certainty.deviation(rows) * self._scale)
+        """What is not known of each output, `(n, n_outputs)`: of the line and of the rest.
+
+        What the line leaves counts as its noise. So where it leaves much, or has seen
+        little, a point far from the data is not certain.
+        """
+        found = self._certainty.deviation(rows)
+        _add_leverage(rows, self._unsure, self._scale, found)
+        return found
 
     def _with_lines(self, rows: FloatArray, left: FloatArray) -> FloatArray:
         _add_lines(rows, self._lines, self._scale, left)
         return left
 
 
-def _line(rows: FloatArray, targets: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Weights of a linear fit, and what it leaves of the targets."""
+def _line(
+    rows: FloatArray, targets: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Weights of a linear fit, what it leaves of the targets, and what is not known."""
     wide = np.concatenate([rows, np.ones((len(rows), 1))], axis=1)
     # Features that say the same twice share their weight.
     normal = wide.T @ wide + LINEAR_RIDGE * np.eye(wide.shape[1])
     line = np.linalg.solve(normal, wide.T @ targets)
-    return line, targets - wide @ line
+    return line, targets - wide @ line, np.linalg.inv(normal)
 
 
 @njit(error_model="numpy")
@@ -306,6 +317,26 @@ def _add_lines(
             for f in range(last):
                 total += lines[o, f] * rows[i, f]
             left[i, o] = total
+
+
+@njit(error_model="numpy")
+def _add_leverage(
+    rows: FloatArray, unsure: FloatArray, scale: FloatArray, found: FloatArray
+) -> None:
+    """scale * sqrt(found^2 + z' unsure z) for z = (row, 1), in place."""
+    last = rows.shape[1]
+    wide = np.ones(last + 1)
+    for i in range(len(rows)):
+        wide[:last] = rows[i]
+        for o in range(len(unsure)):
+            leverage = 0.0
+            for a in range(last + 1):
+                part = 0.0
+                for b in range(last + 1):
+                    part += unsure[o, a, b] * wide[b]
+                leverage += part * wide[a]
+            total = found[i, o] * found[i, o] + max(leverage, 0.0)
+            found[i, o] = scale[o] * np.sqrt(total)
 
 
 def folds_of(count: int) -> IntArray:

@@ -132,16 +132,6 @@ class LearnedSystem(Plant):
         """Return the states that belong to observations, `(n, n_variables)`."""
         return np.asarray(self._angles.variables(np.asarray(observations)))
 
-    def spread(self, states: FloatArray, actions: IntArray) -> FloatArray:
-        """How uncertain a step is; see `LearnedDynamics.spread`.
-
-        Args:
-            states: `(n, n_variables)`.
-            actions: `(n,)`.
-        """
-        x = np.ascontiguousarray(np.asarray(states, np.float64).T)[: self.low.size]
-        return self.dynamics.spread(x, self.inputs.T[:, actions])
-
     def advance(
         self,
         states: FloatArray,

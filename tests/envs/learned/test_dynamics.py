@@ -148,6 +148,35 @@ def test_what_is_not_known_is_shown() -> None:
     assert 2 * errors[sure & free, 1].mean() < errors[~sure & free, 1].mean()
 
 
+def test_the_nearest_recorded_step_is_told() -> None:
+    data = pendulum()
+    dynamics = LearnedDynamics(data)
+    x, u = np.ascontiguousarray(data.states.T), np.ascontiguousarray(data.inputs.T)
+    np.testing.assert_allclose(dynamics.distance(x, u), 0.0, atol=1e-12)
+    rows = dynamics.features.rows(x, u)
+    away = x + np.array([[0.3], [0.5]])
+    found = dynamics.distance(away, u)
+    for i, row in enumerate(dynamics.features.rows(away, u)):
+        assert found[i] == pytest.approx(np.sqrt(((rows - row) ** 2).sum(axis=1)).min())
+
+
+def test_the_deviation_counts_what_the_line_does_not_know() -> None:
+    """From the equation, where nothing but a line was seen from close by."""
+    rng = np.random.default_rng(0)
+    rows = rng.normal(0.0, 0.1, (20, 2))
+    targets = (rows @ [1.0, -2.0] + 0.01 * rng.standard_normal(20))[:, None]
+    fit = Fit(rows, targets, "gaussian process")
+    wide = np.column_stack([rows, np.ones(20)])
+    normal = wide.T @ wide + 1e-3 * np.eye(3)
+    left = targets[:, 0] - wide @ np.linalg.solve(normal, wide.T @ targets[:, 0])
+    at = np.array([3.0, -1.0, 1.0])
+    expected = left.std() * np.sqrt(at @ np.linalg.inv(normal) @ at)
+    found = fit.deviation(at[None, :2])[0, 0]
+    # And what the process does not know, at most its own deviation.
+    most = np.hypot(expected, left.std() * np.sqrt(fit.scales[0].amplitude))
+    assert 0.99 * expected <= found <= 1.01 * most
+
+
 def test_other_functions_differ_where_little_is_known() -> None:
     dynamics = LearnedDynamics(pendulum(), n_draws=20)
     assert dynamics.n_members == 21

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 import os
 import threading
 import time
@@ -32,6 +33,8 @@ from acl_gym.utils import validation
 from acl_gym.utils.boxes import declared_bounds
 from acl_gym.utils.files import write_atomically
 from acl_gym.utils.typing import FloatArray, Row
+
+logger = logging.getLogger("acl_gym")
 
 FIRST_ROUNDS = (20, 40, 60, 90, 120, 160, 200)
 """Interactions after which the colony learns, if nothing else is said."""
@@ -280,6 +283,12 @@ class LearningRun:
         }
         if steps:
             self._history.append(row)
+            logger.info(
+                "%d interactions: %r; the best policy costs %.4g in the model.",
+                self._interactions,
+                model.dynamics,
+                row["model_cost"],
+            )
         return row
 
     def _fitted(

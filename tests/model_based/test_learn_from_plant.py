@@ -148,6 +148,14 @@ def test_the_share_of_random_actions_is_as_asked() -> None:
         assert others == pytest.approx(explore * 2 / 3, abs=4 * np.sqrt(0.25 * 3 / 400))
 
 
+def test_each_round_is_logged(caplog: pytest.LogCaptureFixture) -> None:
+    with caplog.at_level("INFO", logger="acl_gym"):
+        learn_from_plant(pendulum(), interactions=20, rounds=2, seed=0, **QUICK)
+    said = [r.getMessage() for r in caplog.records if "interactions:" in r.getMessage()]
+    assert len(said) == 2
+    assert said[1].startswith("20 interactions: LearnedDynamics(gaussian process")
+
+
 def test_a_callback_ends_learning() -> None:
     seen = []
 

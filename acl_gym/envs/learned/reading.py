@@ -23,8 +23,8 @@ def arrays_of_files(
     path: Any,
     kind: str,
     *,
-    state: Any,
-    input: Any,
+    state: Any = None,
+    input: Any = None,
     next_state: Any = None,
     **columns: Any,
 ) -> dict[str, Any]:
@@ -76,8 +76,8 @@ def arrays_of_files(
 def arrays_of_frames(
     frames: Sequence[Any],
     *,
-    state: Any,
-    input: Any,
+    state: Any = None,
+    input: Any = None,
     next_state: Any = None,
     time: str | None = None,
     run: str | None = None,

@@ -100,6 +100,7 @@ def test_rows_may_be_steps_already() -> None:
         (lambda f: f[:1], {}, "two rows or more that follow each other"),
         (lambda f: f[:0], {}, "two rows or more|array of real numbers"),
         (lambda f: f, {"state": []}, "state must be names of columns"),
+        (lambda f: f, {"input": None}, "input must be names of columns"),
         (lambda f: f, {"state": ["u", "u"]}, "each column once"),
         (lambda f: f, {"next_state": ["u"]}, "next_state must name a column for each"),
         (lambda f: f, {"terminated": "u"}, "terminated needs next_state or run"),

@@ -14,9 +14,9 @@ from acl_gym.evaluation import evaluate_policy_cost
 from acl_gym.utils import validation
 from acl_gym.utils.typing import FloatArray, Predictor
 
-LEAST_CHUNK = 4_000
-"""Steps of all ants in the model between two evaluations of the policy; more where the
-table has more pairs."""
+LEAST_CHUNK, MOST_CHUNK = 4_000, 20_000
+"""Steps of all ants in the model between two evaluations of the policy: as many as the
+table has pairs, within these ends."""
 
 CHUNKS = 5
 """Evaluations in a round, unless the number of steps is given."""
@@ -120,9 +120,9 @@ class Improving:
         self._model = model
 
     def _chunk(self) -> int:
-        """Enough steps to come to each pair once, on the average."""
+        """Enough steps to come to each pair once, on the average, if there are few."""
         pairs = getattr(self.agent, "table", np.empty(0)).size
-        return max(LEAST_CHUNK, int(pairs))
+        return min(max(LEAST_CHUNK, int(pairs)), MOST_CHUNK)
 
     def _made(self, model: LearnedVectorEnv) -> Any:
         made = self._make(model)  # type: ignore[misc]

@@ -80,8 +80,8 @@ def learn_from_plant(
         model: further arguments of `LearnedVectorEnv`, such as `regressor`, `pessimism`
             or `uncertain`.
         model_steps: the most steps of all ants in the model in a round, >= 1. None takes
-            20,000, or five for each pair of a cell and an action if that is more. A round
-            ends earlier if the policy no longer becomes better.
+            five for each pair of a cell and an action, but 20,000 at least and 100,000 at
+            most. A round ends earlier if the policy no longer becomes better.
         data: what was recorded of this plant before.
         folder: where every interaction is written down as soon as it was made, and the
             agent after each round. A call with the same arguments goes on with a run

@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
-from few_plants import NAVIGATION, PENDULUM, PlantTask  # isort: skip  # beside this one
+from few_plants import Measured, NAVIGATION, PENDULUM, PlantTask  # isort: skip  # beside this one
 
 from acl_gym import ACL, QLearning, ReturningACL, learn_from_plant
 from acl_gym.agents.suitable import suitable_deposit
@@ -65,10 +65,14 @@ class Record:
             made: the interactions that it was learned from. They may be a few more than
                 the mark, where a method stops only at the end of a trial.
         """
+        self.judge_by(lambda: self._task.measure(policy), made)
+
+    def judge_by(self, measure: Callable[[], Measured], made: int) -> None:
+        """The same with a measure of the method's own, called once or not at all."""
         self._seconds += time.process_time() - self._began
         found = None
         while self._left and self._left[0] <= made:
-            found = found or self._task.measure(policy)
+            found = found or measure()
             self.rows.append(
                 {
                     "method": self._method,

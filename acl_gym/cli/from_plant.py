@@ -139,9 +139,11 @@ def run(
     found = []
     for each, file in zip(agents, (target, best_file), strict=True):
         cost, metadata = _evaluated(each, environment, steps)
+        measures = policy_measures(cost, numbered)
         each.metadata = metadata
+        each.history[-1] |= measures  # --resume knows the best policy by them
         each.save(file)
-        found.append({"file": str(file), **policy_measures(cost, numbered)})
+        found.append({"file": str(file), **measures})
     facts: dict[str, Any] = {
         **agents[0].metadata,
         "agent": kind,

@@ -12,7 +12,7 @@ Methods:
   without a model, with the settings that were tuned for the environment where there are
   such. They need far more interactions; give them some: --interactions 2000 20000.
 - `pets`: PETS of mbrl-lib, which plans anew in each step with an ensemble of networks; it
-  needs a Python environment of its own, see benchmarks/pets-requirements.txt.
+  needs a Python environment of its own, which `make peers-pets` makes, and minutes a run.
 
 Two of the conditions change what can be done with a plant. With `--starts anywhere` a
 reset puts it into a random state, and learn_from_plant resets the pendulum every 10 steps.

@@ -241,7 +241,13 @@ def run(method: str, task: PlantTask, seed: int, marks: Sequence[int]) -> list[R
 
 
 def _run_pets(record: Record, task: PlantTask, seed: int, marks: Sequence[int]) -> None:
-    from few_pets import run_pets
+    try:
+        from few_pets import run_pets  # which needs mbrl-lib
+    except ImportError as error:
+        raise ValueError(
+            f"pets needs mbrl-lib, which cannot be imported ({error}); make peers-pets "
+            "makes an environment for it."
+        ) from error
 
     run_pets(record, task, seed, marks)
 

@@ -32,7 +32,7 @@ examples:
 A row of the JSON is the policy of one run after `interactions` steps of the plant:
 `method`, `seed`, `interactions`, `seconds` (of the processor, without evaluation),
 `policy_cost`, `success_rate`, and `made`: a method that stops only at the end of a trial
-may have made some more. The table has the median, the range, and in how many runs the
+may have made more than it was given, and is judged in its favour. The table has the median, the range, and in how many runs the
 policy is within 25% and 10% of the best one known. `--out FILE` writes the rows after each
 run, so that nothing is lost with the process; `--read` shows rows of earlier runs.
 """
@@ -58,6 +58,18 @@ from acl_gym.utils.text import replace_unprintable_letters
 
 NEAR = (0.25, 0.10)
 """How much more than the best policy one may cost to be near it."""
+
+LOOKS: dict[str, dict[str, Any]] = {
+    "model": {"color": "#D55E00", "marker": "o", "markersize": 3},
+    "model-acl": {"color": "black", "marker": "^", "markersize": 3},
+    "model-q": {"color": "#009E73", "marker": "s", "markersize": 3},
+    "returning": {"color": "#D55E00", "linestyle": "--"},
+    "q-learning": {"color": "#009E73", "linestyle": "--"},
+    "q-replay": {"color": "#CC79A7", "linestyle": "--"},
+    "dqn": {"color": "#0072B2", "linestyle": "--"},
+    "pets": {"color": "#56B4E9", "linestyle": "-."},
+}
+"""Of the methods in a figure; those without a model are dashed."""
 
 DEFAULTS = [name for name in METHODS if name != "pets"]
 
@@ -107,6 +119,9 @@ def summary(rows: Sequence[Row], best: float | None) -> list[dict[str, Any]]:
                 {
                     "method": method,
                     "interactions": mark,
+                    "made": statistics.median(
+                        row.get("made", row["interactions"]) for row in some
+                    ),
                     "runs": len(some),
                     "median": statistics.median(costs),
                     "lowest": min(costs),
@@ -127,7 +142,7 @@ def summary(rows: Sequence[Row], best: float | None) -> list[dict[str, Any]]:
 def table(rows: Sequence[Row], best: float | None) -> str:
     """A line for each method and number of interactions, in Markdown."""
     near = [] if best is None else [f"within {more:.0%}" for more in NEAR]
-    heads = ["method", "interactions", "runs", "cost, median", "range", *near]
+    heads = ["method", "interactions", "made", "runs", "cost, median", "range", *near]
     heads += ["success", "seconds"]
     lines = [
         f"| {' | '.join(heads)} |",
@@ -138,6 +153,7 @@ def table(rows: Sequence[Row], best: float | None) -> str:
         cells = [
             each["method"],
             f"{each['interactions']:,}",
+            f"{each['made']:,.0f}",
             f"{each['runs']}",
             f"{each['median']:.1f}",
             f"{each['lowest']:.1f} to {each['highest']:.1f}",
@@ -150,44 +166,45 @@ def table(rows: Sequence[Row], best: float | None) -> str:
 
 
 def figure(rows: Sequence[Row], best: float | None, path: Path) -> None:
-    """Cost over interactions: median of each method, and the range of its runs."""
-    import matplotlib
-
-    matplotlib.use("agg")
-    import matplotlib.pyplot as plt
+    """Cost over interactions made: median of each method, and the range of its runs."""
     from matplotlib.ticker import FuncFormatter
 
-    fig, ax = plt.subplots(figsize=(7.2, 4.2), layout="constrained")
+    from acl_gym.plotting import style
+
     entries = summary(rows, best)
-    for number, method in enumerate(dict.fromkeys(each["method"] for each in entries)):
-        mine = [each for each in entries if each["method"] == method]
-        at = [each["interactions"] for each in mine]
-        colour = f"C{number}"
-        ax.fill_between(
-            at,
-            [each["lowest"] for each in mine],
-            [each["highest"] for each in mine],
-            color=colour,
-            alpha=0.15,
-            linewidth=0,
-        )
-        label = f"{method} ({max(each['runs'] for each in mine)} runs)"
-        ax.plot(at, [each["median"] for each in mine], ".-", color=colour, label=label)
-    ax.set_xscale("log")
-    if all(each["lowest"] > 0 for each in entries):
-        ax.set_yscale("log")
-        ax.yaxis.set_major_formatter(FuncFormatter(lambda y, _: f"{y:g}"))
-        ax.yaxis.set_minor_formatter(FuncFormatter(lambda y, _: ""))
-    ax.xaxis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:,.0f}"))
-    if best is not None:
-        for more in (0.0, *NEAR):
-            style = "-" if more == 0.0 else ":"
-            ax.axhline((1 + more) * best, color="black", linestyle=style, linewidth=0.8)
-        ax.set_yticks([best, 1.25 * best, 2 * best, 5 * best, 10 * best])
-    ax.set(xlabel="interactions with the plant", ylabel="cost of the policy")
-    ax.legend(frameon=False, fontsize="small")
-    fig.savefig(path, dpi=150)
-    plt.close(fig)
+    with style.in_style():
+        drawing = style.new_figure(3.6)
+        ax = drawing.add_subplot()
+        for method in dict.fromkeys(each["method"] for each in entries):
+            # Of numbers that are passed in one trial the last.
+            mine = list(
+                {
+                    each["made"]: each for each in entries if each["method"] == method
+                }.values()
+            )
+            made = [each["made"] for each in mine]
+            look = LOOKS[method]
+            ends = [[each[end] for each in mine] for end in ("lowest", "highest")]
+            ax.fill_between(made, *ends, color=look["color"], alpha=0.15, linewidth=0)
+            runs = max(each["runs"] for each in mine)
+            ax.plot(
+                made,
+                [each["median"] for each in mine],
+                label=f"{method}, {runs} {'run' if runs == 1 else 'runs'}",
+                **look,
+            )
+        ax.set_xscale("log")
+        ax.xaxis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:,.0f}"))
+        if all(each["lowest"] > 0 for each in entries):
+            ax.set_yscale("log")
+            style.plain_log(ax.yaxis)
+        if best is not None:
+            ax.axhline(best, **style.BOUND)
+            for more in NEAR:
+                ax.axhline((1 + more) * best, **{**style.BOUND, "linestyle": ":"})
+        ax.set(xlabel="interactions with the plant", ylabel="cost of the policy")
+        ax.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
+        drawing.savefig(path, dpi=150)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -231,7 +248,7 @@ def _read(paths: Sequence[Path]) -> list[Row]:
             rows += [
                 {
                     **row,
-                    "method": str(row["method"]),
+                    "method": _method(row["method"]),
                     "interactions": int(row["interactions"]),
                     "policy_cost": float(row["policy_cost"]),
                     "seconds": float(row["seconds"]),
@@ -247,6 +264,12 @@ def _read(paths: Sequence[Path]) -> list[Row]:
     if not rows:
         raise ValueError("--read must name files with rows, got none.")
     return rows
+
+
+def _method(name: Any) -> str:
+    if name not in METHODS:
+        raise ValueError(f"there is no method {name!r}")
+    return str(name)
 
 
 def _parser() -> argparse.ArgumentParser:

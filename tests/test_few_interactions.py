@@ -69,6 +69,7 @@ def test_rows(
     assert bench.main(["--read", str(kept), "--figure", str(tmp_path / "f.png")]) == 0
     printed = capsys.readouterr().out.splitlines()
     assert len(printed) == 2 + 8
+    assert set(bench.LOOKS) == set(bench.METHODS)
     assert "within 25% | within 10%" in printed[0]
     assert (tmp_path / "f.png").stat().st_size > 10_000
 
@@ -151,6 +152,7 @@ def test_the_summary_counts_who_is_near(bench: SimpleNamespace) -> None:
         for seed, cost in enumerate([100.0, 110.0, 111.0, 125.0, 126.0])
     ]
     (entry,) = bench.summary(rows, 100.0)
+    assert entry["made"] == 100
     assert entry["near"] == [4, 2]
     assert entry["median"] == 111.0
     assert (entry["lowest"], entry["highest"]) == (100.0, 126.0)

@@ -3,7 +3,7 @@
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help install compare bench bench-peers peers-mushroom test lint format build check-wheel clean distclean
+.PHONY: help install compare bench bench-peers peers-mushroom peers-pets test lint format build check-wheel clean distclean
 
 VENV := .venv
 BIN := $(VENV)/bin
@@ -13,6 +13,8 @@ PEERS_VENV := .venv-peers
 PEERS_STAMP := $(PEERS_VENV)/.installed
 MUSHROOM_VENV := .venv-mushroom
 MUSHROOM_STAMP := $(MUSHROOM_VENV)/.installed
+PETS_VENV := .venv-pets
+PETS_STAMP := $(PETS_VENV)/.installed
 
 # The first interpreter that works, is recent enough and can make an environment.
 PYTHON ?= $(shell for python in python3.11 python3; do \
@@ -77,6 +79,19 @@ $(MUSHROOM_STAMP): requirements.lock benchmarks/mushroom-requirements.txt
 	@$(MUSHROOM_VENV)/bin/python $(PIP_INSTALL) --no-deps \
 		-r benchmarks/mushroom-requirements.txt
 	@$(MUSHROOM_VENV)/bin/python $(PIP_INSTALL) --no-deps --no-build-isolation -e .
+	@touch $@
+
+peers-pets: $(STAMP) $(PETS_STAMP) ## Learn from few interactions with mbrl-lib's PETS
+	$(PETS_VENV)/bin/python benchmarks/few_interactions.py --methods pets $(ARGS)
+
+$(PETS_STAMP): requirements.lock benchmarks/pets-requirements.txt
+	@rm -rf $(PETS_VENV)
+	@$(BIN)/python -m venv $(PETS_VENV)
+	@echo "Installing mbrl-lib into $(PETS_VENV): a few minutes, once"
+	@$(PETS_VENV)/bin/python $(PIP_INSTALL) -r requirements.lock
+	@$(PETS_VENV)/bin/python $(PIP_INSTALL) --no-deps \
+		-r benchmarks/pets-requirements.txt
+	@$(PETS_VENV)/bin/python $(PIP_INSTALL) --no-deps --no-build-isolation -e .
 	@touch $@
 
 test: $(STAMP) ## Run every test

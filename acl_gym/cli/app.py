@@ -19,8 +19,9 @@ from acl_gym.cli.evaluate import HELP as EVALUATE_HELP
 from acl_gym.cli.evaluate import evaluate
 from acl_gym.cli.reproduce import HELP as REPRODUCE_HELP
 from acl_gym.cli.reproduce import REPORT_HELP, ReproduceCommand, report, reproduce
-from acl_gym.cli.train import HELP as TRAIN_HELP
-from acl_gym.cli.train import TrainCommand, train
+from acl_gym.cli.train import train
+from acl_gym.cli.train_help import HELP as TRAIN_HELP
+from acl_gym.cli.train_help import TrainCommand
 
 HELP = """Ant Colony Learning: colonies of ants that learn control policies.
 

@@ -151,7 +151,7 @@ def evaluate(
             # So that it knows the inputs of its actions, and that they fit.
             agent.set_env(environment.vector(1))
             policy = agent.interpolated_policy()
-    result, settings = _evaluate(
+    result, settings = evaluate_agent(
         agent, policy, walked, episodes, how.get("episodes"), max_steps, seed
     )
     if render or video is not None:
@@ -224,7 +224,7 @@ def _recorded(file: str, metadata: dict[str, Any]) -> dict[str, Any]:
     return {name: how[name] for name in limits if how.get(name) is not None}
 
 
-def _evaluate(
+def evaluate_agent(
     agent: Any,
     policy: Any,
     environment: Environment,
@@ -233,6 +233,20 @@ def _evaluate(
     max_steps: int | None,
     seed: int,
 ) -> tuple[PolicyCost, dict[str, Any]]:
+    """Follow an agent's policy, and let the agent keep the environment.
+
+    Args:
+        agent: of any kind of this package.
+        environment: where.
+        episodes: how many, from random states; None takes the evaluation states.
+        recorded: how many if the environment has no evaluation states; None takes
+            `FOREIGN_EPISODES`.
+        max_steps: the most steps of an episode; None takes the limit.
+        seed: of the states and the environment.
+
+    Returns:
+        What was found, and how: JSON types.
+    """
     import numpy as np
 
     from acl_gym.cli.environments import default_steps

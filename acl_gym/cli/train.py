@@ -2,84 +2,18 @@
 
 from __future__ import annotations
 
-import textwrap
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import typer
 
 from acl_gym.cli.agents import AGENTS, load_agent, name_of, parameters
 from acl_gym.cli.common import DebugOption, JsonOption, check_name
-from acl_gym.cli.environments import (
-    Environment,
-    check_named_by_file,
-    from_metadata,
-    parse_bins,
-)
-from acl_gym.cli.errors import BadArgumentError, Command, bad_arguments, report
+from acl_gym.cli.environments import Environment, parse_bins
+from acl_gym.cli.errors import BadArgumentError, bad_arguments, report
+from acl_gym.cli.plant_options import PlantOptions
+from acl_gym.cli.resuming import resumed_environment, without_deposit
 from acl_gym.cli.targets import checked_file, free_name, name_after
-
-HELP = """Learn in an environment, print the progress, and save the agent.
-
-The agent is the returning colony: its ants walk back and remember, and its partition is
-chosen and grows. --agent acl is the colony of the thesis, --agent q-learning is
-Q-learning and Q(lambda); --agent ant-system, ant-colony-system and max-min look for one
-best solution, such as a shortest tour, where states are numbered. Without --agent, a parameter may choose: --param deposit=rank:5
-takes the colony of the thesis, the first that has deposits.
-
-ENV_ID is the id of any Gymnasium environment; "module:id" imports a module first, which
-may be in the working directory. Two files are written: NAME.npz, the agent as it is at
-the end, and NAME-best.npz, as it was when its policy was the best.
-
-Ctrl-C, and SIGTERM, end learning after the trial under way (or at once if that takes
-more than two seconds) and save the agent; --resume goes on from there as if nothing had
-happened. The exit code is then 130, or 143. A second Ctrl-C ends the program at once.
-
-\b
-Examples:
-  acl-gym train acl_gym/Pendulum-v0
-  acl-gym train --resume Pendulum-v0.npz --trials 50            50 more trials
-  acl-gym train acl_gym/Pendulum-v0 --agent acl --ants 2000 --seed 3
-  acl-gym train acl_gym/GridSearch2D-v0 --param epsilon=0.2
-  acl-gym train acl_gym/GridSearch2D-v0 --ants 86 --param tabu=true
-  acl-gym train acl_gym/Pendulum-v0 --agent q-learning --param trace_decay=0.5
-  acl-gym train acl_gym/Pendulum-v0 --partition crisp --param tau0=0.001
-  acl-gym train acl_gym/Pendulum-v0 --param epsilon=linear:0.3:0.01:50
-  acl-gym train acl_gym/Pendulum-v0 --env-arg torques=[-1,0,1] --cells 64,65
-  acl-gym train CartPole-v1 --param deposit=rank:5
-  acl-gym train acl_gym/TravellingSalesman-v0 --agent max-min
-  acl-gym train Pendulum-v1 --discretize 5
-  acl-gym train my_module:MyEnv-v0 --max-steps 200 --log run.csv --json
-"""
-
-
-class TrainCommand(Command):
-    """Its help lists the parameters of the agents, which are looked up only then."""
-
-    def format_help(self, ctx: Any, formatter: Any) -> None:
-        """Write the help."""
-        from acl_gym.cli.settings import OBJECTS, SCHEDULES, signature
-
-        blocks = []
-        for name in AGENTS:
-            lines = [
-                textwrap.fill(
-                    f"{each:14} {declared.default}  {declared.words}",
-                    78,
-                    initial_indent="  ",
-                    subsequent_indent=" " * 17,
-                )
-                for each, declared in parameters(name).items()
-            ]
-            blocks += [f"Parameters of --agent {name} with their defaults:", *lines, ""]
-        families = {"a number that changes (schedule)": SCHEDULES, **OBJECTS}
-        for title, kinds in families.items():
-            blocks.append(f"Values for {title}:")
-            blocks += [f"  {signature(name, kind)}" for name, kind in kinds.items()]
-            blocks.append("")
-        blocks.append("Costs add up: settling_time:0:3.14+2*overshoot:0:3.14+0.1")
-        self.epilog = "\b\n" + "\n\n\b\n".join("\n".join(blocks).split("\n\n"))
-        super().format_help(ctx, formatter)
 
 
 def train(
@@ -241,10 +175,76 @@ def train(
             show_default=False,
         ),
     ] = None,
+    interactions: Annotated[
+        int | None,
+        typer.Option(
+            min=1,
+            metavar="N",
+            help="Make only N steps in the environment, record them, and learn in a model "
+            "of what was recorded.",
+            show_default=False,
+        ),
+    ] = None,
+    restart_after: Annotated[
+        int | None,
+        typer.Option(
+            min=1,
+            metavar="N",
+            help="With --interactions: reset the environment after N steps. Where a reset "
+            "is cheap and leads anywhere, short runs tell more.  [default: where its "
+            "episodes end]",
+            show_default=False,
+        ),
+    ] = None,
+    from_data: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="Learn in a model of recorded steps: .npz of acl_gym.Transitions, or "
+            ".csv or .parquet with a row for each moment.",
+            show_default=False,
+        ),
+    ] = None,
+    state: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME,...",
+            help="Columns of a table that hold what the environment observes, in its "
+            "order.",
+            show_default=False,
+        ),
+    ] = None,
+    input_: Annotated[
+        str | None,
+        typer.Option(
+            "--input",
+            metavar="NAME,...",
+            help="Columns of the inputs, each held from its row to the next.",
+            show_default=False,
+        ),
+    ] = None,
+    time: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME",
+            help="Column of the time in seconds, in which gaps are found.",
+            show_default=False,
+        ),
+    ] = None,
+    run: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME",
+            help="Column whose value changes from one run to the next.",
+            show_default=False,
+        ),
+    ] = None,
     log: Annotated[
         Path | None,
         typer.Option(
-            metavar="FILE.csv", help="Write one row per trial.", show_default=False
+            metavar="FILE.csv",
+            help="Write one row per trial; with --interactions, per round.",
+            show_default=False,
         ),
     ] = None,
     tensorboard: Annotated[
@@ -271,6 +271,22 @@ def train(
     typed = None if env_id is None else Environment(env_id, arguments, bins)
     if typed is not None:
         typed.check_id()
+    few = PlantOptions(interactions, restart_after, from_data, state, input_, time, run)
+    if few.wanted:
+        few.refuse_options(
+            {
+                "--resume": resume,
+                "--trials": trials,
+                "--ants": ants,
+                "--partition": None if partition == "auto" else partition,
+                "--cells": cells,
+                "--evaluate-every": evaluate_every,
+                "--checkpoint-every": checkpoint_every,
+                "--tensorboard": tensorboard,
+                "--no-keep-best": None if keep_best else True,
+            }
+        )
+    few.check()
     if resume is None:
         if typed is None:
             raise BadArgumentError(
@@ -286,6 +302,21 @@ def train(
     with bad_arguments():
         set_num_threads(threads)
     shown = learning.Shown(quiet, as_json)
+    if few.wanted and typed is not None:
+        from acl_gym.cli import from_plant
+
+        from_plant.run(
+            few,
+            typed,
+            kind,
+            settings,
+            target=checked_file(free_name(typed.name) if out is None else out),
+            max_steps=max_steps,
+            seed=seed or 0,
+            log=log,
+            shown=shown,
+        )
+        return
     if resume is None and typed is not None:
         target = checked_file(free_name(typed.name) if out is None else out)
         plan = learning.begin(
@@ -310,7 +341,7 @@ def train(
                 "holds a table over its cells; leave them out."
             )
         learner = load_agent(str(resume))
-        environment = _resumed_environment(resume, learner, typed, arguments, bins)
+        environment = resumed_environment(resume, learner, typed, arguments, bins)
         known = name_of(learner)
         if agent not in (None, known):
             raise BadArgumentError(
@@ -318,7 +349,7 @@ def train(
             )
         wanted = list(param or ())
         if agent is None and "deposit" not in parameters(known):
-            wanted = _without_deposit(wanted, known)
+            wanted = without_deposit(wanted, known)
         changes = parse_parameters("--param", wanted, parameters(known))
         for option, value, now in (
             ("--seed", seed, learner.seed),
@@ -352,22 +383,6 @@ def train(
     )
 
 
-def _without_deposit(param: list[str], known: str) -> list[str]:
-    """Leave out a deposit, with a word, where an agent goes on that needs none.
-
-    It says how ants turn costs into pheromone, and lets them learn from rewards of any
-    sign. Other agents do so without it, so that a script that always sets it still works.
-    """
-    kept = [each for each in param if each.partition("=")[0].strip() != "deposit"]
-    if len(kept) < len(param):
-        report(
-            "acl-gym",
-            f"note: --param deposit is left out: this file holds --agent {known}, which "
-            "takes rewards of any sign as they are.",
-        )
-    return kept
-
-
 def _cells(text: str | None) -> list[int] | None:
     if text is None:
         return None
@@ -377,48 +392,3 @@ def _cells(text: str | None) -> list[int] | None:
         raise BadArgumentError(
             f"--cells must be whole numbers such as 40,41, got {text!r}."
         ) from None
-
-
-def _resumed_environment(
-    file: Path,
-    learner: Any,
-    typed: Environment | None,
-    arguments: dict[str, Any],
-    bins: tuple[int, ...] | None,
-) -> Environment:
-    """The environment that a file names, or the user where it names none."""
-    found = from_metadata(str(file), learner.metadata)
-    if found is None:
-        if typed is None:
-            raise BadArgumentError(
-                f"{file} does not name its environment; name it: acl-gym train ENV_ID "
-                f"--resume {file}."
-            )
-        typed.import_module()
-        return typed
-    if typed is not None and typed.name != found.name:
-        raise BadArgumentError(
-            f"{file} was trained in {found.name}, got {typed.name}; leave ENV_ID out to "
-            "go on there."
-        )
-    if bins is not None and found.bins is not None and len(bins) != len(found.bins):
-        same = len(set(bins) | set(found.bins)) == 1
-    else:
-        same = bins in (None, found.bins)
-    if not same:
-        raise BadArgumentError(
-            f"--discretize must be {','.join(map(str, found.bins or ())) or 'left out'}, "
-            f"as in {file}, got {','.join(map(str, bins or ()))}."
-        )
-    for name, value in arguments.items():
-        if found.arguments.get(name, value) != value or name not in found.arguments:
-            raise BadArgumentError(
-                f"--env-arg {name} must be as in {file}, "
-                f"{found.arguments.get(name, 'where it is not set')!r}, got {value!r}; "
-                "leave it out."
-            )
-    if typed is not None and typed.module:
-        typed.import_module()
-    untyped = {k: v for k, v in found.arguments.items() if k not in arguments}
-    check_named_by_file(str(file), Environment(found.env_id, untyped, found.bins), "")
-    return found

@@ -81,8 +81,14 @@ class LearningRun:
         folder: str | os.PathLike[str] | None,
         seed: int | None,
     ) -> None:
-        self.interactions = validation.integer("interactions", interactions, at_least=1)
+        # Where there is data to learn from, no interaction need be made.
+        least = 1 if data is None else 0
+        self.interactions = validation.integer(
+            "interactions", interactions, at_least=least
+        )
         self._ends = _rounds(rounds, self.interactions)
+        if data is not None and self._ends[0] > 0:
+            self._ends = [0, *self._ends]
         if model_steps is not None:
             model_steps = validation.integer("model_steps", model_steps, at_least=1)
         self._model_steps = model_steps
@@ -131,7 +137,7 @@ class LearningRun:
         )
         self._made_before = made
         self._improving = Improving(
-            _default_agent(seed) if agent is None else agent,
+            default_agent(seed) if agent is None else agent,
             None if self._journal is None else self._journal.path(BEST),
         )
         self._model: LearnedVectorEnv | None = None
@@ -357,7 +363,8 @@ def _rounds(rounds: Any, interactions: int) -> list[int]:
         while ends[-1] < interactions:
             ends.append(int(np.ceil(ends[-1] * GROWTH)))
     elif isinstance(rounds, int | np.integer) and not isinstance(rounds, bool):
-        count = validation.integer("rounds", rounds, at_least=1, at_most=interactions)
+        most = max(interactions, 1)
+        count = validation.integer("rounds", rounds, at_least=1, at_most=most)
         ends = [round(interactions * (i + 1) / count) for i in range(count)]
     else:
         listed = validation.elements(rounds)
@@ -431,6 +438,15 @@ def _inputs(env: Any, inputs: Any) -> FloatArray | None:
     return array
 
 
-def _default_agent(seed: int | None) -> Callable[[LearnedVectorEnv], ReturningACL]:
+def default_agent(
+    seed: int | None, **settings: Any
+) -> Callable[[LearnedVectorEnv], ReturningACL]:
+    """What learns in a model if nothing else is said.
+
+    Args:
+        seed: of the agent.
+        **settings: parameters that are to differ.
+    """
     # Steps in a model are cheap: fewer walks back make more of them in the same time.
-    return lambda model: ReturningACL(model, walks_back=10, seed=seed)
+    chosen: dict[str, Any] = {"walks_back": 10, **settings}
+    return lambda model: ReturningACL(model, seed=seed, **chosen)

@@ -59,7 +59,8 @@ def learn_from_plant(
             package, which then changes its environment; or a function of the model (a
             vector environment) that returns anything with `learn(total_timesteps=)` and
             `predict`, such as an agent of Stable-Baselines3 over a `VectorEnvAdapter`.
-        interactions: steps of the plant, of all slots together, >= 1.
+        interactions: steps of the plant, of all slots together, >= 1; with `data` also
+            0, to learn from what was recorded before and nothing else.
         rounds: after how many interactions the colony learns: a number of rounds of
             equal length, or the numbers of interactions. None takes
             20, 40, 60, 90, 120, 160, 200, and then half as many more each time.
@@ -82,7 +83,8 @@ def learn_from_plant(
         model_steps: the most steps of all ants in the model in a round, >= 1. None takes
             five for each pair of a cell and an action, but 20,000 at least and 100,000 at
             most. A round ends earlier if the policy no longer becomes better.
-        data: what was recorded of this plant before.
+        data: what was recorded of this plant before. The colony learns from it before
+            the first interaction.
         folder: where every interaction is written down as soon as it was made, and the
             agent after each round. A call with the same arguments goes on with a run
             that was killed: no interaction is lost, and none is made twice.

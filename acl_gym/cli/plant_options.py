@@ -1,0 +1,118 @@
+"""Options of `acl-gym train` for few steps of a plant, and for none."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from acl_gym.cli.errors import BadArgumentError
+
+TABLES = {".csv": "csv", ".parquet": "parquet"}
+"""The endings of files with a row for each moment."""
+
+
+class PlantOptions(NamedTuple):
+    """What was asked for, as it was typed.
+
+    Attributes:
+        interactions: steps to be made; None: those of `from_data` only.
+        restart_after: steps after which the environment is reset.
+        from_data: a file of recorded steps.
+        state: columns of a table, with commas.
+        input: the same.
+        time: a column.
+        run: a column whose value changes from one run to the next.
+    """
+
+    interactions: int | None
+    restart_after: int | None
+    from_data: Path | None
+    state: str | None
+    input: str | None
+    time: str | None
+    run: str | None
+
+    @property
+    def wanted(self) -> bool:
+        """Whether to learn in a model."""
+        return self.interactions is not None or self.from_data is not None
+
+    @property
+    def columns(self) -> dict[str, Any]:
+        """Arguments of `Transitions.from_csv`."""
+        named: dict[str, Any] = {
+            "state": _names("--state", self.state),
+            "input": _names("--input", self.input),
+        }
+        for name, column in (("time", self.time), ("run", self.run)):
+            if column is not None:
+                named[name] = column
+        return named
+
+    @property
+    def kind_of_table(self) -> str | None:
+        """Either "csv" or "parquet"; None for a file of `Transitions`."""
+        return (
+            None
+            if self.from_data is None
+            else TABLES.get(self.from_data.suffix.lower())
+        )
+
+    def refuse_options(self, given: dict[str, Any]) -> None:
+        """Refuse options that have no meaning here.
+
+        Args:
+            given: what was typed, by option; None where nothing was.
+
+        Raises:
+            BadArgumentError: one was typed.
+        """
+        own = "--from-data" if self.interactions is None else "--interactions"
+        for option, value in given.items():
+            if value is not None:
+                raise BadArgumentError(
+                    f"{option} does not go with {own}, which learns in a model, round "
+                    "after round; leave it out."
+                )
+
+    def check(self) -> None:
+        """Check that the options go together.
+
+        Raises:
+            BadArgumentError: they do not.
+        """
+        if self.restart_after is not None and self.interactions is None:
+            raise BadArgumentError(
+                "--restart-after belongs to --interactions, which makes steps; leave it "
+                "out or add --interactions N."
+            )
+        columns = {
+            "--state": self.state,
+            "--input": self.input,
+            "--time": self.time,
+            "--run": self.run,
+        }
+        typed = [option for option, names in columns.items() if names is not None]
+        if self.kind_of_table is None:
+            if typed:
+                raise BadArgumentError(
+                    f"{typed[0]} names columns of --from-data FILE.csv or FILE.parquet, "
+                    f"got {'no such file' if self.from_data is None else self.from_data}"
+                    "; leave it out or name such a file."
+                )
+            return
+        for option in ("--state", "--input"):
+            if columns[option] is None:
+                raise BadArgumentError(
+                    f"--from-data {self.from_data} needs {option} with the names of "
+                    "columns, such as --state theta,omega --input u."
+                )
+
+
+def _names(option: str, text: str | None) -> list[str]:
+    names = [part.strip() for part in (text or "").split(",")]
+    if not all(names):
+        raise BadArgumentError(
+            f"{option} must be names of columns such as theta,omega, got {text!r}."
+        )
+    return names

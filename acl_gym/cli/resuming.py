@@ -1,0 +1,74 @@
+"""What `acl-gym train --resume` takes over from a file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from acl_gym.cli.environments import (
+    Environment,
+    check_named_by_file,
+    from_metadata,
+)
+from acl_gym.cli.errors import BadArgumentError, report
+
+
+def without_deposit(param: list[str], known: str) -> list[str]:
+    """Leave out a deposit, with a word, where an agent goes on that needs none.
+
+    It says how ants turn costs into pheromone, and lets them learn from rewards of any
+    sign. Other agents do so without it, so that a script that always sets it still works.
+    """
+    kept = [each for each in param if each.partition("=")[0].strip() != "deposit"]
+    if len(kept) < len(param):
+        report(
+            "acl-gym",
+            f"note: --param deposit is left out: this file holds --agent {known}, which "
+            "takes rewards of any sign as they are.",
+        )
+    return kept
+
+
+def resumed_environment(
+    file: Path,
+    learner: Any,
+    typed: Environment | None,
+    arguments: dict[str, Any],
+    bins: tuple[int, ...] | None,
+) -> Environment:
+    """The environment that a file names, or the user where it names none."""
+    found = from_metadata(str(file), learner.metadata)
+    if found is None:
+        if typed is None:
+            raise BadArgumentError(
+                f"{file} does not name its environment; name it: acl-gym train ENV_ID "
+                f"--resume {file}."
+            )
+        typed.import_module()
+        return typed
+    if typed is not None and typed.name != found.name:
+        raise BadArgumentError(
+            f"{file} was trained in {found.name}, got {typed.name}; leave ENV_ID out to "
+            "go on there."
+        )
+    if bins is not None and found.bins is not None and len(bins) != len(found.bins):
+        same = len(set(bins) | set(found.bins)) == 1
+    else:
+        same = bins in (None, found.bins)
+    if not same:
+        raise BadArgumentError(
+            f"--discretize must be {','.join(map(str, found.bins or ())) or 'left out'}, "
+            f"as in {file}, got {','.join(map(str, bins or ()))}."
+        )
+    for name, value in arguments.items():
+        if found.arguments.get(name, value) != value or name not in found.arguments:
+            raise BadArgumentError(
+                f"--env-arg {name} must be as in {file}, "
+                f"{found.arguments.get(name, 'where it is not set')!r}, got {value!r}; "
+                "leave it out."
+            )
+    if typed is not None and typed.module:
+        typed.import_module()
+    untyped = {k: v for k, v in found.arguments.items() if k not in arguments}
+    check_named_by_file(str(file), Environment(found.env_id, untyped, found.bins), "")
+    return found

@@ -236,7 +236,8 @@ def evaluate_agent(
     """Follow an agent's policy, and let the agent keep the environment.
 
     Args:
-        agent: of any kind of this package.
+        agent: of any kind of this package, for its episode cost.
+        policy: what is followed, the agent or a policy of it.
         environment: where.
         episodes: how many, from random states; None takes the evaluation states.
         recorded: how many if the environment has no evaluation states; None takes

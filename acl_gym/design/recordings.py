@@ -159,7 +159,7 @@ def model_facts(env: LearnedVectorEnv, responses: Responses) -> dict[str, Any]:
 def spread_over(env: LearnedVectorEnv, states: FloatArray) -> FloatArray:
     """The spread of the least certain action in each of some states, `(n,)`."""
     spreads = [
-        env.system.spread(states, np.full(len(states), action))
+        env.spread(states, np.full(len(states), action))
         for action in range(len(env.system.inputs))
     ]
     return np.asarray(np.max(spreads, axis=0))
@@ -173,7 +173,7 @@ def largest_spreads(env: LearnedVectorEnv, responses: Responses) -> FloatArray:
     actions = responses.actions[times, starts]
     spreads = np.concatenate(
         [
-            env.system.spread(states[i : i + _AT_ONCE], actions[i : i + _AT_ONCE])
+            env.spread(states[i : i + _AT_ONCE], actions[i : i + _AT_ONCE])
             for i in range(0, len(states), _AT_ONCE)
         ]
     )

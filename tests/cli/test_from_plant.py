@@ -220,7 +220,7 @@ def test_another_sampling_time(table: Path) -> None:
 def test_too_few_steps() -> None:
     shown: Any = invoke("train", PENDULUM, "--interactions", "3")
     assert shown.exit_code == 2
-    assert "a model needs 5 steps or more, got 3" in shown.stderr
+    assert "interactions must be 5 or more to learn from, got 3" in shown.stderr
 
 
 def test_help_has_an_example_of_each() -> None:

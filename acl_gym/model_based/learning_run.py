@@ -12,12 +12,9 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from gymnasium import spaces
-from gymnasium.vector import VectorEnv
 
 from acl_gym.agents.base import TabularAgent
 from acl_gym.agents.returning import ReturningACL
-from acl_gym.envs.control.lookup import system_of
 from acl_gym.envs.learned import (
     DataWarning,
     LearnedDynamics,
@@ -25,31 +22,27 @@ from acl_gym.envs.learned import (
     Transitions,
 )
 from acl_gym.envs.learned.regression import LEAST_STEPS
+from acl_gym.model_based.arguments import (
+    episode_steps,
+    grid_of_inputs,
+    round_ends,
+    task_of,
+)
 from acl_gym.model_based.improving import Improving
 from acl_gym.model_based.journal import AGENT, BEST, STATE, Journal
 from acl_gym.model_based.plant_runner import PlantRunner
 from acl_gym.model_based.result import PlantLearning
 from acl_gym.utils import validation
-from acl_gym.utils.boxes import declared_bounds
 from acl_gym.utils.files import write_atomically
-from acl_gym.utils.typing import FloatArray, Row
+from acl_gym.utils.typing import Row
 
 logger = logging.getLogger("acl_gym")
-
-FIRST_ROUNDS = (20, 40, 60, 90, 120, 160, 200)
-"""Interactions after which the colony learns, if nothing else is said."""
-
-GROWTH = 1.5
-"""By which factor there are more of them in each later round."""
 
 ANTS = 50
 """Slots of the model."""
 
-COMPARED = 50
+COMPARED = 100
 """States from which policies are compared in the model."""
-
-VALUES = 5
-"""Values of each continuous input, if none are given."""
 
 Callback = Callable[[PlantLearning, Row], Any] | None
 
@@ -86,7 +79,7 @@ class LearningRun:
         self.interactions = validation.integer(
             "interactions", interactions, at_least=least
         )
-        self._ends = _rounds(rounds, self.interactions)
+        self._ends = round_ends(rounds, self.interactions)
         if data is not None and self._ends[0] > 0:
             self._ends = [0, *self._ends]
         if model_steps is not None:
@@ -108,11 +101,11 @@ class LearningRun:
                 f"{self.interactions}."
             )
         seed = validation.seed(seed)
-        self._task = _task(env, task)
+        self._task = task_of(env, task)
         self._initial, self._data = initial, data
         self._arguments = dict(model or {})
-        self._steps = _episode_steps(env, max_episode_steps)
-        values = _inputs(env, inputs)
+        self._steps = episode_steps(env, max_episode_steps)
+        values = grid_of_inputs(env, inputs)
         self._journal: Journal | None = None
         self._before: Transitions | None = None
         if folder is not None:
@@ -354,88 +347,6 @@ class LearningRun:
                 f"{path} cannot be read: {error}; remove it to learn anew from what was "
                 "recorded."
             ) from error
-
-
-def _rounds(rounds: Any, interactions: int) -> list[int]:
-    """The numbers of interactions after which the colony learns, the last one being all."""
-    if rounds is None:
-        ends = list(FIRST_ROUNDS)
-        while ends[-1] < interactions:
-            ends.append(int(np.ceil(ends[-1] * GROWTH)))
-    elif isinstance(rounds, int | np.integer) and not isinstance(rounds, bool):
-        most = max(interactions, 1)
-        count = validation.integer("rounds", rounds, at_least=1, at_most=most)
-        ends = [round(interactions * (i + 1) / count) for i in range(count)]
-    else:
-        listed = validation.elements(rounds)
-        ends = [
-            validation.integer("rounds", each, at_least=1) for each in listed or [None]
-        ]
-    return [*sorted({end for end in ends if end < interactions}), interactions]
-
-
-def _task(env: Any, given: dict[str, Any]) -> dict[str, Any]:
-    """Goal, tolerance and cost: those given, else what is known of the environment."""
-    system = system_of(env)
-    known = None if system is None else system.task
-    task = {name: value for name, value in given.items() if value is not None}
-    if known is None:
-        return task
-    if "goal" in task:  # a tolerance belongs to its goal
-        return {**task, "cost": task.get("cost", known["cost"])}
-    return {**known, **task}
-
-
-def _episode_steps(env: Any, given: int | None) -> int:
-    if given is not None:
-        return validation.integer("max_episode_steps", given, at_least=1)
-    spec = getattr(env, "spec", None)
-    limits = (
-        getattr(spec, "max_episode_steps", None),
-        getattr(env, "max_episode_steps", None),
-    )
-    known = next((limit for limit in limits if limit is not None and limit > 0), 300)
-    return int(known)
-
-
-def _inputs(env: Any, inputs: Any) -> FloatArray | None:
-    """What each action sets where actions are continuous; None where they are not."""
-    space = env.single_action_space if isinstance(env, VectorEnv) else env.action_space
-    if isinstance(space, spaces.Discrete):
-        if inputs is not None:
-            raise ValueError(
-                "inputs belong to continuous actions, got them for "
-                f"{validation.shown(space)}; leave them out."
-            )
-        return None
-    if not isinstance(space, spaces.Box) or len(space.shape) != 1:
-        raise TypeError(
-            "a plant needs Discrete actions or a Box of one axis, got "
-            f"{validation.shown(space)}."
-        )
-    if inputs is None:
-        low, high = declared_bounds(space)
-        if not (np.isfinite(low).all() and np.isfinite(high).all()):
-            raise ValueError(
-                "inputs must be given where the Box of actions has no finite bounds, got "
-                f"{validation.shown(space)}."
-            )
-        lines = [np.linspace(*ends, VALUES) for ends in zip(low, high, strict=True)]
-        grid = np.meshgrid(*lines, indexing="ij")
-        return np.stack(grid, axis=-1).reshape(-1, len(lines))
-    array = validation.real_array("inputs", inputs)
-    array = array[:, None] if array.ndim == 1 else array
-    if array.ndim != 2 or array.shape[1] != space.shape[0]:
-        raise ValueError(
-            f"inputs must hold a row of {space.shape[0]} numbers for each action, got "
-            f"shape {array.shape}."
-        )
-    if ((array < space.low) | (array > space.high)).any():
-        raise ValueError(
-            f"inputs must lie within the actions of the environment, {space}, got "
-            f"{validation.shown(inputs)}."
-        )
-    return array
 
 
 def default_agent(

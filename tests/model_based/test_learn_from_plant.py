@@ -24,8 +24,8 @@ from acl_gym import (
     evaluate_policy_cost,
     learn_from_plant,
 )
+from acl_gym.model_based.arguments import round_ends
 from acl_gym.model_based.journal import DATA
-from acl_gym.model_based.learning_run import _rounds
 from tests.model_based.plants import QUICK, pendulum, quick
 
 J_STAR = 38.4  # of the pendulum, by value iteration on a fine grid
@@ -171,10 +171,10 @@ def test_a_callback_ends_learning() -> None:
 
 
 def test_rounds() -> None:
-    assert _rounds(None, 100) == [20, 40, 60, 90, 100]
-    assert _rounds(None, 500) == [20, 40, 60, 90, 120, 160, 200, 300, 450, 500]
-    assert _rounds(4, 10) == [2, 5, 8, 10]
-    assert _rounds([5, 3, 50], 20) == [3, 5, 20]
+    assert round_ends(None, 100) == [20, 40, 60, 90, 100]
+    assert round_ends(None, 500) == [20, 40, 60, 90, 120, 160, 200, 300, 450, 500]
+    assert round_ends(4, 10) == [2, 5, 8, 10]
+    assert round_ends([5, 3, 50], 20) == [3, 5, 20]
 
 
 @pytest.mark.parametrize(

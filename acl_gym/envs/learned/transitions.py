@@ -10,6 +10,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from acl_gym.envs.learned import reading
+from acl_gym.envs.learned.arrays import (
+    checked_column,
+    checked_flags,
+    checked_runs,
+    checked_table,
+    runs_of,
+)
 from acl_gym.envs.learned.description import Description, described
 from acl_gym.envs.learned.quality import doubts
 from acl_gym.envs.learned.recorder import Policy, Recorder
@@ -83,10 +90,10 @@ class Transitions:
         numbered: bool = False,
         sampling_time: float | None = None,
     ) -> None:
-        x = _table("states", states)
+        x = checked_table("states", states)
         count = len(x)
-        u = _table("inputs", inputs, rows=count)
-        y = _table("next_states", next_states, rows=count, columns=x.shape[1])
+        u = checked_table("inputs", inputs, rows=count)
+        y = checked_table("next_states", next_states, rows=count, columns=x.shape[1])
         self.description = described(
             x.shape[1],
             u.shape[1],
@@ -107,11 +114,11 @@ class Transitions:
             "next_states": y,
         }
         if rewards is not None:
-            self._arrays["rewards"] = _column("rewards", rewards, count)
+            self._arrays["rewards"] = checked_column("rewards", rewards, count)
         if terminated is not None:
-            self._arrays["terminated"] = _flags("terminated", terminated, count)
+            self._arrays["terminated"] = checked_flags("terminated", terminated, count)
         self._arrays["episodes"] = (
-            _runs(x, y) if episodes is None else _numbers(episodes, count)
+            runs_of(x, y) if episodes is None else checked_runs(episodes, count)
         )
         for array in self._arrays.values():
             array.setflags(write=False)
@@ -392,70 +399,3 @@ def _both(one: Description, other: Description) -> Description:
         values=one.values if one.values is not None else other.values,
         sampling_time=one.sampling_time or other.sampling_time,
     )
-
-
-def _table(
-    name: str, values: Any, rows: int | None = None, columns: int | None = None
-) -> FloatArray:
-    array = validation.real_array(name, values, finite=False)
-    if array.ndim == 1:
-        array = array[:, None]
-    if array.ndim != 2 or rows not in (None, len(array)):
-        count = "n" if rows is None else str(rows)
-        raise ValueError(
-            f"{name} must have a row for each step, shape ({count}, size), got "
-            f"{np.shape(values)}."
-        )
-    if columns not in (None, array.shape[1]):
-        raise ValueError(
-            f"{name} must have the {columns} variables of states, got {array.shape[1]}."
-        )
-    _check_finite(name, array)
-    return np.ascontiguousarray(array)
-
-
-def _column(name: str, values: Any, count: int) -> FloatArray:
-    array = validation.real_array(name, values, finite=False)
-    if array.shape != (count,):
-        raise ValueError(f"{name} must have shape ({count},), got {array.shape}.")
-    _check_finite(name, array[:, None])
-    return array
-
-
-def _check_finite(name: str, array: FloatArray) -> None:
-    finite = np.isfinite(array).all(axis=1)
-    if not finite.all():
-        row = int(np.argmin(finite))
-        raise ValueError(
-            f"{name} must be finite, got {array[row].tolist()} in row {row} "
-            f"({np.count_nonzero(~finite)} rows of {len(array)} are not); leave such "
-            "rows out or repair them."
-        )
-
-
-def _flags(name: str, values: Any, count: int) -> BoolArray:
-    array = validation.as_array(values)
-    good = array is not None and array.shape == (count,) and array.dtype.kind in "biuf"
-    if not good or not ((array == 0) | (array == 1)).all():  # type: ignore[union-attr]
-        raise ValueError(
-            f"{name} must be {count} booleans, got {validation.shown(values)}."
-        )
-    return np.asarray(array == 1)
-
-
-def _numbers(values: Any, count: int) -> IntArray:
-    array = validation.as_array(values)
-    good = array is not None and array.shape == (count,) and array.dtype.kind in "iu"
-    if array is None or not good or (np.diff(array.astype(np.int64)) < 0).any():
-        raise ValueError(
-            f"episodes must be {count} integers that do not fall, got "
-            f"{validation.shown(values)}."
-        )
-    return array.astype(np.int64)
-
-
-def _runs(states: FloatArray, next_states: FloatArray) -> IntArray:
-    """The numbers of runs, a new one where a state does not follow the one before."""
-    breaks = np.zeros(len(states), np.int64)
-    breaks[1:] = (states[1:] != next_states[:-1]).any(axis=1)
-    return np.cumsum(breaks)

@@ -1,0 +1,97 @@
+"""Checks of the arrays of a recording."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from acl_gym.utils import validation
+from acl_gym.utils.typing import BoolArray, FloatArray, IntArray
+
+
+def checked_table(
+    name: str, values: Any, rows: int | None = None, columns: int | None = None
+) -> FloatArray:
+    """Return finite numbers with a row for each step, `(n, size)`.
+
+    Raises:
+        ValueError: they are none, or there are not `rows` and `columns` of them.
+    """
+    array = validation.real_array(name, values, finite=False)
+    if array.ndim == 1:
+        array = array[:, None]
+    if array.ndim != 2 or rows not in (None, len(array)):
+        count = "n" if rows is None else str(rows)
+        raise ValueError(
+            f"{name} must have a row for each step, shape ({count}, size), got "
+            f"{np.shape(values)}."
+        )
+    if columns not in (None, array.shape[1]):
+        raise ValueError(
+            f"{name} must have the {columns} variables of states, got {array.shape[1]}."
+        )
+    _check_finite(name, array)
+    return np.ascontiguousarray(array)
+
+
+def checked_column(name: str, values: Any, count: int) -> FloatArray:
+    """Return `count` finite numbers.
+
+    Raises:
+        ValueError: they are not that many, or not finite.
+    """
+    array = validation.real_array(name, values, finite=False)
+    if array.shape != (count,):
+        raise ValueError(f"{name} must have shape ({count},), got {array.shape}.")
+    _check_finite(name, array[:, None])
+    return array
+
+
+def _check_finite(name: str, array: FloatArray) -> None:
+    finite = np.isfinite(array).all(axis=1)
+    if not finite.all():
+        row = int(np.argmin(finite))
+        raise ValueError(
+            f"{name} must be finite, got {array[row].tolist()} in row {row} "
+            f"({np.count_nonzero(~finite)} rows of {len(array)} are not); leave such "
+            "rows out or repair them."
+        )
+
+
+def checked_flags(name: str, values: Any, count: int) -> BoolArray:
+    """Return `count` booleans.
+
+    Raises:
+        ValueError: they are not that many, or no booleans.
+    """
+    array = validation.as_array(values)
+    good = array is not None and array.shape == (count,) and array.dtype.kind in "biuf"
+    if not good or not ((array == 0) | (array == 1)).all():  # type: ignore[union-attr]
+        raise ValueError(
+            f"{name} must be {count} booleans, got {validation.shown(values)}."
+        )
+    return np.asarray(array == 1)
+
+
+def checked_runs(values: Any, count: int) -> IntArray:
+    """Return the number of the run of each of `count` steps.
+
+    Raises:
+        ValueError: they are no integers, or fall.
+    """
+    array = validation.as_array(values)
+    good = array is not None and array.shape == (count,) and array.dtype.kind in "iu"
+    if array is None or not good or (np.diff(array.astype(np.int64)) < 0).any():
+        raise ValueError(
+            f"episodes must be {count} integers that do not fall, got "
+            f"{validation.shown(values)}."
+        )
+    return array.astype(np.int64)
+
+
+def runs_of(states: FloatArray, next_states: FloatArray) -> IntArray:
+    """The numbers of runs, a new one where a state does not follow the one before."""
+    breaks = np.zeros(len(states), np.int64)
+    breaks[1:] = (states[1:] != next_states[:-1]).any(axis=1)
+    return np.cumsum(breaks)

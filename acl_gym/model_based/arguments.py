@@ -1,0 +1,106 @@
+"""What the arguments of `learn_from_plant` stand for."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from gymnasium import spaces
+from gymnasium.vector import VectorEnv
+
+from acl_gym.envs.control.lookup import system_of
+from acl_gym.utils import validation
+from acl_gym.utils.boxes import declared_bounds
+from acl_gym.utils.typing import FloatArray
+
+FIRST_ROUNDS = (20, 40, 60, 90, 120, 160, 200)
+"""Interactions after which the colony learns, if nothing else is said."""
+
+GROWTH = 1.5
+"""By which factor there are more of them in each later round."""
+
+VALUES = 5
+"""Values of each continuous input, if none are given."""
+
+
+def round_ends(rounds: Any, interactions: int) -> list[int]:
+    """The numbers of interactions after which the colony learns, the last one being all."""
+    if rounds is None:
+        ends = list(FIRST_ROUNDS)
+        while ends[-1] < interactions:
+            ends.append(int(np.ceil(ends[-1] * GROWTH)))
+    elif isinstance(rounds, int | np.integer) and not isinstance(rounds, bool):
+        most = max(interactions, 1)
+        count = validation.integer("rounds", rounds, at_least=1, at_most=most)
+        ends = [round(interactions * (i + 1) / count) for i in range(count)]
+    else:
+        listed = validation.elements(rounds)
+        ends = [
+            validation.integer("rounds", each, at_least=1) for each in listed or [None]
+        ]
+    return [*sorted({end for end in ends if end < interactions}), interactions]
+
+
+def task_of(env: Any, given: dict[str, Any]) -> dict[str, Any]:
+    """Goal, tolerance and cost: those given, else what is known of the environment."""
+    system = system_of(env)
+    known = None if system is None else system.task
+    task = {name: value for name, value in given.items() if value is not None}
+    if known is None:
+        return task
+    if "goal" in task:  # a tolerance belongs to its goal
+        return {**task, "cost": task.get("cost", known["cost"])}
+    return {**known, **task}
+
+
+def episode_steps(env: Any, given: int | None) -> int:
+    """T in the model: what is given, else the limit of the environment, else 300."""
+    if given is not None:
+        return validation.integer("max_episode_steps", given, at_least=1)
+    spec = getattr(env, "spec", None)
+    limits = (
+        getattr(spec, "max_episode_steps", None),
+        getattr(env, "max_episode_steps", None),
+    )
+    known = next((limit for limit in limits if limit is not None and limit > 0), 300)
+    return int(known)
+
+
+def grid_of_inputs(env: Any, inputs: Any) -> FloatArray | None:
+    """What each action sets where actions are continuous; None where they are not."""
+    space = env.single_action_space if isinstance(env, VectorEnv) else env.action_space
+    if isinstance(space, spaces.Discrete):
+        if inputs is not None:
+            raise ValueError(
+                "inputs belong to continuous actions, got them for "
+                f"{validation.shown(space)}; leave them out."
+            )
+        return None
+    if not isinstance(space, spaces.Box) or len(space.shape) != 1:
+        raise TypeError(
+            "a plant needs Discrete actions or a Box of one axis, got "
+            f"{validation.shown(space)}."
+        )
+    if inputs is None:
+        low, high = declared_bounds(space)
+        if not (np.isfinite(low).all() and np.isfinite(high).all()):
+            raise ValueError(
+                "inputs must be given where the Box of actions has no finite bounds, got "
+                f"{validation.shown(space)}."
+            )
+        lines = [np.linspace(*ends, VALUES) for ends in zip(low, high, strict=True)]
+        grid = np.meshgrid(*lines, indexing="ij")
+        return np.stack(grid, axis=-1).reshape(-1, len(lines))
+    array = validation.real_array("inputs", inputs)
+    array = array[:, None] if array.ndim == 1 else array
+    if array.ndim != 2 or array.shape[1] != space.shape[0]:
+        raise ValueError(
+            f"inputs must hold a row of {space.shape[0]} numbers for each action, got "
+            f"shape {array.shape}."
+        )
+    if ((array < space.low) | (array > space.high)).any():
+        raise ValueError(
+            f"inputs must lie within the actions of the environment, {space}, got "
+            f"{validation.shown(inputs)}."
+        )
+    return array

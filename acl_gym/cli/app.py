@@ -30,7 +30,7 @@ Examples:
   acl-gym envs                                   list the environments
   acl-gym train acl_gym/Pendulum-v0 --out a.npz  learn, in a few seconds
   acl-gym evaluate a.npz                         evaluate the saved policy
-  acl-gym design --example pendulum              a controller in C, and a report
+  acl-gym design --example pendulum              a controller in C, a report
   acl-gym compare                                compare ACL, Q-learning, DQN
   acl-gym reproduce fig5.4 --runs 3              repeat a figure of the thesis
 

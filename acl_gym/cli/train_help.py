@@ -36,7 +36,7 @@ Examples:
   acl-gym train acl_gym/Pendulum-v0
   acl-gym train acl_gym/Pendulum-v0 --interactions 200 --restart-after 10
   acl-gym train acl_gym/Pendulum-v0 --from-data recorded.npz
-  acl-gym train acl_gym/Pendulum-v0 --from-data log.csv --state theta,omega --input u
+  acl-gym train acl_gym/Pendulum-v0 --from-data log.csv --state a,b --input u
   acl-gym train --resume Pendulum-v0.npz --trials 50            50 more trials
   acl-gym train acl_gym/Pendulum-v0 --agent acl --ants 2000 --seed 3
   acl-gym train acl_gym/GridSearch2D-v0 --param epsilon=0.2

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import gymnasium as gym
 import numpy as np
 from gymnasium import spaces
 from gymnasium.vector import VectorEnv
@@ -21,6 +22,19 @@ GROWTH = 1.5
 
 VALUES = 5
 """Values of each continuous input, if none are given."""
+
+
+def check_plant(env: Any) -> None:
+    """Refuse what is no environment, before anything is asked of it.
+
+    Raises:
+        TypeError: it is none.
+    """
+    if not isinstance(env, gym.Env | VectorEnv):
+        raise TypeError(
+            "env must be an environment of Gymnasium, single or vector, got "
+            f"{validation.shown(env)}; pass gym.make(id), not the id."
+        )
 
 
 def round_ends(rounds: Any, interactions: int) -> list[int]:

@@ -52,10 +52,15 @@ class Journal:
         values: NDArray[np.float64] | None,
     ) -> None:
         self.folder = validation.path("folder", folder)
+        if self.folder.exists() and not self.folder.is_dir():
+            raise NotADirectoryError(
+                f"folder must be a folder or a new name, got the file {self.folder}."
+            )
         self.folder.mkdir(parents=True, exist_ok=True)
         facts = described_by(env)
         self._size, self._n_inputs = facts.pop("size"), facts.pop("n_inputs")
         self._facts = facts if values is None else {**facts, "values": values}
+        settings = {**settings, "plant": _plain(facts)}
         self._check(settings)
         self.transitions, self._runs = self._read()
         self._file: IO[str] | None = None  # opened with the first step
@@ -124,7 +129,7 @@ class Journal:
         whole = content[: content.rfind(b"\n") + 1]
         if len(whole) < len(content):
             write_atomically(path, whole)
-        rows = list(csv.reader(io.StringIO(whole.decode())))
+        rows = list(csv.reader(io.StringIO(whole.decode(errors="replace"))))
         if not rows:
             return None, 0
         if rows[0] != self._columns():
@@ -134,7 +139,7 @@ class Journal:
             )
         if len(rows) == 1:
             return None, 0
-        table = np.array(rows[1:], dtype=np.float64)
+        table = self._table(path, rows)
         ends = np.cumsum([1, self._size, self._n_inputs, self._size, 1])
         run, states, inputs, after, rewards, ended = np.split(table, ends, axis=1)
         order = np.argsort(run[:, 0], kind="stable")
@@ -149,8 +154,33 @@ class Journal:
         )
         return found, int(run.max()) + 1
 
+    def _table(self, path: Path, rows: list[list[str]]) -> NDArray[np.float64]:
+        """The numbers of all lines but the first.
+
+        Raises:
+            ValueError: a line does not hold as many.
+        """
+        for number, row in enumerate(rows[1:], start=2):
+            try:
+                good = len(row) == len(rows[0]) and bool(
+                    np.isfinite([float(cell) for cell in row]).all()
+                )
+            except ValueError:
+                good = False
+            if not good:
+                raise ValueError(
+                    f"line {number} of {path} must hold {len(rows[0])} finite numbers, "
+                    f"got {validation.shown(','.join(row))}; remove that line to go on."
+                )
+        return np.array(rows[1:], dtype=np.float64)
+
     def _columns(self) -> list[str]:
         states = [f"x{i}" for i in range(self._size)]
         inputs = [f"u{i}" for i in range(self._n_inputs)]
         after = [f"next_{name}" for name in states]
         return ["run", *states, *inputs, *after, "reward", "terminated"]
+
+
+def _plain(facts: dict[str, Any]) -> dict[str, Any]:
+    """What the environment tells of its numbers, as text, to tell plants apart."""
+    return {name: repr(np.asarray(value).tolist()) for name, value in facts.items()}

@@ -8,7 +8,7 @@ import os
 import threading
 import time
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -23,6 +23,7 @@ from acl_gym.envs.learned import (
 )
 from acl_gym.envs.learned.regression import LEAST_STEPS
 from acl_gym.model_based.arguments import (
+    check_plant,
     episode_steps,
     grid_of_inputs,
     round_ends,
@@ -34,7 +35,7 @@ from acl_gym.model_based.plant_runner import PlantRunner
 from acl_gym.model_based.result import PlantLearning
 from acl_gym.utils import validation
 from acl_gym.utils.files import write_atomically
-from acl_gym.utils.typing import Row
+from acl_gym.utils.typing import FloatArray, Row
 
 logger = logging.getLogger("acl_gym")
 
@@ -101,8 +102,14 @@ class LearningRun:
                 f"{self.interactions}."
             )
         seed = validation.seed(seed)
+        check_plant(env)
         self._task = task_of(env, task)
         self._initial, self._data = initial, data
+        if not isinstance(model, Mapping | None):
+            raise TypeError(
+                "model must be a dict of arguments of LearnedVectorEnv, such as "
+                f'{{"pessimism": 1.0}}, got {validation.shown(model)}.'
+            )
         self._arguments = dict(model or {})
         self._steps = episode_steps(env, max_episode_steps)
         values = grid_of_inputs(env, inputs)
@@ -136,7 +143,7 @@ class LearningRun:
         self._model: LearnedVectorEnv | None = None
         self._history: list[Row] = []
         self._seconds = 0.0
-        self._rounds_done = self._restored_rounds()
+        self._learned_at = self._restored()
 
     def close(self) -> None:
         """Close the file of interactions."""
@@ -171,19 +178,18 @@ class LearningRun:
 
     def _in_turn(self, callback: Callback, progress: Callable[[int], Any]) -> None:
         """Plant and colony take turns."""
-        for number, end in enumerate(self._ends):
+        for end in self._ends:
             before = self._interactions
             while self._interactions < end:
                 self._runner.step(self._journal)
             progress(self._interactions - before)
-            if number < self._rounds_done or self._too_few():
+            if end <= self._learned_at or self._too_few():
                 continue
             row = self._learn()
-            self._keep(number + 1)
+            self._keep()
             if callback is not None and callback(self._result(), row) is False:
                 return
-        if self._model is None:  # all rounds were done before the run was killed
-            self._learn(0)
+        self._take_over()
 
     def _side_by_side(self, callback: Callback, progress: Callable[[int], Any]) -> None:
         """The plant runs in a thread of its own, and nobody waits."""
@@ -210,10 +216,12 @@ class LearningRun:
                     plant.join(0.01)
                     continue
                 now = self._interactions
+                if now == self._learned_at and done:
+                    break
                 row = self._learn()
                 progress(now - seen)
                 seen = now
-                self._keep(0)
+                self._keep()
                 if callback is not None and callback(self._result(), row) is False:
                     break
                 if done:
@@ -221,8 +229,14 @@ class LearningRun:
         finally:
             stop.set()
             plant.join()
+        self._take_over()
+
+    def _take_over(self) -> None:
+        """Where all was done before the run was killed: the model and the best policy."""
         if self._model is None:
             self._learn(0)
+        if self._improving.best is None:  # its file is gone
+            self._learn()
 
     @property
     def _interactions(self) -> int:
@@ -251,6 +265,9 @@ class LearningRun:
         """Fit the model to everything recorded, and let the colony go on in it."""
         began = time.perf_counter()
         recorded = self._recorded()
+        restored = self._learned_at >= 0
+        before = 0 if self._data is None else len(self._data)
+        self._learned_at = len(recorded) - before
         begin: LearnedDynamics | None = (
             None if self._model is None else self._model.dynamics
         )
@@ -260,15 +277,15 @@ class LearningRun:
             # noise repeats itself.
             warnings.simplefilter("ignore", DataWarning)
             self._model = self._fitted(recorded, begin)
-        if first and self._rounds_done and self._journal is not None:
+        if first and restored and self._journal is not None:
             files = self._journal.path(AGENT), self._journal.path(BEST)
             if files[0].exists():
                 self._improving.restore(*files, self._model)
         model: LearnedVectorEnv = self._model
-        states = model.system.sample_states(np.random.default_rng(0), COMPARED)
+        states = self._compared(model)
         steps = self._improving.improve(
             model,
-            np.ascontiguousarray(states.T),
+            states,
             self._model_steps if most_steps is None else most_steps,
         )
         self._runner.policy = self._improving.best
@@ -289,6 +306,17 @@ class LearningRun:
                 row["model_cost"],
             )
         return row
+
+    def _compared(self, model: LearnedVectorEnv) -> FloatArray:
+        """States from which policies are compared, `(n, n_variables)`.
+
+        Half of them where the plant has begun, from where it will be asked again.
+        """
+        rng, system = np.random.default_rng(0), model.system
+        anywhere = system.sample_states(rng, COMPARED // 2).T[:, : system.low.size]
+        begun = system.variables(model.transitions.starts)
+        begun = begun[rng.integers(len(begun), size=COMPARED // 2)]
+        return np.concatenate([anywhere, np.clip(begun, system.low, system.high)])
 
     def _fitted(
         self, recorded: Transitions, begin: LearnedDynamics | None
@@ -320,28 +348,28 @@ class LearningRun:
             [dict(row) for row in self._history],
         )
 
-    def _keep(self, rounds_done: int) -> None:
+    def _keep(self) -> None:
         """Save the agent, and how far the run has come."""
         if self._journal is None or not isinstance(self._improving.agent, TabularAgent):
             return
         self._improving.agent.save(self._journal.path(AGENT))
         state = {
-            "rounds": rounds_done,
+            "interactions": self._learned_at,
             "seconds": self._seconds,
             "history": self._history,
         }
         write_atomically(self._journal.path(STATE), json.dumps(state).encode())
 
-    def _restored_rounds(self) -> int:
-        """How many rounds were done before the run was killed."""
+    def _restored(self) -> int:
+        """After how many interactions the colony had learned; -1: it had not."""
         if self._journal is None or not self._journal.path(STATE).exists():
-            return 0
+            return -1
         path = self._journal.path(STATE)
         try:
             state = json.loads(path.read_text())
             self._seconds = float(state["seconds"])
             self._history = [dict(row) for row in state["history"]]
-            return int(state["rounds"])
+            return int(state["interactions"])
         except (ValueError, KeyError, TypeError) as error:
             raise ValueError(
                 f"{path} cannot be read: {error}; remove it to learn anew from what was "

@@ -157,7 +157,11 @@ def test_nothing_that_runs_is_forgotten() -> None:
         if name not in known and not _is_package(name) and name != "acl_gym"
     }
     silent = {n for n in forgotten if n.endswith(("compiling", "rendering", "painter"))}
-    of_packages = ("acl_gym.callbacks.", "acl_gym.evaluation.trajectory")
+    of_packages = (
+        "acl_gym.callbacks.",
+        "acl_gym.evaluation.robustness",
+        "acl_gym.evaluation.trajectory",
+    )
     by_packages = {n for n in forgotten if n.startswith(of_packages)}
     # `systems` was imported by this test, to have something to run.
     assert forgotten - silent - by_packages <= {"acl_gym.experiments.systems"}

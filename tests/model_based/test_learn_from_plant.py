@@ -195,6 +195,7 @@ def test_rounds() -> None:
         ({"data": [1]}, TypeError, r"data must be acl_gym\.Transitions"),
         ({"callback": 3}, TypeError, "callback must be a function"),
         ({"model": {"colour": 1}}, TypeError, "colour"),
+        ({"model": [1]}, TypeError, "model must be a dict"),
         ({"interactions": 3}, ValueError, "interactions must be 5 or more"),
     ],
 )
@@ -205,6 +206,12 @@ def test_bad_arguments_get_one_clear_error(
         learn_from_plant(
             pendulum(), **{"seed": 0, **QUICK, "interactions": 20, **arguments}
         )
+
+
+@pytest.mark.parametrize("env", ["acl_gym/Pendulum-v0", 3, None])
+def test_what_is_no_environment_is_refused(env: Any) -> None:
+    with pytest.raises(TypeError, match="env must be an environment of Gymnasium"):
+        learn_from_plant(env, interactions=10)
 
 
 def test_actions_that_no_table_has_are_refused() -> None:
@@ -271,6 +278,51 @@ class TestFolder:
         (tmp_path / "run.json").unlink()
         with pytest.raises(ValueError, match=r"but no run\.json"):
             self.run(tmp_path)
+
+    def test_more_interactions_are_learned_from(self, tmp_path: Path) -> None:
+        """Though there are as many rounds as before."""
+        for end in (25, 28):
+            learned = self.run(tmp_path, interactions=end)
+            assert learned.history[-1]["interactions"] == end
+        assert [row["interactions"] for row in learned.history] == [10, 20, 25, 28]
+
+    def test_what_a_thread_learned_is_not_lost(self, tmp_path: Path) -> None:
+        first = self.run(tmp_path, asynchronous=True)
+        again = self.run(tmp_path, interactions=45, asynchronous=True)
+        assert again.agent.num_timesteps > first.agent.num_timesteps
+        assert len(again.history) > len(first.history)
+
+    def test_a_policy_that_is_gone_is_learned_again(self, tmp_path: Path) -> None:
+        self.run(tmp_path, interactions=10)
+        for name in ("agent.npz", "best.npz"):
+            (tmp_path / name).unlink()
+        assert self.run(tmp_path, interactions=10).policy is not None
+
+    def test_another_plant_is_refused(self, tmp_path: Path) -> None:
+        self.run(tmp_path, interactions=10)
+        with pytest.raises(ValueError, match="holds another run, with plant"):
+            learn_from_plant(
+                gym.make("MountainCar-v0"),
+                interactions=10,
+                folder=tmp_path,
+                seed=0,
+                **QUICK,
+            )
+
+    def test_a_line_that_is_damaged_is_named(self, tmp_path: Path) -> None:
+        self.run(tmp_path, interactions=10)
+        lines = (tmp_path / DATA).read_text().splitlines(keepends=True)
+        lines[3] = "0,a,1\n"
+        (tmp_path / DATA).write_text("".join(lines))
+        with pytest.raises(
+            ValueError, match=r"line 4 of .* must hold 8 finite numbers"
+        ):
+            self.run(tmp_path, interactions=10)
+
+    def test_a_file_is_no_folder(self, tmp_path: Path) -> None:
+        (tmp_path / "file").write_text("")
+        with pytest.raises(NotADirectoryError, match="folder must be a folder"):
+            self.run(tmp_path / "file")
 
     def test_damaged_files_are_refused(self, tmp_path: Path) -> None:
         self.run(tmp_path, interactions=10)

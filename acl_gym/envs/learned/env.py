@@ -69,7 +69,7 @@ class LearnedVectorEnv(ControlVectorEnv):
         per_action: see there.
         n_draws: see there; only with `uncertain`.
         uncertain: let each slot walk in its own function, drawn anew in each episode
-            from all that fit the data, so that a policy is learned that does for all.
+            from all that fit the data, so that a policy is learned that works for all.
         pessimism: what a step costs more where the model is not sure, for a `spread` of
             1, >= 0.
         dynamics: what was learned already, in place of learning it.
@@ -132,6 +132,11 @@ class LearnedVectorEnv(ControlVectorEnv):
         self.transitions = transitions
         known = transitions.description
         actions = _inputs(inputs, transitions)
+        if len(actions) < 2:
+            raise ValueError(
+                "a controller needs two actions or more, got the one input "
+                f"{actions[0].tolist()}; record with inputs that change, or give inputs=."
+            )
         for doubt in transitions.doubts():
             warnings.warn(DataWarning(doubt), stacklevel=2)
         if dynamics is None:
@@ -208,6 +213,11 @@ class LearnedVectorEnv(ControlVectorEnv):
                 f"actions must be integers, got {validation.shown(actions)}."
             )
         inputs = self.system.inputs
+        if numbers.shape not in ((), (len(rows),)):
+            raise ValueError(
+                f"actions must be one or {len(rows)}, as there are states, got shape "
+                f"{numbers.shape}."
+            )
         chosen: IntArray = np.broadcast_to(numbers, len(rows)).astype(np.int64)
         if ((chosen < 0) | (chosen >= len(inputs))).any():
             raise ValueError(
@@ -273,7 +283,16 @@ def _bounds(
     circle = periods_of(known) > 0.0
     centre = None if goal is None or callable(goal) else validation.as_array(goal)
     if centre is not None and centre.shape == bottom.shape:
-        half = (top - bottom) / 40 if tolerance is None else np.asarray(tolerance)
+        if not np.isfinite(centre.astype(float)).all():
+            raise ValueError(f"goal must be finite, got {validation.shown(goal)}.")
+        half = (top - bottom) / 40
+        if tolerance is not None:
+            half = validation.real_array("tolerance", tolerance, finite=False)
+            if half.shape not in ((), (1,), bottom.shape):
+                raise ValueError(
+                    f"tolerance must be a number or {bottom.size} of them, got "
+                    f"{validation.shown(tolerance)}."
+                )
         bottom = np.where(circle, bottom, np.minimum(bottom, centre - half))
         top = np.where(circle, top, np.maximum(top, centre + half))
     return _given("low", low, bottom), _given("high", high, top)
@@ -307,7 +326,7 @@ def _initial(
 
 
 class _Anywhere:
-    """Draws every other state from some rows, and the others within bounds."""
+    """Draws about half of the states from some rows, and the others within bounds."""
 
     def __init__(self, rows: FloatArray, low: FloatArray, high: FloatArray) -> None:
         self._rows, self._low, self._high = rows, low, high

@@ -10,6 +10,9 @@ from acl_gym.utils.typing import FloatArray
 FEW = 10
 """Steps for each variable and input, below which a recording is called short."""
 
+MANY_TURNS = 20
+"""Turns of an angle in one recording that are hardly turns."""
+
 OFTEN_TWICE = 0.25
 """The share of rows that may be there twice; a plant at rest repeats itself."""
 
@@ -66,10 +69,10 @@ def doubts(
     twice = count - len(np.unique(rows, axis=0))
     if twice > OFTEN_TWICE * count and not _discrete(states):
         found.append(
-            f"{twice} of {count} rows are there twice or more often; check that no file "
+            f"{twice} of {count} rows occur more than once; check that no file "
             "was read twice, and that no sensor stands still."
         )
-    return found + _mixed_units(states, next_states, description)
+    return found
 
 
 def _discrete(states: FloatArray) -> bool:
@@ -77,33 +80,57 @@ def _discrete(states: FloatArray) -> bool:
     return bool((states == np.rint(states)).all())
 
 
-def _mixed_units(
+def unit_doubts(
     states: FloatArray, next_states: FloatArray, description: Description
 ) -> list[str]:
-    """Variables that are the rate of change of another, but for a factor of a unit."""
+    """What speaks for units that are mixed up, a sentence each.
+
+    A variable is the rate of change of another, but for a factor between units; or an
+    angle goes round more often than any.
+
+    Args:
+        states: as they were recorded, `(n, d)`, angles not brought back.
+        next_states: the same.
+        description: of both.
+    """
+    found = []
+    for axis in description.circular:
+        span = description.high[axis] - description.low[axis]
+        turns = float(np.ptp(np.concatenate([states, next_states])[:, axis]) / span)
+        if turns > MANY_TURNS:
+            found.append(
+                f"the angle {description.state_names[axis]} goes through {turns:.0f} "
+                f"turns of {span:.4g}; if it is in degrees, give low= and high= such as "
+                "0 and 360, or radians."
+            )
     time = description.sampling_time
     if time is None or len(states) < FEW:
-        return []
+        return found
     change = next_states - states
     for axis in description.circular:
         span = description.high[axis] - description.low[axis]
-        change[:, axis] -= span * np.rint(change[:, axis] / span)
+        if np.abs(change[:, axis]).max() <= span:  # else it is no angle in this unit
+            change[:, axis] -= span * np.rint(change[:, axis] / span)
     middle = 0.5 * (states + next_states)
-    found = []
     names = description.state_names
     for axis in range(states.shape[1]):
         for rate in range(states.shape[1]):
             factor = _factor(change[:, axis], middle[:, rate] * time)
             if axis == rate or factor is None:
                 continue
-            for unit, words in UNITS.items():
-                for times in (unit, 1 / unit):
-                    if abs(factor / times - 1.0) < 0.1:
-                        found.append(
-                            f"{names[axis]} changes {factor:.3g} times as fast as "
-                            f"{names[rate]} says, as if one of them were in {words}; "
-                            "give both in the same unit."
-                        )
+            near = min(
+                (
+                    (abs(np.log(factor / times)), words)
+                    for unit, words in UNITS.items()
+                    for times in (unit, 1 / unit)
+                ),
+            )
+            if near[0] < 0.1:
+                found.append(
+                    f"{names[axis]} changes {factor:.3g} times as fast as "
+                    f"{names[rate]} says, as if one of them were in {near[1]}; give both "
+                    "in the same unit."
+                )
     return found
 
 

@@ -51,7 +51,8 @@ class Recorder:
         seed: int | None = None,
     ) -> None:
         self.facts = described_by(env)
-        del self.facts["size"], self.facts["n_inputs"]
+        self._size = self.facts.pop("size")
+        del self.facts["n_inputs"]
         self.env, self.policy = env, policy
         self.hold = validation.integer("hold", hold, at_least=1)
         self._vector = isinstance(env, VectorEnv)
@@ -88,7 +89,7 @@ class Recorder:
             found, *results, infos = self.env.step(self._single(actions))
             found = np.asarray(found)[None]
             rewards, terminated, truncated = (np.array([each]) for each in results)
-        found = np.asarray(found, dtype=np.float64)
+        found = self._numbers(found)
         ended = np.asarray(terminated | truncated, dtype=np.bool_)
         reached = found
         mode = self._mode()
@@ -97,6 +98,7 @@ class Recorder:
             last = infos["final_obs"]
             for slot in np.flatnonzero(ended):
                 reached[slot] = np.asarray(last[slot], dtype=np.float64)
+        self._check(reached, rewards)
         made = ~self._starting  # the step of a slot that restarts is none
         rows = np.flatnonzero(made)
         new = {
@@ -119,6 +121,33 @@ class Recorder:
             elif mode is not AutoresetMode.SAME_STEP:
                 self._begin(ended)
         return ended
+
+    def _numbers(self, found: Any) -> NDArray[np.float64]:
+        """Observations `(num_envs, size)` as numbers.
+
+        Raises:
+            ValueError: they have another shape than they are to have.
+        """
+        array = validation.as_array(found)
+        shape = self.num_envs, self._size
+        if array is None or array.shape != shape or array.dtype.kind not in "biuf":
+            raise ValueError(
+                f"the plant must return observations of shape {shape} after step "
+                f"{self.steps}, got {validation.shown(found)}; nothing of that step was "
+                "kept."
+            )
+        return array.astype(np.float64)
+
+    def _check(self, reached: NDArray[np.float64], rewards: Any) -> None:
+        """Refuse what is not finite before it is kept: nobody could learn from it."""
+        good = np.isfinite(reached).all(axis=1) & np.isfinite(rewards)
+        if not good.all():
+            slot = int(np.argmin(good))
+            raise ValueError(
+                f"the plant must return finite numbers, got {reached[slot].tolist()} "
+                f"with reward {np.asarray(rewards)[slot]} after step {self.steps}; check "
+                "its sensors. Nothing of that step was kept."
+            )
 
     def restart(self, slots: BoolArray) -> None:
         """Reset some slots in the middle of their episodes.
@@ -203,5 +232,6 @@ class Recorder:
 
     def _reset(self, **how: Any) -> NDArray[np.float64]:
         found, _ = self.env.reset(**how)
-        array = np.asarray(found, dtype=np.float64)
-        return array if self._vector else array[None]
+        array = self._numbers(found if self._vector else np.asarray(found)[None])
+        self._check(array, np.zeros(self.num_envs))
+        return array

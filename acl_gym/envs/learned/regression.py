@@ -107,9 +107,8 @@ class OfLibrary(Regression):
                 out = each.folds == fold
                 members.append(each.estimator(make, ~out))
                 if out.any():
-                    missed[out] = (
-                        members[-1].predict(each.rows[out]) - each.targets[out]
-                    )
+                    found = _predicted(members[-1], each.rows[out])
+                    missed[out] = found - each.targets[out]
             errors.append(each.relative(missed))
         self.errors = np.array(errors)
         self.n_members = 1 + N_FOLDS
@@ -127,11 +126,31 @@ class OfLibrary(Regression):
         return found
 
     def _of(self, member: int, rows: FloatArray) -> FloatArray:
-        columns = [
-            np.asarray(each[member].predict(rows), np.float64).ravel()
-            for each in self._members
-        ]
+        columns = [_predicted(each[member], rows) for each in self._members]
         return np.stack(columns, axis=1)
+
+
+def _predicted(estimator: Any, rows: FloatArray) -> FloatArray:
+    """What an estimator predicts, `(n,)`, whoever wrote it.
+
+    Raises:
+        ValueError: it predicts something else than a finite number for each row.
+    """
+    found = validation.as_array(estimator.predict(rows))
+    if found is not None and found.shape == (len(rows), 1):
+        found = found[:, 0]
+    good = (
+        found is not None
+        and found.shape == (len(rows),)
+        and found.dtype.kind in "iuf"
+        and bool(np.isfinite(found).all())
+    )
+    if found is None or not good:
+        raise ValueError(
+            f"predict of the regressor {type(estimator).__name__} must return a finite "
+            f"number for each of {len(rows)} rows, got {validation.shown(found)}."
+        )
+    return found.astype(np.float64)
 
 
 class Fit:
@@ -270,10 +289,11 @@ def checked_kind(kind: Any) -> Any:
     """
     if isinstance(kind, str):
         return validation.one_of("regressor", kind, ("auto", *KINDS))
-    if not all(callable(getattr(kind, name, None)) for name in ("fit", "predict")):
+    methods = all(callable(getattr(kind, name, None)) for name in ("fit", "predict"))
+    if isinstance(kind, type) or not methods:
         raise TypeError(
             "regressor must be a name or an object with fit(X, y) and predict(X), got "
-            f"{validation.shown(kind)}."
+            f"{validation.shown(kind)}; of a class pass an instance."
         )
     return kind
 

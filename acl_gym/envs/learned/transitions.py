@@ -18,7 +18,7 @@ from acl_gym.envs.learned.arrays import (
     runs_of,
 )
 from acl_gym.envs.learned.description import Description, described
-from acl_gym.envs.learned.quality import doubts
+from acl_gym.envs.learned.quality import doubts, unit_doubts
 from acl_gym.envs.learned.recorder import Policy, Recorder
 from acl_gym.utils import archives, validation
 from acl_gym.utils.angles import find_angles
@@ -32,7 +32,7 @@ _FLAT = ("state_names", "input_names", "circular", "angles", "numbered")
 
 
 class Transitions:
-    """What a plant did: in a state, with an input held for a sampling time, the next state.
+    """Recorded steps of a plant: a state, the input held for a sampling time, the next state.
 
     Read them from a run of an environment (`record`), from files of measurements
     (`from_csv`, `from_parquet`, `from_frame`), or from a Minari data set
@@ -107,6 +107,9 @@ class Transitions:
             numbered=numbered,
             sampling_time=sampling_time,
         )
+        self._check_numbers(u)
+        # Before angles are brought back between their ends, which hides the unit.
+        self._unit_doubts = unit_doubts(x, y, self.description)
         x, y = self.description.settled(x), self.description.settled(y)
         self._arrays: dict[str, NDArray[Any]] = {
             "states": x,
@@ -122,6 +125,20 @@ class Transitions:
         )
         for array in self._arrays.values():
             array.setflags(write=False)
+
+    def _check_numbers(self, inputs: FloatArray) -> None:
+        """Refuse inputs that number no action, where they are to number them."""
+        known = self.description
+        if not known.numbered or known.values is None:
+            return
+        strange = ~np.isin(inputs[:, 0], np.ravel(known.values))
+        if strange.any():
+            row = int(np.argmax(strange))
+            raise ValueError(
+                "inputs must be numbers of actions, "
+                f"{validation.shown(np.ravel(known.values).tolist())}, got "
+                f"{inputs[row, 0]:g} in row {row}; record the actions, not what they set."
+            )
 
     @property
     def states(self) -> FloatArray:
@@ -210,7 +227,7 @@ class Transitions:
         kept = {name: array[rows] for name, array in self._arrays.items()}
         if not len(kept["states"]):
             raise ValueError("at least one step must be left, got none.")
-        return self._made(self.description, kept)
+        return self._made(self.description, kept, self._unit_doubts)
 
     def __add__(self, other: Any) -> Self:
         """Both recordings, one after the other.
@@ -236,7 +253,8 @@ class Transitions:
         }
         after = self.episodes[-1] + 1 - other.episodes[0]
         joined["episodes"][len(self) :] += after
-        return self._made(_both(self.description, other.description), joined)
+        either = list(dict.fromkeys(self._unit_doubts + other._unit_doubts))
+        return self._made(_both(self.description, other.description), joined, either)
 
     def doubts(self) -> list[str]:
         """What speaks against learning from this data, a sentence each; empty if nothing.
@@ -244,7 +262,8 @@ class Transitions:
         Few steps, inputs that never change, rows that are there twice, variables that
         never change, and units that do not fit together.
         """
-        return doubts(self.states, self.inputs, self.next_states, self.description)
+        found = doubts(self.states, self.inputs, self.next_states, self.description)
+        return found + self._unit_doubts
 
     def save(self, path: archives.Target) -> Any:
         """Write everything to one file, in one atomic step.
@@ -381,10 +400,13 @@ class Transitions:
         return cls(**{**reading.arrays_of_minari(dataset), **described})
 
     @classmethod
-    def _made(cls, description: Description, arrays: dict[str, Any]) -> Self:
+    def _made(
+        cls, description: Description, arrays: dict[str, Any], unit_doubts: list[str]
+    ) -> Self:
         """From arrays that are known to be good."""
         made = cls.__new__(cls)
         made.description, made._arrays = description, arrays
+        made._unit_doubts = list(unit_doubts)
         for array in arrays.values():
             array.setflags(write=False)
         return made

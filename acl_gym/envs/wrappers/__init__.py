@@ -5,7 +5,6 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from acl_gym.envs.wrappers.action_grid import ActionGrid
 from acl_gym.envs.wrappers.scaling import (
     ScaledObservation,
     ScaledVectorObservation,
@@ -14,6 +13,7 @@ from acl_gym.envs.wrappers.scaling import (
 from acl_gym.envs.wrappers.waiting import WaitingVectorEnv
 
 if TYPE_CHECKING:
+    from acl_gym.envs.wrappers.action_grid import ActionGrid
     from acl_gym.envs.wrappers.changing import ChangingVectorEnv, Drift, Jump
     from acl_gym.envs.wrappers.inner_loop import InnerLoop
     from acl_gym.envs.wrappers.pid import PID
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 # Imported on first use: they know the systems of this package and load compiled kernels,
 # which new worker processes, that import this folder, need not wait for.
 _LAZY = {
+    "ActionGrid": "acl_gym.envs.wrappers.action_grid",
     "ChangingVectorEnv": "acl_gym.envs.wrappers.changing",
     "Drift": "acl_gym.envs.wrappers.changing",
     "InnerLoop": "acl_gym.envs.wrappers.inner_loop",

@@ -94,6 +94,34 @@ def test_an_object_with_fit_and_predict_will_do() -> None:
     assert LearnedDynamics(Transitions(**line()), Constant()).regressor == "Constant"
 
 
+@pytest.mark.parametrize(
+    "predict",
+    [
+        lambda rows: 0.0,
+        lambda rows: None,
+        lambda rows: np.zeros(3),
+        lambda rows: np.full(len(rows), np.nan),
+        lambda rows: np.array(["a"] * len(rows)),
+    ],
+)
+def test_what_a_regressor_predicts_is_checked(predict: Any) -> None:
+    """Nothing else may reach the kernels, which write where they are told to."""
+    regressor = Constant()
+    regressor.predict = predict  # type: ignore[method-assign]
+    with pytest.raises(
+        ValueError, match="predict of the regressor Constant must return"
+    ):
+        LearnedDynamics(Transitions(**line()), regressor)
+
+
+def test_columns_of_one_are_numbers_and_classes_are_no_regressors() -> None:
+    regressor = Constant()
+    regressor.predict = lambda rows: np.zeros((len(rows), 1))  # type: ignore[method-assign]
+    LearnedDynamics(Transitions(**line()), regressor)
+    with pytest.raises(TypeError, match="of a class pass an instance"):
+        LearnedDynamics(Transitions(**line()), Ridge)
+
+
 def test_the_kind_with_the_smallest_error_is_taken() -> None:
     """A jump is no work for a smooth process, but for trees."""
     rng = np.random.default_rng(0)

@@ -281,7 +281,7 @@ def test_each_slot_may_walk_in_its_own_function() -> None:
 def test_doubts_are_warned_of() -> None:
     still = Transitions(**{**line(), "inputs": np.zeros((40, 1))})
     with pytest.warns(DataWarning, match="is always 0"):
-        LearnedVectorEnv(still, cost="time")
+        LearnedVectorEnv(still, cost="time", inputs=[-1.0, 1.0])
 
 
 @pytest.mark.parametrize(
@@ -292,6 +292,13 @@ def test_doubts_are_warned_of() -> None:
         ({"low": [0.0, 1.0]}, ValueError, "low must hold a number or None for each"),
         ({"pessimism": -1.0}, ValueError, "pessimism must lie in"),
         ({"max_episode_steps": 0}, ValueError, "max_episode_steps must be"),
+        ({"inputs": [1.0]}, ValueError, "two actions or more, got the one input"),
+        ({"goal": [np.nan]}, ValueError, "goal must be finite"),
+        (
+            {"goal": [0.0], "tolerance": [1, 2]},
+            ValueError,
+            "tolerance must be a number",
+        ),
         ({"goal": [1.0, 2.0, 3.0]}, ValueError, "goal must be a state of 1 variables"),
         ({"regressor": "neural"}, ValueError, "regressor must be one of"),
     ],

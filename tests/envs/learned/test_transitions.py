@@ -292,7 +292,7 @@ def test_good_data_is_not_doubted() -> None:
 def test_few_steps_and_copies_are_doubted() -> None:
     assert "only 10 steps" in Transitions(**line(10)).doubts()[0]
     data = pendulum()
-    assert "rows are there twice" in (data + data).doubts()[0]
+    assert "rows occur more than once" in (data + data).doubts()[0]
 
 
 def test_mixed_units_are_noticed() -> None:
@@ -306,3 +306,50 @@ def test_mixed_units_are_noticed() -> None:
     assert any("degrees instead of radians" in doubt for doubt in found), found
     states[:, 0], after[:, 0] = np.radians(states[:, 0]), np.radians(after[:, 0])
     assert Transitions(states, u, after, sampling_time=0.1).doubts() == []
+
+
+def test_degrees_of_an_angle_are_noticed_though_it_wraps_around() -> None:
+    rng = np.random.default_rng(0)
+    rate, angle = rng.uniform(-2, 2, 100), rng.uniform(-100, 100, 100)
+    states = np.stack([angle, rate], axis=1)
+    after = np.stack([angle + np.degrees(rate * 0.1), rate], axis=1)
+    u = rng.choice([-1.0, 1.0], 100)
+    data = Transitions(states, u, after, sampling_time=0.1, circular=[0])
+    (turns, unit) = data.doubts()
+    assert "turns of 6.283; if it is in degrees" in turns
+    assert "degrees instead of radians" in unit
+    assert data[:50].doubts() == [turns, unit]
+    right = Transitions(
+        states,
+        u,
+        after,
+        sampling_time=0.1,
+        circular=[0],
+        low=[-180, None],
+        high=[180, None],
+    )
+    assert len(right.doubts()) == 1  # the rate is still in radians
+
+
+def test_inputs_must_be_numbers_of_actions() -> None:
+    with pytest.raises(ValueError, match="inputs must be numbers of actions"):
+        Transitions(**line(), numbered=True, values=[[0.0], [1.0]])
+
+
+@pytest.mark.parametrize(
+    ("observation", "reward", "message"),
+    [
+        ([np.nan, 0.0], 0.0, r"finite numbers, got \[nan, 0\.0\]"),
+        ([0.0, 0.0], np.inf, "with reward inf"),
+        ([0.0], 0.0, r"observations of shape \(1, 2\)"),
+    ],
+)
+def test_what_a_plant_returns_is_checked(
+    observation: Any, reward: float, message: str
+) -> None:
+    class Broken(gym.Wrapper[Any, Any, Any, Any]):
+        def step(self, action: Any) -> Any:
+            return np.array(observation), reward, False, False, {}
+
+    with pytest.raises(ValueError, match=message):
+        Transitions.record(Broken(gym.make("acl_gym/Pendulum-v0")), 5, seed=0)

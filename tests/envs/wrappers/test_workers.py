@@ -510,3 +510,11 @@ def test_a_cluster_gives_the_same_bits(here: WorkersVectorEnv, tmp_path: Path) -
     while any(map(alive, pids)) and time.monotonic() < deadline:
         time.sleep(0.1)
     assert not any(map(alive, pids))
+
+
+def test_workers_do_not_wait_for_kernels() -> None:
+    """What a new process imports that is to host environments of others."""
+    program = (
+        "import sys, acl_gym.envs.wrappers.hosting; sys.exit('numba' in sys.modules)"
+    )
+    assert subprocess.run([sys.executable, "-c", program], check=False).returncode == 0

@@ -17,6 +17,14 @@ _MORE = {
 }
 
 
+_OPTIONS = {
+    "max_episode_steps=": "--max-steps",
+    "tolerance=": "--tolerance",
+    "inputs=": "--actions",
+}
+"""What the arguments are called where a plant is known by recordings."""
+
+
 def advice(learned: Learned, measures: Measures, plant: Plant) -> list[str]:
     """Sentences on what to try, the most promising first; empty where all is well.
 
@@ -74,6 +82,8 @@ def advice(learned: Learned, measures: Measures, plant: Plant) -> list[str]:
             "Begin with easier starts (initial=), if the plant never is in all states "
             "between low and high."
         )
+    if from_data:
+        found = [_as_options(each) for each in found]
     return found
 
 
@@ -86,3 +96,10 @@ def state_in_words(state: tuple[float, ...], plant: Plant) -> str:
         joined = f"{word} = " if "[" in word else f"{word} "
         parts.append(f"{joined}{digits(value)}{unit}")
     return ", ".join(parts)
+
+
+def _as_options(sentence: str) -> str:
+    """Advice on a recording names options of the command, not arguments of `plant`."""
+    for argument, option in _OPTIONS.items():
+        sentence = sentence.replace(argument, option)
+    return sentence

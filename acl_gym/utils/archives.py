@@ -37,6 +37,11 @@ _BYTES_A_VALUE = 64
 """What a value in the JSON counts at least, being an object in memory."""
 
 _NAMED = {AGENT: "an agent", TRANSITIONS: "a file of transitions"}
+_FILE = {AGENT: "agent file", TRANSITIONS: "file of transitions"}
+_WRITTEN_BY = {
+    AGENT: "save() or by `acl-gym train`",
+    TRANSITIONS: "Transitions.save()",
+}
 _AGAIN = {AGENT: "the agent", TRANSITIONS: "them"}
 
 _PART = 2**20
@@ -113,7 +118,7 @@ class Archive:
     def __init__(
         self, source: Target, max_bytes: int = MOST_BYTES, kind: str = AGENT
     ) -> None:
-        self.name, content = _content(source, max_bytes)
+        self.name, content = _content(source, max_bytes, kind)
         try:
             members = _Members(content, max_bytes)
             header = _json(members.pop_header(), max_bytes)
@@ -265,7 +270,7 @@ def _is_file(doing: str, target: Any, method: str) -> bool:
     return True
 
 
-def _content(source: Target, most: int) -> tuple[str, bytes]:
+def _content(source: Target, most: int, kind: str) -> tuple[str, bytes]:
     """The name and the bytes of a file."""
     if _is_file("load from", source, "read"):
         name = str(getattr(source, "name", "the file"))
@@ -276,8 +281,8 @@ def _content(source: Target, most: int) -> tuple[str, bytes]:
     if not _is_there(path):
         or_typed = "" if typed == named else f", and none at {typed}"
         raise FileNotFoundError(
-            f"no agent file at {named}{or_typed}; give the name of a file that "
-            "was written by save() or by `acl-gym train`."
+            f"no {_FILE[kind]} at {named}{or_typed}; give the name of a file that "
+            f"was written by {_WRITTEN_BY[kind]}."
         )
     with path.open("rb") as file:
         return str(path), _read(file, str(path), most)

@@ -49,8 +49,8 @@ def doubts(
     wanted = FEW * (size + inputs.shape[1])
     if count < wanted:
         found.append(
-            f"there are only {count} steps for {size} variables and "
-            f"{inputs.shape[1]} inputs; record {wanted} or more."
+            f"there are only {_count(count, 'step')} for {_count(size, 'variable')} and "
+            f"{_count(inputs.shape[1], 'input')}; record {wanted} or more."
         )
     for name, column in zip(description.input_names, inputs.T, strict=True):
         if count > 1 and np.ptp(column) == 0.0:
@@ -73,6 +73,10 @@ def doubts(
             "was read twice, and that no sensor stands still."
         )
     return found
+
+
+def _count(number: int, what: str) -> str:
+    return f"{number} {what}" if number == 1 else f"{number} {what}s"
 
 
 def _discrete(states: FloatArray) -> bool:

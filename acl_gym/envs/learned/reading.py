@@ -43,7 +43,7 @@ def arrays_of_files(
     """
     import pandas as pd
 
-    read = pd.read_csv if kind == "csv" else pd.read_parquet
+    read = _read_csv if kind == "csv" else pd.read_parquet
     several = isinstance(path, list | tuple)
     paths = [
         validation.file_path("path", each) for each in (path if several else [path])
@@ -117,6 +117,13 @@ def arrays_of_frames(
                 "next_state must name a column for each of state, got "
                 f"{columns['next_state']} for {columns['state']}."
             )
+    both = set(columns["state"]) & set(columns["input"])
+    if both:
+        raise ValueError(
+            f"a column is a variable of the state or an input, got {sorted(both)} as both."
+        )
+    if sampling_time is not None:
+        sampling_time = validation.number("sampling_time", sampling_time, above=0)
     if terminated is not None and next_state is None and run is None:
         raise ValueError(
             "terminated needs next_state or run as well: without them the row after an "
@@ -149,8 +156,9 @@ def arrays_of_frames(
     if gaps:
         warnings.warn(
             DataWarning(
-                f"there are {gaps} gaps in time, where a row is not {sampling_time:g} s "
-                "after the one before; the run is taken to end there."
+                f"there {'is 1 gap' if gaps == 1 else f'are {gaps} gaps'} in time, where "
+                f"a row is not {sampling_time:g} s after the one before; the run is taken "
+                "to end there. Resample a recording whose steps are uneven throughout."
             ),
             stacklevel=4,
         )
@@ -282,10 +290,11 @@ def _numbers(frame: Any, columns: list[str], name: str) -> NDArray[np.float64]:
     for column in columns:
         values = frame[column].to_numpy()
         if values.dtype.kind not in "biuf":
-            bad = next((v for v in values if not _is_number(v)), values[:1])
+            row = next((i for i, v in enumerate(values) if not _is_number(v)), 0)
             raise ValueError(
                 f"column {column!r} of {name} must hold numbers, got "
-                f"{validation.shown(bad)}; repair the file or name another column."
+                f"{validation.shown(values[row : row + 1].tolist())} in row {row}, counted "
+                "from 0 below the names; repair the file or name another column."
             )
         found.append(values.astype(np.float64))
     table = np.stack(found, axis=1)
@@ -331,7 +340,21 @@ def _is_number(value: Any) -> bool:
         float(value)
     except (TypeError, ValueError):
         return False
-    return not isinstance(value, str)
+    return True
+
+
+def _read_csv(path: Path) -> Any:
+    """A frame from a CSV file, whatever separates its columns."""
+    import pandas as pd
+
+    with path.open(errors="replace") as file:
+        head, first = file.readline(), file.readline()
+    separator = max((",", ";", "\t"), key=head.count)
+    comma = separator != "," and "," in first and "." not in first
+    frame = pd.read_csv(
+        path, sep=separator, decimal="," if comma else ".", skipinitialspace=True
+    )
+    return frame.rename(columns=lambda name: str(name).strip())
 
 
 def _first_line(error: Exception) -> str:

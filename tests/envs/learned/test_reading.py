@@ -56,9 +56,26 @@ def test_files_are_read_as_frames_are(kind: str, tmp_path: Path) -> None:
     assert several.episodes.tolist() == [0] * 49 + [1] * 49
 
 
+@pytest.mark.parametrize(
+    ("separator", "decimal"), [(";", "."), ("\t", "."), (";", ","), (", ", ".")]
+)
+def test_columns_may_be_separated_in_other_ways(
+    separator: str, decimal: str, tmp_path: Path
+) -> None:
+    frame, path = table(), tmp_path / "run.csv"
+    lines = [separator.join(frame.columns)]
+    for row in frame.to_numpy():
+        lines.append(separator.join(repr(float(v)).replace(".", decimal) for v in row))
+    path.write_text("\n".join(lines) + "\n")
+    found = Transitions.from_csv(path, **COLUMNS)
+    np.testing.assert_array_equal(
+        found.states, Transitions.from_frame(frame, **COLUMNS).states
+    )
+
+
 def test_a_gap_in_time_ends_a_run() -> None:
     frame = table().drop(index=[20, 21])
-    with pytest.warns(DataWarning, match="there are 1 gaps in time"):
+    with pytest.warns(DataWarning, match="there is 1 gap in time"):
         data = Transitions.from_frame(frame, **COLUMNS, time="t")
     assert len(data) == 46
     assert np.bincount(data.episodes).tolist() == [19, 27]
@@ -93,7 +110,14 @@ def test_rows_may_be_steps_already() -> None:
     ("change", "columns", "message"),
     [
         (lambda f: f.rename(columns={"u": "v"}), {}, "must have a column 'u', got"),
-        (lambda f: f.assign(u="on"), {}, "column 'u' of the frame must hold numbers"),
+        (lambda f: f.assign(u="on"), {}, r"must hold numbers, got \['on'\] in row 0"),
+        (
+            lambda f: f.assign(u=["0.5"] * 7 + ["off"] * 43),
+            {},
+            r"column 'u' of the frame must hold numbers, got \['off'\] in row 7",
+        ),
+        (lambda f: f, {"input": ["omega"]}, r"got \['omega'\] as both"),
+        (lambda f: f, {"sampling_time": -1.0}, "sampling_time must lie in"),
         (lambda f: f.assign(omega=np.nan), {}, r"must be finite, got .* in row 0"),
         (lambda f: f.iloc[::-1], {"time": "t"}, "must increase"),
         (lambda f: pd.concat([f, f]), {"time": "t"}, "must increase"),

@@ -20,7 +20,7 @@ from acl_gym.experiments.comparison.tasks import tuned
 from acl_gym.experiments.methods import make_agent
 from acl_gym.experiments.names import GROWING
 from acl_gym.experiments.study import Study
-from acl_gym.model_based.learning_run import FIRST_ROUNDS, GROWTH
+from acl_gym.model_based.arguments import FIRST_ROUNDS, GROWTH
 
 Row = dict[str, Any]
 

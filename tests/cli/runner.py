@@ -80,3 +80,10 @@ class Corridor(gym.Env):
 
 gym.register("Corridor-v0", entry_point=Corridor, max_episode_steps=80)
 """
+
+STARTED = (
+    "import signal; signal.signal(signal.SIGINT, signal.default_int_handler);"
+    "signal.signal(signal.SIGTERM, signal.SIG_DFL);"
+    "from acl_gym.cli import main; main()"
+)
+"""Python's own handlers, as in a terminal; a shell may have set to ignore a signal."""

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from acl_gym.cli.design import EXAMPLES, _free_folder, example
-from tests.cli.runner import figures, invoke, refused, run
+from tests.cli.runner import STARTED, figures, invoke, refused, run
 
 # A mass on a line is brought to rest; learned in a second.
 PLANT = """
@@ -187,17 +187,20 @@ def test_a_plant_that_fails_while_learning_is_one_line_and_1() -> None:
 @pytest.mark.skipif(sys.platform == "win32", reason="sends a signal")
 def test_ctrl_c_keeps_the_best_so_far(tmp_path: Path) -> None:
     plant()
-    command = [sys.executable, "-m", "acl_gym", "design", "mass.py", "--out", "kept"]
+    command = [sys.executable, "-c", STARTED, "design", "mass.py", "--out", "kept"]
     process = subprocess.Popen(
         [*command, "--steps", "100000000"],
         stderr=subprocess.PIPE,
         text=True,
     )
-    # A line every five seconds says that there is a policy.
-    while "learning, " not in (line := process.stderr.readline()):
-        assert line, "it has ended"
-    process.send_signal(signal.SIGINT)
-    _, words = process.communicate(timeout=60)
+    try:
+        # A line every five seconds says that there is a policy.
+        while "learning, " not in (line := process.stderr.readline()):
+            assert line, "it has ended"
+        process.send_signal(signal.SIGINT)
+        _, words = process.communicate(timeout=60)
+    finally:
+        process.kill()
     assert process.returncode == 130, words
     assert "interrupted" in words.splitlines()[-1]
     assert "best controller so far is in kept" in words

@@ -17,18 +17,11 @@ import pytest
 
 from acl_gym import ACL
 from acl_gym.cli.agents import load_agent
-from tests.cli.runner import MODULE, PENDULUM, figures, invoke, refused
+from tests.cli.runner import MODULE, PENDULUM, STARTED, figures, invoke, refused
 
 RUN = ["train", PENDULUM, "--ants", "10", "--cells", "6,7", "--evaluate-every", "3"]
 RUN += ["--agent", "acl"]
 CHANGING = ["--param", "epsilon=linear:0.5:0.01:8", "--param", "alpha=harmonic:3:20"]
-
-STARTED = (
-    "import signal; signal.signal(signal.SIGINT, signal.default_int_handler);"
-    "signal.signal(signal.SIGTERM, signal.SIG_DFL);"
-    "from acl_gym.cli import main; main()"
-)
-"""Python's own handlers, as in a terminal; a shell may have set to ignore a signal."""
 
 SLOW = (
     MODULE.replace("import gymnasium", "import time\nimport gymnasium")

@@ -14,7 +14,7 @@ from acl_gym.evaluation import evaluate_policy_cost
 from acl_gym.utils import validation
 from acl_gym.utils.typing import FloatArray, Predictor
 
-LEAST_CHUNK, MOST_CHUNK = 4_000, 20_000
+LEAST_CHUNK, MOST_CHUNK = 4_000, 6_000
 """Steps of all ants in the model between two evaluations of the policy: as many as the
 table has pairs, within these ends."""
 

@@ -81,8 +81,9 @@ def learn_from_plant(
         model: further arguments of `LearnedVectorEnv`, such as `regressor`, `pessimism`
             or `uncertain`.
         model_steps: the most steps of all ants in the model in a round, >= 1. None takes
-            five for each pair of a cell and an action, but 20,000 at least and 100,000 at
-            most. A round ends earlier if the policy no longer becomes better.
+            five for each pair of a cell and an action, but 20,000 at least and 30,000 at
+            most; with four state variables or more, 100,000 are better. A round ends
+            earlier if the policy no longer becomes better.
         data: what was recorded of this plant before. The colony learns from it before
             the first interaction.
         folder: where every interaction is written down as soon as it was made, and the

@@ -14,12 +14,8 @@ from acl_gym.evaluation import evaluate_policy_cost
 from acl_gym.utils import validation
 from acl_gym.utils.typing import FloatArray, Predictor
 
-LEAST_CHUNK, MOST_CHUNK = 4_000, 6_000
-"""Steps of all ants in the model between two evaluations of the policy: as many as the
-table has pairs, within these ends."""
-
 CHUNKS = 5
-"""Evaluations in a round, unless the number of steps is given."""
+"""Evaluations of the policy in a round that does not end early."""
 
 PATIENCE = 2
 """Evaluations in a row without a better policy, after which a round ends."""
@@ -72,25 +68,23 @@ class Improving:
             self.best = kind.load(best_file).policy
 
     def improve(
-        self, model: LearnedVectorEnv, states: FloatArray, most_steps: int | None
+        self, model: LearnedVectorEnv, states: FloatArray, most_steps: int
     ) -> int:
         """Learn in a model.
 
         Args:
             model: it may be another one each time.
             states: from which policies are compared, `(n, n_variables)`.
-            most_steps: after how many steps learning ends in any case; None: after
-                `CHUNKS` evaluations.
+            most_steps: after how many steps learning ends in any case.
 
         Returns:
             The steps of all ants.
         """
         self._enter(model)
         self.cost = np.inf if self.best is None else self._cost(self.best, states)
-        done, in_vain, chunk = 0, 0, self._chunk()
-        most = CHUNKS * chunk if most_steps is None else most_steps
-        while done < most and in_vain < PATIENCE:
-            chunk = min(chunk, most - done)
+        done, in_vain = 0, 0
+        while done < most_steps and in_vain < PATIENCE:
+            chunk = min(-(-most_steps // CHUNKS), most_steps - done)
             self.agent.learn(total_timesteps=chunk)
             done += chunk
             policy = getattr(self.agent, "policy", None)
@@ -118,11 +112,6 @@ class Improving:
             self._model.set_system(model.system, model.parameters)
             model = self._model
         self._model = model
-
-    def _chunk(self) -> int:
-        """Enough steps to come to each pair once, on the average, if there are few."""
-        pairs = getattr(self.agent, "table", np.empty(0)).size
-        return min(max(LEAST_CHUNK, int(pairs)), MOST_CHUNK)
 
     def _made(self, model: LearnedVectorEnv) -> Any:
         made = self._make(model)  # type: ignore[misc]

@@ -70,7 +70,7 @@ class LearningRun:
         initial: Any,
         max_episode_steps: int | None,
         model: dict[str, Any] | None,
-        model_steps: int | None,
+        model_steps: int,
         data: Transitions | None,
         folder: str | os.PathLike[str] | None,
         seed: int | None,
@@ -83,9 +83,7 @@ class LearningRun:
         self._ends = round_ends(rounds, self.interactions)
         if data is not None and self._ends[0] > 0:
             self._ends = [0, *self._ends]
-        if model_steps is not None:
-            model_steps = validation.integer("model_steps", model_steps, at_least=1)
-        self._model_steps = model_steps
+        self._model_steps = validation.integer("model_steps", model_steps, at_least=1)
         explore = validation.number("explore", explore, at_least=0, at_most=1)
         hold = validation.integer("hold", hold, at_least=1)
         if restart_after is not None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import math
 import time
@@ -173,7 +174,9 @@ def _measured(learned: Learned, env: Any, folder: Path, seed: int) -> _Measured:
         model = model_facts(env, responses)
         figures["model"] = draw_spread(learned.policy, env)
     for name, figure in figures.items():
-        figure.savefig(folder / f"{name}.png", dpi=pictures.DPI)
+        buffer = io.BytesIO()
+        figure.savefig(buffer, format="png", dpi=pictures.DPI)
+        files.write_atomically(folder / f"{name}.png", buffer.getvalue())
     return _Measured(
         measure(responses, system),
         _robustness(learned.policy, env, starts, seed),

@@ -10,6 +10,7 @@ from gymnasium import spaces
 from gymnasium.vector import VectorEnv
 
 from acl_gym.envs.control.lookup import system_of
+from acl_gym.envs.learned.description import rows_of_inputs
 from acl_gym.utils import validation
 from acl_gym.utils.boxes import declared_bounds
 from acl_gym.utils.typing import FloatArray
@@ -105,13 +106,7 @@ def grid_of_inputs(env: Any, inputs: Any) -> FloatArray | None:
         lines = [np.linspace(*ends, VALUES) for ends in zip(low, high, strict=True)]
         grid = np.meshgrid(*lines, indexing="ij")
         return np.stack(grid, axis=-1).reshape(-1, len(lines))
-    array = validation.real_array("inputs", inputs)
-    array = array[:, None] if array.ndim == 1 else array
-    if array.ndim != 2 or array.shape[1] != space.shape[0]:
-        raise ValueError(
-            f"inputs must hold a row of {space.shape[0]} numbers for each action, got "
-            f"shape {array.shape}."
-        )
+    array = rows_of_inputs(inputs, space.shape[0])
     if ((array < space.low) | (array > space.high)).any():
         raise ValueError(
             f"inputs must lie within the actions of the environment, {space}, got "

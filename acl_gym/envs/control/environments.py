@@ -394,7 +394,7 @@ class ControlVectorEnv(VectorEnv[Observation, Any, NDArray[Any]]):
         return {**self.parameters, **values}
 
     def _made_anew(self, num_envs: int, parameters: dict[str, Any]) -> Self:
-        made = type(self)(
+        made = self._constructed(
             num_envs,
             max_episode_steps=self.max_episode_steps,
             autoreset_mode=self.autoreset_mode,
@@ -404,6 +404,10 @@ class ControlVectorEnv(VectorEnv[Observation, Any, NDArray[Any]]):
         made._np_random = copy.deepcopy(self._np_random)
         made._np_random_seed = self._np_random_seed
         return made
+
+    def _constructed(self, num_envs: int, **arguments: Any) -> Self:
+        """Another environment of this class."""
+        return type(self)(num_envs, **arguments)
 
     def _slots_to_restart(self) -> IntArray | None:
         """The finished slots that this step must reset, None if there are none."""

@@ -230,3 +230,23 @@ def _rows(name: str, values: Any, n_inputs: int) -> tuple[tuple[float, ...], ...
             f"{array.shape}."
         )
     return tuple(map(tuple, array.tolist()))
+
+
+def rows_of_inputs(inputs: Any, n_inputs: int) -> FloatArray:
+    """Return what each action sets, `(n_actions, n_inputs)`.
+
+    Args:
+        inputs: these rows, or a number for each action.
+        n_inputs: numbers in a row.
+
+    Raises:
+        ValueError: they are none.
+    """
+    array = validation.real_array("inputs", inputs)
+    array = array[:, None] if array.ndim == 1 else array
+    if array.ndim != 2 or array.shape[1] != n_inputs:
+        raise ValueError(
+            f"inputs must hold a row of {n_inputs} numbers for each action, got shape "
+            f"{array.shape}."
+        )
+    return array

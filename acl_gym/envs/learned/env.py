@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 import warnings
 from typing import Any, Self
 
@@ -10,6 +9,7 @@ import numpy as np
 from gymnasium.vector import AutoresetMode
 
 from acl_gym.envs.control.environments import ControlVectorEnv
+from acl_gym.envs.learned.description import rows_of_inputs
 from acl_gym.envs.learned.dynamics import LearnedDynamics
 from acl_gym.envs.learned.features import periods_of, variable_ends
 from acl_gym.envs.learned.outcomes import LearnedCost, LearnedGoal, can_be_learned
@@ -226,21 +226,12 @@ class LearnedVectorEnv(ControlVectorEnv):
             )
         return np.ascontiguousarray(rows.T), np.ascontiguousarray(inputs[chosen].T)
 
-    def _made_anew(self, num_envs: int, parameters: dict[str, Any]) -> Self:
+    def _constructed(self, num_envs: int, **arguments: Any) -> Self:
         """Nothing is learned again."""
         made = type(self).__new__(type(self))
         made.transitions = self.transitions
         made.learned_goal, made.learned_cost = self.learned_goal, self.learned_cost
-        ControlVectorEnv.__init__(
-            made,
-            num_envs,
-            max_episode_steps=self.max_episode_steps,
-            autoreset_mode=self.autoreset_mode,
-            render_mode=self.render_mode,
-            **parameters,
-        )
-        made._np_random = copy.deepcopy(self._np_random)
-        made._np_random_seed = self._np_random_seed
+        ControlVectorEnv.__init__(made, num_envs, **arguments)
         return made
 
 
@@ -248,14 +239,7 @@ def _inputs(inputs: Any, transitions: Transitions) -> Any:
     """The inputs of each action, `(n_actions, n_inputs)`."""
     known = transitions.description
     if inputs is not None:
-        array = validation.real_array("inputs", inputs)
-        array = array[:, None] if array.ndim == 1 else array
-        if array.ndim != 2 or array.shape[1] != len(known.input_names):
-            raise ValueError(
-                f"inputs must hold a row of {len(known.input_names)} numbers for each "
-                f"action, got shape {array.shape}."
-            )
-        return array
+        return rows_of_inputs(inputs, len(known.input_names))
     if known.values is not None:
         return np.array(known.values)
     found = np.unique(transitions.inputs, axis=0)

@@ -141,6 +141,9 @@ class LearnedSystem(Plant):
         reached: BoolArray,
     ) -> None:
         """One sampling time; see `ControlSystem.advance`."""
+        if self._learned_cost is None and self.pessimism == 0.0:
+            super().advance(states, actions, uniforms, rewards, reached)
+            return
         before = states[: self.low.size].copy()
         super().advance(states, actions, uniforms, rewards, reached)
         inputs = self.inputs.T[:, actions]

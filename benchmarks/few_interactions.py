@@ -315,7 +315,7 @@ def _parser() -> argparse.ArgumentParser:
         type=_at_least(1),
         metavar="N",
         help="steps after which learn_from_plant resets the plant (default: 10 or 40 on "
-        "the pendulum, elsewhere the limit of its episodes)",
+        "the pendulum, 40 on the navigation, elsewhere the limit of its episodes)",
     )
     add(
         "--seeds",

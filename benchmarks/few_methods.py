@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
-from few_plants import Measured, NAVIGATION, PENDULUM, PlantTask  # isort: skip  # beside this one
+from few_plants import Measured, NAVIGATION, PENDULUM, PlantTask, ROUNDS  # isort: skip  # beside this one
 
 from acl_gym import ACL, QLearning, ReturningACL, learn_from_plant
 from acl_gym.agents.suitable import suitable_deposit
@@ -99,7 +99,7 @@ def run_model(
         task.plant(),
         agent,
         marks[-1],
-        rounds=rounds_of(marks),
+        rounds=rounds_of(task, marks),
         restart_after=task.steps_of_a_run,
         seed=seed,
         callback=lambda learning, row: record.judge(
@@ -108,10 +108,10 @@ def run_model(
     )
 
 
-def rounds_of(marks: Sequence[int]) -> list[int]:
+def rounds_of(task: PlantTask, marks: Sequence[int]) -> list[int]:
     """The usual rounds of learn_from_plant, and one at each mark."""
-    ends = list(FIRST_ROUNDS)
-    while ends[-1] < marks[-1]:
+    ends = list(ROUNDS.get(task.env_id, FIRST_ROUNDS))
+    while task.env_id not in ROUNDS and ends[-1] < marks[-1]:
         ends.append(int(ends[-1] * GROWTH) + 1)
     return sorted({*marks, *(end for end in ends if end < marks[-1])})
 

@@ -34,8 +34,16 @@ VALUES = 5
 
 EVALUATION_SEED = 12_345
 
-_RESTARTS = {(PENDULUM, "anywhere"): 10, (PENDULUM, "rest"): 40}
+_RESTARTS = {
+    (PENDULUM, "anywhere"): 10,
+    (PENDULUM, "rest"): 40,
+    (NAVIGATION, "anywhere"): 40,
+}
 """After how many steps learn_from_plant resets a plant."""
+
+
+ROUNDS = {NAVIGATION: (200, 400, 700)}
+"""Interactions after which the colony learns in a model, where that takes long."""
 
 
 @dataclass(frozen=True)

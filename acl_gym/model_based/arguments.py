@@ -25,6 +25,10 @@ VALUES = 5
 """Values of each continuous input, if none are given."""
 
 
+MODEL_STEPS, MOST_MODEL_STEPS = 20_000, 300_000
+"""Steps in the model in a round: with two variables, and with many."""
+
+
 def check_plant(env: Any) -> None:
     """Refuse what is no environment, before anything is asked of it.
 
@@ -79,6 +83,11 @@ def episode_steps(env: Any, given: int | None) -> int:
     )
     known = next((limit for limit in limits if limit is not None and limit > 0), 300)
     return int(known)
+
+
+def usual_model_steps(n_variables: int) -> int:
+    """The most steps of all ants in a round, if nothing is said."""
+    return min(MODEL_STEPS * 4 ** max(n_variables - 2, 0), MOST_MODEL_STEPS)
 
 
 def grid_of_inputs(env: Any, inputs: Any) -> FloatArray | None:

@@ -28,6 +28,7 @@ from acl_gym.model_based.arguments import (
     grid_of_inputs,
     round_ends,
     task_of,
+    usual_model_steps,
 )
 from acl_gym.model_based.improving import Improving
 from acl_gym.model_based.journal import AGENT, BEST, STATE, Journal
@@ -70,7 +71,7 @@ class LearningRun:
         initial: Any,
         max_episode_steps: int | None,
         model: dict[str, Any] | None,
-        model_steps: int,
+        model_steps: int | None,
         data: Transitions | None,
         folder: str | os.PathLike[str] | None,
         seed: int | None,
@@ -83,7 +84,9 @@ class LearningRun:
         self._ends = round_ends(rounds, self.interactions)
         if data is not None and self._ends[0] > 0:
             self._ends = [0, *self._ends]
-        self._model_steps = validation.integer("model_steps", model_steps, at_least=1)
+        if model_steps is not None:
+            model_steps = validation.integer("model_steps", model_steps, at_least=1)
+        self._model_steps = model_steps
         explore = validation.number("explore", explore, at_least=0, at_most=1)
         hold = validation.integer("hold", hold, at_least=1)
         if restart_after is not None:
@@ -281,11 +284,10 @@ class LearningRun:
                 self._improving.restore(*files, self._model)
         model: LearnedVectorEnv = self._model
         states = self._compared(model)
-        steps = self._improving.improve(
-            model,
-            states,
-            self._model_steps if most_steps is None else most_steps,
-        )
+        if most_steps is None:
+            usual = usual_model_steps(model.system.low.size)
+            most_steps = self._model_steps or usual
+        steps = self._improving.improve(model, states, most_steps)
         self._runner.policy = self._improving.best
         self._seconds += time.perf_counter() - began
         row: Row = {

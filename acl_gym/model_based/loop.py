@@ -30,7 +30,7 @@ def learn_from_plant(
     initial: Any = None,
     max_episode_steps: int | None = None,
     model: dict[str, Any] | None = None,
-    model_steps: int = 20_000,
+    model_steps: int | None = None,
     data: Transitions | None = None,
     folder: str | os.PathLike[str] | None = None,
     asynchronous: bool = False,
@@ -80,9 +80,10 @@ def learn_from_plant(
         max_episode_steps: T in the model; None takes the limit of `env`, or 300.
         model: further arguments of `LearnedVectorEnv`, such as `regressor`, `pessimism`
             or `uncertain`.
-        model_steps: the most steps of all ants in the model in a round, >= 1. A round
-            ends earlier if two fifths of them brought no better policy. With four state
-            variables, 100,000 are better.
+        model_steps: the most steps of all ants in the model in a round, >= 1. None takes
+            20,000 with one or two state variables, four times as many with each more,
+            but at most 300,000. A round ends earlier if two fifths of them brought no
+            better policy.
         data: what was recorded of this plant before. The colony learns from it before
             the first interaction.
         folder: where every interaction is written down as soon as it was made, and the

@@ -14,7 +14,6 @@ from acl_gym.envs.learned.gaussian_process import (
     Posterior,
     Scales,
     certainty_of,
-    first_scales,
     search_scales,
 )
 from acl_gym.envs.learned.line import Output, add_leverage, add_lines
@@ -186,7 +185,6 @@ class Fit:
     ) -> None:
         # Before threads are limited: only libraries that are loaded are told.
         import sklearn.ensemble
-        import sklearn.gaussian_process
         import sklearn.neighbors  # noqa: F401
         from threadpoolctl import threadpool_limits
 
@@ -225,9 +223,7 @@ class Fit:
                 search_scales(
                     each.rows,
                     each.targets,
-                    [first_scales(n_features)]
-                    if begin is None
-                    else [first_scales(n_features), begin.scales[number]],
+                    [] if begin is None else [begin.scales[number]],
                 )
                 for number, each in enumerate(outputs)
             ]

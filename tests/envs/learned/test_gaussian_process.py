@@ -13,7 +13,7 @@ from acl_gym.envs.learned.gaussian_process import (
     Posterior,
     Scales,
     certainty_of,
-    first_scales,
+    log_likelihood,
     search_scales,
     spread_evenly,
 )
@@ -158,11 +158,49 @@ def test_draws_have_the_mean_and_the_deviation_of_the_posterior() -> None:
     np.testing.assert_allclose(values.std(axis=0), deviation, rtol=0.2, atol=0.05)
 
 
+@settings(max_examples=20, deadline=None)
+@given(st.integers(2, 20), st.integers(1, 4), SEEDS)
+def test_the_likelihood_is_that_of_scikit_learn(
+    n: int, n_features: int, seed: int
+) -> None:
+    from sklearn.gaussian_process import GaussianProcessRegressor
+    from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
+
+    rows, targets, scales = data(n, n_features, seed)
+    kernel = ConstantKernel(scales.amplitude) * RBF(scales.lengths)
+    other = GaussianProcessRegressor(
+        kernel + WhiteKernel(scales.noise), optimizer=None, alpha=1e-9
+    ).fit(rows, targets)
+    logarithms = np.log([scales.amplitude, *scales.lengths, scales.noise])
+    expected = other.log_marginal_likelihood(other.kernel_.theta, eval_gradient=True)
+    found = log_likelihood(logarithms, rows, targets)
+    np.testing.assert_allclose(found[0], expected[0], rtol=1e-5, atol=1e-5)
+    np.testing.assert_allclose(found[1], expected[1], rtol=1e-4, atol=1e-4)
+
+
+def test_equal_rows_do_not_make_the_likelihood_singular() -> None:
+    rows = np.zeros((500, 1))
+    found, gradient = log_likelihood(np.log([1e4, 1.0, 1e-7]), rows, np.arange(500.0))
+    assert np.isfinite(found)
+    assert np.isfinite(gradient).all()
+
+
+def test_inputs_of_few_values_do_not_become_cases_of_their_own() -> None:
+    """There is a second top of the likelihood at lengths far below their distance."""
+    rng = np.random.default_rng(0)
+    rows = np.column_stack(
+        [rng.uniform(-2, 2, (300, 2)), rng.integers(-1, 2, (300, 2)) * 1.2]
+    )
+    targets = np.exp(-rows[:, 0] ** 2) * rows[:, 1] + 0.1 * rows[:, 2] * rows[:, 0]
+    found = search_scales(rows, targets / targets.std())
+    assert found.lengths[2:].min() > 2.0
+
+
 def test_the_search_finds_which_feature_matters() -> None:
     rng = np.random.default_rng(0)
     rows = rng.uniform(-2, 2, (60, 3))
     targets = np.sin(3 * rows[:, 1]) * np.sqrt(2)
-    found = search_scales(rows, targets, [first_scales(3)])
+    found = search_scales(rows, targets)
     assert found.lengths[1] < 1.0
     assert min(found.lengths[0], found.lengths[2]) > 10 * found.lengths[1]
     assert found.noise < 1e-3

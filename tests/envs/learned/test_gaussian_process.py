@@ -191,7 +191,7 @@ def test_inputs_of_few_values_do_not_become_cases_of_their_own() -> None:
     rows = np.column_stack(
         [rng.uniform(-2, 2, (300, 2)), rng.integers(-1, 2, (300, 2)) * 1.2]
     )
-    targets = np.exp(-rows[:, 0] ** 2) * rows[:, 1] + 0.1 * rows[:, 2] * rows[:, 0]
+    targets = np.exp(-(rows[:, 0] ** 2)) * rows[:, 1] + 0.1 * rows[:, 2] * rows[:, 0]
     found = search_scales(rows, targets / targets.std())
     assert found.lengths[2:].min() > 2.0
 

@@ -42,7 +42,7 @@ _RESTARTS = {
 """After how many steps learn_from_plant resets a plant."""
 
 
-ROUNDS = {NAVIGATION: (200, 400, 700)}
+ROUNDS = {NAVIGATION: (300, 600)}
 """Interactions after which the colony learns in a model, where that takes long."""
 
 

@@ -14,11 +14,12 @@ from acl_gym.evaluation import evaluate_policy_cost
 from acl_gym.utils import validation
 from acl_gym.utils.typing import FloatArray, Predictor
 
-CHUNKS = 5
-"""Evaluations of the policy in a round that does not end early."""
+CHUNKS, LEAST_CHUNK = 15, 4_000
+"""Evaluations of the policy in a round that does not end early, and the least steps
+between two of them."""
 
-PATIENCE = 2
-"""Evaluations in a row without a better policy, after which a round ends."""
+PATIENCE = 0.4
+"""The share of the steps of a round that may bring no better policy before it ends."""
 
 ALIKE = 0.1
 """Two models may differ by this share of the deviation of a step's change, and what ants
@@ -83,15 +84,16 @@ class Improving:
         self._enter(model)
         self.cost = np.inf if self.best is None else self._cost(self.best, states)
         done, in_vain = 0, 0
-        while done < most_steps and in_vain < PATIENCE:
-            chunk = min(-(-most_steps // CHUNKS), most_steps - done)
+        each = max(-(-most_steps // CHUNKS), LEAST_CHUNK)
+        while done < most_steps and in_vain < PATIENCE * most_steps:
+            chunk = min(each, most_steps - done)
             self.agent.learn(total_timesteps=chunk)
             done += chunk
             policy = getattr(self.agent, "policy", None)
             # A policy of another package changes with its agent; there is no copy.
             snapshot = policy if isinstance(self.agent, TabularAgent) else self.agent
             cost = self._cost(snapshot, states)
-            in_vain = 0 if cost < (1.0 - BETTER) * self.cost else in_vain + 1
+            in_vain = 0 if cost < (1.0 - BETTER) * self.cost else in_vain + chunk
             if cost <= self.cost or snapshot is self.agent:
                 self.best, self.cost = snapshot, cost
                 if self._best_file is not None and hasattr(self.agent, "save"):

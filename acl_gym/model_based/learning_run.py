@@ -22,6 +22,7 @@ from acl_gym.envs.learned import (
     Transitions,
 )
 from acl_gym.envs.learned.regression import LEAST_STEPS
+from acl_gym.envs.learned.system import LearnedSystem
 from acl_gym.model_based.arguments import (
     check_plant,
     episode_steps,
@@ -34,6 +35,8 @@ from acl_gym.model_based.improving import Improving
 from acl_gym.model_based.journal import AGENT, BEST, STATE, Journal
 from acl_gym.model_based.plant_runner import PlantRunner
 from acl_gym.model_based.result import PlantLearning
+from acl_gym.partitions.around_goal import partition_around_goal
+from acl_gym.partitions.grid import Fuzzy
 from acl_gym.utils import validation
 from acl_gym.utils.files import write_atomically
 from acl_gym.utils.typing import FloatArray, Row
@@ -43,8 +46,9 @@ logger = logging.getLogger("acl_gym")
 ANTS = 50
 """Slots of the model."""
 
-COMPARED = 100
-"""States from which policies are compared in the model."""
+COMPARED, MORE_COMPARED = 100, 300
+"""States from which policies are compared in the model: with up to two variables, and
+with more, where few would make the choice a matter of luck."""
 
 Callback = Callable[[PlantLearning, Row], Any] | None
 
@@ -313,9 +317,11 @@ class LearningRun:
         Half of them where the plant has begun, from where it will be asked again.
         """
         rng, system = np.random.default_rng(0), model.system
-        anywhere = system.sample_states(rng, COMPARED // 2).T[:, : system.low.size]
+        n_variables = system.low.size
+        half = (COMPARED if n_variables <= 2 else MORE_COMPARED) // 2
+        anywhere = system.sample_states(rng, half).T[:, :n_variables]
         begun = system.variables(model.transitions.starts)
-        begun = begun[rng.integers(len(begun), size=COMPARED // 2)]
+        begun = begun[rng.integers(len(begun), size=half)]
         return np.concatenate([anywhere, np.clip(begun, system.low, system.high)])
 
     def _fitted(
@@ -388,4 +394,21 @@ def default_agent(
     """
     # Steps in a model are cheap: fewer walks back make more of them in the same time.
     chosen: dict[str, Any] = {"walks_back": 10, **settings}
-    return lambda model: ReturningACL(model, seed=seed, **chosen)
+
+    def make(model: Any) -> ReturningACL:
+        cells = None if "partition" in chosen else cells_of_goal(model)
+        own = {} if cells is None else {"partition": cells}
+        return ReturningACL(model, seed=seed, **own, **chosen)
+
+    return make
+
+
+def cells_of_goal(model: Any) -> Fuzzy | None:
+    """Cells for the goal of a model, where a grid that grows would be too coarse."""
+    system = getattr(model, "system", None)
+    if not isinstance(system, LearnedSystem) or system.goal_box is None:
+        return None
+    known = system.dynamics.description
+    if known.circular or known.shown_angles.pairs:
+        return None  # what is observed are not the variables of the goal
+    return partition_around_goal(system.low, system.high, *system.goal_box)

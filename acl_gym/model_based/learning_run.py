@@ -396,9 +396,10 @@ def default_agent(
     chosen: dict[str, Any] = {"walks_back": 10, **settings}
 
     def make(model: Any) -> ReturningACL:
-        cells = None if "partition" in chosen else cells_of_goal(model)
-        own = {} if cells is None else {"partition": cells}
-        return ReturningACL(model, seed=seed, **own, **chosen)
+        own = dict(chosen)
+        if own.get("partition") is None:
+            own["partition"] = cells_of_goal(model)
+        return ReturningACL(model, seed=seed, **own)
 
     return make
 

@@ -145,7 +145,9 @@ def move(
         for k in range(d):
             old = x[i, d + k]
             new = w * old + u[i, k]
-            new = min(max(new, -limit[k]), limit[k])
+            # Not min and max, which may make a number of NaN.
+            new = limit[k] if new > limit[k] else new
+            new = -limit[k] if new < -limit[k] else new
             x[i, d + k] = new
             x[i, k] += old if literal else new
         for k in range(d):

@@ -111,7 +111,7 @@ def search_space(bounds: Any) -> SearchSpace:
         )
     lower, upper = array.T.copy()
     ordered = (lower <= upper) & (lower < np.inf) & (upper > -np.inf)  # NaN neither
-    with np.errstate(over="ignore"):
+    with np.errstate(over="ignore", invalid="ignore"):
         ordered &= np.isfinite(upper - lower) | np.isinf(lower) | np.isinf(upper)
     if not ordered.all():
         k = int(np.flatnonzero(~ordered)[0])

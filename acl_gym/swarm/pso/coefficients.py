@@ -47,7 +47,7 @@ Inertia = ArrayLike | Callable[[int], ArrayLike]
 
 
 def of_each_particle(
-    name: str, values: Any, n: int, *, at_least: float | None = None
+    name: str, values: Any, n: int, *, at_least: float = -math.inf
 ) -> FloatArray:
     """Return a parameter as one finite number for each particle, `(n,)`.
 
@@ -55,7 +55,7 @@ def of_each_particle(
         name: what the parameter is called in the error message.
         values: a number, or `(n,)` numbers (Definition 6.8).
         n: number of particles.
-        at_least: the least that is allowed; None: any number.
+        at_least: the least that is allowed.
 
     Raises:
         ValueError: `values` are neither, or out of range.

@@ -158,9 +158,7 @@ def move(
             if lower[k] <= x[i, k] <= upper[k]:
                 continue
             if boundary == REFLECT:
-                x[i, k], x[i, d + k] = mirror(
-                    x[i, k], x[i, d + k], lower[k], upper[k]
-                )
+                x[i, k], x[i, d + k] = mirror(x[i, k], x[i, d + k], lower[k], upper[k])
                 finite &= math.isfinite(x[i, k])
             else:
                 x[i, k] = min(max(x[i, k], lower[k]), upper[k])

@@ -99,7 +99,9 @@ class Landscape(Environment):
         self.velocity_limit = _limits(velocity_limit, self.space.d)
         self.order = validation.one_of("order", order, ORDERS)
         # Bad points are found at once, not when the run begins.
-        self.space.initial_positions(self.n_particles, self.x0, np.random.default_rng(0))
+        self.space.initial_positions(
+            self.n_particles, self.x0, np.random.default_rng(0)
+        )
 
     @property
     def positions(self) -> FloatArray:

@@ -253,13 +253,22 @@ class _Search:
 
     def row(self) -> tuple[int, float, float]:
         """What the history holds of an iteration."""
-        positions: FloatArray = self.landscape.positions
-        squares = (positions - positions.mean(axis=0)) ** 2
         return (
             self.landscape.objective.evaluations,
             float(self.agents.best_values.min()),
-            math.sqrt(squares.sum(axis=1).mean()),
+            _spread(self.landscape.positions),
         )
+
+
+def _spread(positions: FloatArray) -> float:
+    """The root mean square distance of points from their centre."""
+    # Scaled, because squares overflow long before positions do.
+    scale = float(np.abs(positions).max())
+    if scale == 0.0:
+        return 0.0
+    scaled = positions / scale
+    squares = (scaled - scaled.mean(axis=0)) ** 2
+    return scale * math.sqrt(squares.sum(axis=1).mean())
 
 
 def _channel_of(topology: Any) -> Channel:

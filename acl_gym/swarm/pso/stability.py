@@ -27,6 +27,7 @@ Common arguments:
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -66,7 +67,9 @@ def second_moment_matrix(
         + square * np.kron(random, random)
     )
     # Of (theta theta, theta nu, nu theta, nu nu) the middle two are equal.
-    return np.column_stack([full[[0, 1, 3], 0], full[[0, 1, 3], 1:3].sum(1), full[[0, 1, 3], 3]])
+    return np.column_stack(
+        [full[[0, 1, 3], 0], full[[0, 1, 3], 1:3].sum(1), full[[0, 1, 3], 3]]
+    )
 
 
 def spectral_radius(
@@ -252,7 +255,7 @@ def _moments_of_c(cognitive: float, social: float) -> tuple[float, float]:
     return mean, VARIANCE * (c1 * c1 + c2 * c2) + mean * mean
 
 
-def _matrix_of(moment: int) -> object:
+def _matrix_of(moment: int) -> Callable[[float, float, float, str], FloatArray]:
     if moment not in (1, 2):
         raise ValueError(
             f"moment must be 1, the means, or 2, the means of products, got "

@@ -93,7 +93,9 @@ def swarm(
 
     def move(i: int, known: list[tuple[float, list[float]]], r: Any) -> None:
         senders = hears[i]
-        lbest = known[min(senders, key=lambda j: known[j][0])][1] if senders else pbest[i]
+        lbest = (
+            known[min(senders, key=lambda j: known[j][0])][1] if senders else pbest[i]
+        )
         theta[i], nu[i] = moved(
             theta[i],
             nu[i],

@@ -22,7 +22,9 @@ def both(kernel: Any) -> tuple[Any, Any]:
 
 
 @given(SEEDS, st.integers(1, 7), st.integers(1, 5))
-def test_personal_bests_are_replaced_by_better_points(seed: int, n: int, d: int) -> None:
+def test_personal_bests_are_replaced_by_better_points(
+    seed: int, n: int, d: int
+) -> None:
     rng = np.random.default_rng(seed)
     values = rng.choice([0.0, 1.0, 2.0, math.inf], n)
     old = rng.choice([0.0, 1.0, 2.0, math.inf], n)
@@ -46,9 +48,7 @@ def test_local_bests_are_those_heard_if_they_are_worth_something(
     for kernel in both(kernels.choose_local_best):
         chosen = np.full(n, 99)
         kernel(sender, heard, chosen)
-        expected = [
-            int(j) if j >= 0 and heard[j] != math.inf else -1 for j in sender
-        ]
+        expected = [int(j) if j >= 0 and heard[j] != math.inf else -1 for j in sender]
         assert chosen.tolist() == expected
 
 

@@ -116,9 +116,9 @@ def test_radii_are_broadcast() -> None:
 
 def simulated(
     n: int, steps: int, order: str, seed: int, *, w: float, c1: float, c2: float
-) -> tuple[np.ndarray, np.ndarray]:
-    """Mean and fourth-order sample of positions of n particles whose bests stand still:
-    theta_pbest = 1, theta_lbest = -2, from theta = 3 with nu = -0.5."""
+) -> np.ndarray:
+    """The positions of n particles whose bests stand still, step by step: theta_pbest = 1
+    and theta_lbest = -2, from theta = 3 and nu = -0.5."""
     rng = np.random.default_rng(seed)
     x = np.tile([3.0, -0.5], (n, 1))
     free = np.array([math.inf])
@@ -175,9 +175,7 @@ def test_simulated_swarms_have_these_moments(
     ).all()
 
 
-@given(
-    st.floats(-0.8, 0.8), st.floats(0.1, 3.0), st.floats(0.1, 3.0), st.floats(-5, 5)
-)
+@given(st.floats(-0.8, 0.8), st.floats(0.1, 3.0), st.floats(0.1, 3.0), st.floats(-5, 5))
 def test_moments_settle_where_the_theory_says(
     w: float, c1: float, c2: float, p: float
 ) -> None:
@@ -200,7 +198,11 @@ def test_moments_settle_where_the_theory_says(
     [
         (lambda: largest_acceleration(1.0), ValueError, "inertia must lie in"),
         (lambda: largest_acceleration(0.5, moment=3), ValueError, "moment must be 1"),
-        (lambda: largest_acceleration(0.5, order="new"), ValueError, "order must be one"),
+        (
+            lambda: largest_acceleration(0.5, order="new"),
+            ValueError,
+            "order must be one",
+        ),
         (lambda: largest_acceleration(0.5, share=1.5), ValueError, "share must lie in"),
         (lambda: spectral_radius(0.5, -1.0, 1.0), ValueError, "cognitive must lie in"),
         (lambda: spectral_radius(math.nan, 1.0, 1.0), ValueError, "inertia"),

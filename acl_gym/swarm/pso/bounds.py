@@ -39,6 +39,25 @@ class SearchSpace:
         """The number of variables."""
         return self.lower.size
 
+    def initial_velocities(
+        self, positions: FloatArray, rng: np.random.Generator
+    ) -> FloatArray:
+        """Return half the way from each position to a point drawn within the bounds.
+
+        Args:
+            positions: `(n, d)`.
+            rng: draws the points, uniformly.
+
+        Returns:
+            `(n, d)`; 0 for variables whose bounds are not finite.
+        """
+        finite = np.isfinite(self.upper - self.lower)
+        lower, width = self.lower[finite], (self.upper - self.lower)[finite]
+        velocities = np.zeros(positions.shape)
+        points = lower + width * rng.random((len(positions), lower.size))
+        velocities[:, finite] = 0.5 * (points - positions[:, finite])
+        return velocities
+
     def initial_positions(
         self, n: int, x0: ArrayLike | None, rng: np.random.Generator
     ) -> FloatArray:

@@ -43,7 +43,9 @@ class Landscape(Environment):
             where every particle begins.
         n_particles: N, >= 1.
         x0: where the first particle begins, `(d,)`, or the first m, `(m, d)`; the others
-            begin uniformly distributed within the bounds. All begin at rest.
+            begin uniformly distributed within the bounds. All begin with half the way to
+            another such point as their velocity, which is 0 for variables whose bounds
+            are not finite: a particle at rest that hears nobody would never move.
         inertia: w, the share of its velocity that a particle keeps: a number, one for
             each particle, or a function of k = 0, 1, .. that returns either, such as
             `acl_gym.Linear(0.9, 0.4, 1000)`.
@@ -114,10 +116,11 @@ class Landscape(Environment):
         return self.x[:, self.space.d :]
 
     def reset(self, rng: np.random.Generator) -> None:
-        """Draw initial positions; see `Environment.reset`."""
-        n, d = self.n_particles, self.space.d
-        self.x = np.zeros((n, 2 * d))
-        self.x[:, :d] = self.space.initial_positions(n, self.x0, rng)
+        """Draw initial positions and velocities; see `Environment.reset`."""
+        positions = self.space.initial_positions(self.n_particles, self.x0, rng)
+        velocities = self.space.initial_velocities(positions, rng)
+        limit = self.velocity_limit
+        self.x = np.hstack([positions, np.clip(velocities, -limit, limit)])
         self.iteration = 0
 
     def observe(self) -> dict[str, FloatArray]:

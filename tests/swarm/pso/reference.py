@@ -87,7 +87,8 @@ def swarm(
     n, d = len(hears), lower.size
     share = rng.random((n, d))
     theta = [list(lower + (upper - lower) * share[i]) for i in range(n)]
-    nu = [[0.0] * d for _ in range(n)]
+    point = lower + (upper - lower) * rng.random((n, d))
+    nu = [[(point[i][k] - theta[i][k]) / 2 for k in range(d)] for i in range(n)]
     pbest = [list(each) for each in theta]
     value = [float(function(np.array(each))) for each in theta]
 

@@ -17,20 +17,25 @@ from acl_gym.swarm.pso.benchmark_functions import sphere
 UNIT = [(-1.0, 1.0)] * 2
 
 
-def at_rest(landscape: Landscape, seed: int = 0) -> Landscape:
+def begun(landscape: Landscape, seed: int = 0) -> Landscape:
+    """A landscape whose particles are where they begin."""
     landscape.reset(np.random.default_rng(seed))
     return landscape
 
 
-def test_particles_begin_at_rest_within_the_bounds() -> None:
-    landscape = at_rest(Landscape(sphere, [(-3, -2), (1, 1), (5, 9)], n_particles=500))
-    theta = landscape.positions
+def test_particles_begin_within_the_bounds_on_their_way_to_another_point() -> None:
+    bounds = [(-3, -2), (1, 1), (5, 9)]
+    landscape = begun(Landscape(sphere, bounds, n_particles=500))
     assert landscape.x.shape == (500, 6)
-    assert not landscape.velocities.any()
-    assert (theta[:, 1] == 1.0).all()
-    for k, (low, high) in enumerate([(-3, -2), (1, 1), (5, 9)]):
-        assert low <= theta[:, k].min() <= theta[:, k].max() <= high
-        assert np.ptp(theta[:, k]) >= 0.9 * (high - low)
+    theta, nu = landscape.positions, landscape.velocities
+    for points in (theta, theta + 2 * nu):
+        assert (points[:, 1] == 1.0).all()
+        for k, (low, high) in enumerate(bounds):
+            assert low <= points[:, k].min() <= points[:, k].max() <= high
+            assert np.ptp(points[:, k]) >= 0.9 * (high - low)
+    assert abs(np.corrcoef(theta[:, 0], (theta + 2 * nu)[:, 0])[0, 1]) < 0.2
+    slow = begun(Landscape(sphere, bounds, n_particles=500, velocity_limit=0.25))
+    assert np.array_equal(slow.velocities, np.clip(nu, -0.25, 0.25))
 
 
 def test_scipy_bounds_are_bounds() -> None:
@@ -43,12 +48,13 @@ def test_scipy_bounds_are_bounds() -> None:
 def test_the_first_particles_begin_where_they_are_told() -> None:
     points = [[0.5, -0.5], [0.25, 1.0]]
     for x0, m in ((points[0], 1), (points, 2)):
-        landscape = at_rest(Landscape(sphere, UNIT, n_particles=4, x0=x0))
+        landscape = begun(Landscape(sphere, UNIT, n_particles=4, x0=x0))
         assert np.array_equal(landscape.positions[:m], np.atleast_2d(x0))
         assert (np.abs(landscape.positions) <= 1).all()
     free = [(-math.inf, math.inf)] * 2
-    landscape = at_rest(Landscape(sphere, free, n_particles=2, x0=points))
+    landscape = begun(Landscape(sphere, free, n_particles=2, x0=points))
     assert landscape.positions.tolist() == points
+    assert not landscape.velocities.any()
 
 
 def test_observations_are_values_and_positions_and_nobody_shares_arrays() -> None:
@@ -60,7 +66,7 @@ def test_observations_are_values_and_positions_and_nobody_shares_arrays() -> Non
         points[:] = 9.0  # its own copy
         return values
 
-    landscape = at_rest(Landscape(function, UNIT, n_particles=3))
+    landscape = begun(Landscape(function, UNIT, n_particles=3))
     before = landscape.x.copy()
     first, second = landscape.observe(), landscape.observe()
     assert np.array_equal(landscape.x, before)
@@ -80,7 +86,7 @@ def test_a_function_may_return_the_same_array_each_time() -> None:
         memory[:] = points[:, 0]
         return memory
 
-    landscape = at_rest(Landscape(function, UNIT, n_particles=3))
+    landscape = begun(Landscape(function, UNIT, n_particles=3))
     first = landscape.observe()["value"]
     kept = first.copy()
     memory[:] = 5.0
@@ -93,7 +99,7 @@ def test_nan_counts_as_infinity_with_one_warning(vectorized: bool) -> None:
         return np.where(points[..., 0] > 0, math.nan, points[..., 0])
 
     landscape = Landscape(function, UNIT, n_particles=50, vectorized=vectorized)
-    at_rest(landscape)
+    begun(landscape)
     with pytest.warns(RuntimeWarning, match=r"returned NaN at \[0\.") as caught:
         values = [landscape.observe()["value"] for _ in range(2)]
     assert len(caught) == 1
@@ -112,19 +118,19 @@ def test_inertia_may_change_with_the_iteration_and_the_particle() -> None:
         landscape = Landscape(
             sphere, [(-9, 9)], n_particles=2, x0=[[0.0], [0.0]], inertia=inertia
         )
-        at_rest(landscape)
+        begun(landscape)
         landscape.velocities[:] = 1.0
         for row in expected:
             landscape.step(np.zeros((2, 1)), np.random.default_rng(0))
             assert landscape.velocities[:, 0].tolist() == row
-        at_rest(landscape)
+        begun(landscape)
         assert landscape.iteration == 0
 
 
 def test_the_velocity_limit_may_differ_between_variables() -> None:
     landscape = Landscape(sphere, [(-9, 9)] * 2, n_particles=1, velocity_limit=[0.5, 2])
-    at_rest(landscape)
-    landscape.step(np.array([[-3.0, 3.0]]), np.random.default_rng(0))
+    begun(landscape)
+    landscape.step(np.array([[-9.0, 9.0]]), np.random.default_rng(0))
     assert landscape.velocities.tolist() == [[-0.5, 2.0]]
 
 
@@ -143,7 +149,7 @@ def test_what_bounds_do_to_position_and_velocity(
     landscape = Landscape(
         sphere, UNIT, n_particles=1, x0=[0.5, 0.0], boundary=boundary, inertia=0.0
     )
-    at_rest(landscape)
+    begun(landscape)
     landscape.step(np.array([[1.0, 0.25]]), np.random.default_rng(0))
     assert landscape.x.tolist() == [[position, 0.25, velocity, 0.25]]
 
@@ -293,7 +299,7 @@ def test_what_functions_may_not_return(
     function: Any, vectorized: bool, message: str
 ) -> None:
     landscape = Landscape(function, UNIT, n_particles=4, vectorized=vectorized)
-    at_rest(landscape)
+    begun(landscape)
     with pytest.raises(ValueError, match=message):
         landscape.observe()
 
@@ -311,7 +317,7 @@ def test_what_functions_may_not_return(
 )
 def test_what_functions_may_return(function: Any, vectorized: bool) -> None:
     landscape = Landscape(function, UNIT, n_particles=4, vectorized=vectorized)
-    at_rest(landscape)
+    begun(landscape)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         values = landscape.observe()["value"]
@@ -321,6 +327,6 @@ def test_what_functions_may_return(function: Any, vectorized: bool) -> None:
 
 
 def test_inputs_of_another_shape_are_refused() -> None:
-    landscape = at_rest(Landscape(sphere, UNIT, n_particles=4))
+    landscape = begun(Landscape(sphere, UNIT, n_particles=4))
     with pytest.raises(ValueError, match=r"u must have the shape \(4, 2\).*\(2, 4\)"):
         landscape.step(np.zeros((2, 4)), np.random.default_rng(0))

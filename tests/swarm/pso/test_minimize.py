@@ -350,11 +350,14 @@ def test_the_history() -> None:
 
 
 def test_one_particle_searches_alone() -> None:
-    """It starts at rest at its own best: nothing attracts it, in any topology."""
+    """Its own best is all that attracts it, in any topology."""
     for topology in ("global", "ring", "von_neumann", Radius(1.0)):
-        found = quickly(n_particles=1, topology=topology, max_iterations=20)
+        found = quickly(
+            n_particles=1, topology=topology, max_iterations=20, history=True
+        )
         assert found.nfev == 21
         assert found.success
+        assert found.fun < found.history["fun"][0]
 
 
 def test_fixed_variables_stay_and_the_others_are_optimized() -> None:

@@ -100,12 +100,11 @@ def mirror(
     if math.isinf(width):  # there is one wall
         wall = lower if position < lower else upper
         return wall - (position - wall), -velocity
-    turns = math.floor((position - lower) / width)
-    rest = (position - lower) - turns * width
-    rest = min(max(rest, 0.0), width)  # rounding
-    if turns % 2.0 == 0.0:
+    # After two reflections everything repeats.
+    rest = (position - lower) % (2.0 * width)
+    if rest <= width:
         return min(lower + rest, upper), velocity
-    return max(upper - rest, lower), -velocity
+    return max(upper - (rest - width), lower), -velocity
 
 
 @njit(error_model="numpy")

@@ -3,7 +3,8 @@
 - The order of (6.1) as printed explodes, on Sphere in 30 variables without bounds.
 - Which inertia and acceleration are stable: means, variances, and the printed order.
 - The standard deviation of a particle whose bests stand still: exact, and simulated.
-- Which topology finds what: median values after some evaluations, on five functions.
+- Which topology, and which boundary, finds what: median values after some evaluations,
+  on five functions.
 """
 
 from __future__ import annotations
@@ -31,6 +32,7 @@ from acl_gym.swarm.pso.benchmark_functions import (
     BENCHMARK_FUNCTIONS,
     BenchmarkFunction,
 )
+from acl_gym.swarm.pso.bounds import BOUNDARIES
 from acl_gym.utils import validation
 
 OUT = Path(__file__).parent.parent / "docs" / "figures"
@@ -144,10 +146,49 @@ def topologies(seeds: int) -> list[dict[str, Any]]:
                 "topology": name,
                 "nfev": runs[0]["nfev"],
                 "values": values,
+                "stuck": float((values[:, -1] > 0.01).mean()),
                 "medians": [float(np.median(values[:, each])) for each in at],
             }
         )
     return rows
+
+
+def boundaries(seeds: int) -> list[dict[str, Any]]:
+    """Best values of global swarms, for each function and kind of boundary."""
+    rows = []
+    cases = list(itertools.product(BENCHMARK_FUNCTIONS, BOUNDARIES))
+    for function, boundary in tqdm(cases, disable=None):
+        problem = BENCHMARK_FUNCTIONS[function]
+        values = [
+            minimize(
+                problem.function,
+                problem.bounds(VARIABLES),
+                max_evaluations=60_000,
+                seed=seed,
+                topology="global",
+                boundary=boundary,
+            ).fun
+            for seed in range(seeds)
+        ]
+        rows.append(
+            {
+                "function": function,
+                "boundary": boundary,
+                "median": float(np.median(values)),
+                "worst": max(values),
+            }
+        )
+    return rows
+
+
+def table(title: str, key: str, rows: list[dict[str, Any]]) -> None:
+    """Print values by function and one thing more, as Markdown."""
+    names = list(dict.fromkeys(row[key] for row in rows))
+    print(f"\n{title}\n\n| function | {' | '.join(names)} |")
+    print(f"| --- |{' ---: |' * len(names)}")
+    for function in BENCHMARK_FUNCTIONS:
+        cells = [f"{r['value']:.2g}" for r in rows if r["function"] == function]
+        print(f"| {function.capitalize()} | {' | '.join(cells)} |")
 
 
 def draw(
@@ -264,13 +305,14 @@ def main() -> None:
         for moment, order in itertools.product((1, 2), ("standard", "literal"))
     ]
     rows = topologies(options.seeds)
+    walls = boundaries(2 * options.seeds)
     if options.json:
-        table = [
-            {key: row[key] for key in ("function", "topology", "medians")}
+        medians = [
+            {key: row[key] for key in ("function", "topology", "medians", "stuck")}
             for row in rows
         ]
-        found = {"spread": last, "largest_acceleration": bounds, "topologies": table}
-        print(json.dumps(found))
+        found = {"spread": last, "largest_acceleration": bounds, "topologies": medians}
+        print(json.dumps({**found, "boundaries": walls}))
         return
     print(f"spread after {ITERATIONS:,} iterations, median")
     for name, value in last.items():
@@ -279,16 +321,16 @@ def main() -> None:
     for each in bounds:
         print(f"  moment {each['moment']}, {each['order']}: {each['bound']:.4f}")
     for place, mark in enumerate(MARKS):
-        print(f"\nMedian of the best value after {mark:,} evaluations\n")
-        print(f"| function | {' | '.join(TOPOLOGIES)} |")
-        print(f"| --- |{' ---: |' * len(TOPOLOGIES)}")
-        for function in BENCHMARK_FUNCTIONS:
-            cells = [
-                f"{row['medians'][place]:.2g}"
-                for row in rows
-                if row["function"] == function
-            ]
-            print(f"| {function} | {' | '.join(cells)} |")
+        title = f"Median of the best value after {mark:,} evaluations"
+        placed = [{**row, "value": row["medians"][place]} for row in rows]
+        table(title, "topology", placed)
+    for row in rows:
+        if row["function"] == "ackley":
+            print(f"Ackley, {row['topology']}: {row['stuck']:.0%} end above 0.01")
+    for measure in ("median", "worst"):
+        title = f"Boundaries: {measure} of {2 * options.seeds} runs"
+        placed = [{**row, "value": row[measure]} for row in walls]
+        table(title, "boundary", placed)
     options.out.mkdir(parents=True, exist_ok=True)
     draw(spreads, rows, 0, options.out / "particle_swarms.png")
 

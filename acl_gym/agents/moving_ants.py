@@ -25,7 +25,6 @@ inputs and messages only. `acl_gym.swarm.run` then learns the same pheromone, to
 
 from __future__ import annotations
 
-from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -74,17 +73,17 @@ class Inputs(NamedTuple):
     Attributes:
         ants: those that act, `(m,)`.
         actions: what they do, `(m,)`.
-        index: the cells for which they chose it, `(m, k)`, where the process decays the
+        cells: those for which they chose it, `(m, k)`, where the process decays the
             pheromone.
-        degree: their degrees, `(m, k)`.
+        degrees: of these cells, `(m, k)`.
         asks: which ants ask for the global update, `(n,)`.
         solutions: the trajectories of all ants, along which they then walk back.
     """
 
     ants: IntArray
     actions: IntArray
-    index: CellArray
-    degree: FloatArray
+    cells: CellArray
+    degrees: FloatArray
     asks: BoolArray
     solutions: Solutions
 
@@ -164,27 +163,16 @@ class Ants(DynamicAgents):
             # The table keeps the probabilities that follow from levels and exponents.
             y.pheromone.alpha = ACL.alpha.at(self, self._trial)
             y.pheromone.beta = ACL.beta.at(self, self._trial)
+            allowed = y.allowed
+            if self.tabu:
+                allowed = self.solutions.untried(ants, index, allowed)
+            epsilon = ACL.epsilon.at(self, self._trial)
             actions = choose_actions(
-                self.selection,
-                y.pheromone,
-                index,
-                degree,
-                ACL.epsilon.at(self, self._trial),
-                rng,
-                self._allowed(ants, index),
+                self.selection, y.pheromone, index, degree, epsilon, rng, allowed
             )
             self.solutions.append(ants, y.state, index, actions)
         asks = self._all_done | (not in_time)
         return Inputs(ants, actions, index, degree, asks, self.solutions)
-
-    def _allowed(self, ants: IntArray, index: CellArray) -> BoolArray | None:
-        """U(x_c) without what is tabu."""
-        allowed = self._seen.allowed
-        if not self.tabu:
-            return allowed
-        if allowed is None:
-            allowed = np.ones((ants.size, self.n_actions), np.bool_)
-        return self.solutions.untried(ants, index, allowed)
 
 
 class StigmergyEnvironment(Environment):
@@ -241,15 +229,7 @@ class StigmergyEnvironment(Environment):
         self.trials = validation.integer("trials", trials, at_least=1)
         self._rollout = Rollout(colony.rollout.env, colony.max_steps)
         self._levels = colony.table.copy()
-        first = colony.pheromone
-        self._new_pheromone = partial(
-            Pheromone,
-            *self._levels.shape,
-            first.tau0,
-            first.alpha,
-            first.heuristic,
-            first.beta,
-        )
+        self._tau0, self._heuristic = colony.tau0, colony.heuristic
         self._first_trial = colony.trials
         self._update = as_update(colony.update)
         self._local_decay = colony.local_decay
@@ -258,9 +238,13 @@ class StigmergyEnvironment(Environment):
 
     def reset(self, rng: np.random.Generator) -> None:
         """Begin the first trial with the initial pheromone."""
-        self.pheromone = self._new_pheromone()
+        n_cells, n_actions = self._levels.shape
+        # The ants set the exponents, which are a part of their selection rule.
+        self.pheromone = Pheromone(
+            n_cells, n_actions, self._tau0, alpha=1.0, heuristic=self._heuristic
+        )
         self.pheromone.set_levels(self._levels)
-        self._rule = watched(as_update(self._update), self._levels.shape[1])
+        self._rule = watched(as_update(self._update), n_actions)
         self.costs: list[FloatArray] = []
         self._begin_trial(rng)
 
@@ -292,7 +276,7 @@ class StigmergyEnvironment(Environment):
         elif u.ants.size:
             self._take_in(self._rollout.move(u.actions))
             self._rule.local_update(
-                self.pheromone, u.index, u.degree, u.actions, self._local_decay
+                self.pheromone, u.cells, u.degrees, u.actions, self._local_decay
             )
 
     @property

@@ -17,6 +17,10 @@ from acl_gym.utils import validation
 from acl_gym.utils.typing import FloatArray
 
 
+class ExplosionError(OverflowError):
+    """A position or velocity of a swarm is larger than a float can hold."""
+
+
 class Landscape(Environment):
     """Particles that move through a fitness landscape F(theta), §6.3.2.
 
@@ -149,7 +153,7 @@ class Landscape(Environment):
 
         Raises:
             ValueError: `u` is of another shape.
-            OverflowError: a position or a velocity is no longer finite.
+            ExplosionError: a position or a velocity is no longer finite.
         """
         if u.shape != (self.n_particles, self.space.d):
             raise ValueError(
@@ -173,7 +177,7 @@ class Landscape(Environment):
             u: their inputs, one row for each, C order.
 
         Raises:
-            OverflowError: a position or a velocity is no longer finite.
+            ExplosionError: a position or a velocity is no longer finite.
         """
         finite = kernels.move(
             self.x[rows],
@@ -186,7 +190,7 @@ class Landscape(Environment):
             self.order == "literal",
         )
         if not finite:
-            raise OverflowError(
+            raise ExplosionError(
                 "positions and velocities must stay finite, but the swarm has exploded: "
                 f"in iteration {self.iteration} one of them is larger than a float can "
                 "hold; use order='standard', a smaller inertia or acceleration "

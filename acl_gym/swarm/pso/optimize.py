@@ -14,7 +14,7 @@ from acl_gym.swarm.channel import Channel
 from acl_gym.swarm.inbox import Inbox
 from acl_gym.swarm.pso.agents import ParticleSwarm
 from acl_gym.swarm.pso.coefficients import ACCELERATION, INERTIA, Inertia
-from acl_gym.swarm.pso.landscape import Landscape
+from acl_gym.swarm.pso.landscape import ExplosionError, Landscape
 from acl_gym.swarm.topologies import Everyone, Ring, VonNeumann
 from acl_gym.utils import validation
 from acl_gym.utils.typing import FloatArray
@@ -141,39 +141,35 @@ def minimize(
         target = validation.number("target", target)
     if tolerance is not None:
         tolerance = validation.number("tolerance", tolerance, at_least=0)
+    if callback is not None and not callable(callback):
+        raise TypeError(
+            "callback must be a function of an OptimizeResult, got "
+            f"{validation.shown(callback)}."
+        )
+    history = validation.flag("history", history)
     if not isinstance(seed, np.random.Generator):
         seed = np.random.default_rng(validation.seed(seed))
 
     search.begin(seed)
     rows = [search.row()] if history else []
     exploded = False
-    message = ""
-    while not message:
-        if search.reaches(target):
-            message = "The target was reached."
-        elif search.agrees(tolerance):
-            message = "All personal bests lie within the tolerance."
-        elif search.nit == iterations:
-            message = f"All {iterations} iterations were made."
-        else:
-            try:
-                search.iterate(seed)
-            except OverflowError as error:
-                message, exploded = str(error), True
-                continue
-            if history:
-                rows.append(search.row())
-            if callback is not None and _stops(callback, search.result()):
-                message = "The callback has ended the search."
+    while not (message := search.end(iterations, target, tolerance)):
+        try:
+            search.iterate(seed)
+        except ExplosionError as error:
+            message, exploded = str(error), True
+            break
+        if history:
+            rows.append(search.row())
+        if callback is not None and _stops(callback, search.result()):
+            message = "The callback has ended the search."
+            break
     result = search.result()
-    result.success = bool(
-        math.isfinite(result.fun)
-        and (target is None or result.fun <= target)
-        and not exploded
-    )
-    if not math.isfinite(result.fun):
+    found = math.isfinite(result.fun)
+    if not found:
         message += f" No point with a finite value was found: fun is {result.fun}."
     result.message = message
+    result.success = found and not exploded and (target is None or result.fun <= target)
     if history:
         names = ("nfev", "fun", "spread")
         result.history = {
@@ -230,16 +226,21 @@ class _Search:
             landscape.move(rows, u)
             agents.remember(rows, landscape.evaluate(rows))
 
-    def reaches(self, target: float | None) -> bool:
-        """Whether the best value is as low as asked for."""
-        return target is not None and bool(self.agents.best_values.min() <= target)
-
-    def agrees(self, tolerance: float | None) -> bool:
-        """Whether all personal bests are as good as each other."""
-        if tolerance is None:
-            return False
+    def end(
+        self, iterations: int, target: float | None, tolerance: float | None
+    ) -> str:
+        """Say why the search is over, or nothing."""
         values = self.agents.best_values
-        return bool(values.max() <= values.min() + tolerance < math.inf)
+        if target is not None and values.min() <= target:
+            return "The target was reached."
+        if (
+            tolerance is not None
+            and values.max() <= values.min() + tolerance < math.inf
+        ):
+            return "All personal bests lie within the tolerance."
+        if self.nit == iterations:
+            return f"All {iterations} iterations were made."
+        return ""
 
     def result(self) -> OptimizeResult:
         """The best point so far."""

@@ -19,9 +19,9 @@ sampling distribution of particle swarm optimizers during stagnation", IEEE Tran
 on Evolutionary Computation 13, 2009), with |w| < 1 and c1 + c2 > 0 in both.
 
 Common arguments:
-    inertia: w, any real number.
-    cognitive: c1, >= 0.
-    social: c2, >= 0.
+    inertia: w, in [-1e6, 1e6].
+    cognitive: c1, in [0, 1e6].
+    social: c2, in [0, 1e6].
     order: `"standard"` or `"literal"`, see `acl_gym.swarm.pso.landscape.Landscape`.
 """
 
@@ -40,6 +40,9 @@ from acl_gym.utils.typing import FloatArray
 
 MEAN, VARIANCE = 1 / 2, 1 / 12
 """Of a number that is uniform on [0, 1]."""
+
+MOST = 1e6
+"""The largest coefficient; squares of larger ones may not fit into a float."""
 
 
 def mean_matrix(
@@ -67,9 +70,8 @@ def second_moment_matrix(
         + square * np.kron(random, random)
     )
     # Of (theta theta, theta nu, nu theta, nu nu) the middle two are equal.
-    return np.column_stack(
-        [full[[0, 1, 3], 0], full[[0, 1, 3], 1:3].sum(1), full[[0, 1, 3], 3]]
-    )
+    rows = full[[0, 1, 3]]
+    return np.column_stack([rows[:, 0], rows[:, 1] + rows[:, 2], rows[:, 3]])
 
 
 def spectral_radius(
@@ -206,17 +208,17 @@ def position_moments(
         Mean and variance at the steps 0 to `steps`.
 
     Raises:
-        ValueError: an argument is out of range.
+        ValueError: an argument is out of range, or a moment larger than a float can hold.
         TypeError: `steps` is not an integer.
     """
     steps = validation.integer("steps", steps, at_least=0)
     fixed, random = _recursion(inertia, order)
-    c1 = validation.number("cognitive", cognitive, at_least=0)
-    c2 = validation.number("social", social, at_least=0)
-    p = validation.number("personal_best", personal_best)
+    c1, c2 = _accelerations(cognitive, social)
     g = validation.number("local_best", local_best)
+    # Seen from the local best: squares of large coordinates would hide the variance.
+    p = validation.number("personal_best", personal_best) - g
     start = [
-        validation.number("position", position),
+        validation.number("position", position) - g,
         validation.number("velocity", velocity),
         1.0,
     ]
@@ -224,33 +226,46 @@ def position_moments(
     d, of_p, of_q = np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((3, 3))
     d[:2, :2], d[2, 2] = fixed, 1.0
     receives = random[:, 0]  # which of theta and nu the attraction enters
-    for matrix, c, best in ((of_p, c1, p), (of_q, c2, g)):
+    for matrix, c, best in ((of_p, c1, p), (of_q, c2, 0.0)):
         matrix[:2, 0] = -c * receives
         matrix[:2, 2] = c * best * receives
     mean = d + MEAN * (of_p + of_q)
     moment = np.outer(start, start)
     means, variances = np.empty(steps + 1), np.empty(steps + 1)
     for step in range(steps + 1):
+        if not np.isfinite(moment).all():
+            raise ValueError(
+                f"steps must be fewer than {step}, got {steps}: the moments of a swarm "
+                "that is not stable are then larger than a float can hold."
+            )
         means[step] = moment[0, 2]
         variances[step] = moment[0, 0] - moment[0, 2] ** 2
-        moment = mean @ moment @ mean.T + VARIANCE * (
-            of_p @ moment @ of_p.T + of_q @ moment @ of_q.T
-        )
-    return Moments(means, np.maximum(variances, 0.0))
+        with np.errstate(over="ignore", invalid="ignore"):
+            moment = mean @ moment @ mean.T + VARIANCE * (
+                of_p @ moment @ of_p.T + of_q @ moment @ of_q.T
+            )
+    return Moments(means + g, np.maximum(variances, 0.0))
 
 
 def _recursion(inertia: float, order: str) -> tuple[FloatArray, FloatArray]:
     """A and B of z' = (A - C B) z, z = (theta, nu), for p = g = 0."""
-    w = validation.number("inertia", inertia)
+    w = validation.number("inertia", inertia, at_least=-MOST, at_most=MOST)
     if validation.one_of("order", order, ORDERS) == "standard":
         return np.array([[1.0, w], [0.0, w]]), np.array([[1.0, 0.0], [1.0, 0.0]])
     return np.array([[1.0, 1.0], [0.0, w]]), np.array([[0.0, 0.0], [1.0, 0.0]])
 
 
+def _accelerations(cognitive: float, social: float) -> tuple[float, float]:
+    """c1 and c2, checked."""
+    return (
+        validation.number("cognitive", cognitive, at_least=0, at_most=MOST),
+        validation.number("social", social, at_least=0, at_most=MOST),
+    )
+
+
 def _moments_of_c(cognitive: float, social: float) -> tuple[float, float]:
     """E[C] and E[C^2] of C = c1 r1 + c2 r2."""
-    c1 = validation.number("cognitive", cognitive, at_least=0)
-    c2 = validation.number("social", social, at_least=0)
+    c1, c2 = _accelerations(cognitive, social)
     mean = MEAN * (c1 + c2)
     return mean, VARIANCE * (c1 * c1 + c2 * c2) + mean * mean
 

@@ -1,12 +1,15 @@
-"""The programs of docs/particle-swarms.md do what their comments say."""
+"""The programs of docs/particle-swarms.md and of `minimize` do what they say."""
 
 from __future__ import annotations
 
+import doctest
 import re
 from pathlib import Path
 from typing import Any
 
 import pytest
+
+from acl_gym.swarm.pso import optimize
 
 PAGE = Path(__file__).resolve().parents[3] / "docs" / "particle-swarms.md"
 
@@ -25,3 +28,7 @@ def test_the_programs_run(capsys: pytest.CaptureFixture[str]) -> None:
     for call, value in promised:
         found = eval(call, names)
         assert (f"{found:.3f}" if isinstance(found, float) else str(found)) == value
+
+
+def test_the_example_of_the_docstring() -> None:
+    assert doctest.testmod(optimize) == (0, 2)

@@ -13,6 +13,7 @@ from scipy.optimize import Bounds
 from acl_gym.swarm import Inbox, Links, run
 from acl_gym.swarm.pso import Landscape, ParticleSwarm
 from acl_gym.swarm.pso.benchmark_functions import sphere
+from acl_gym.swarm.pso.landscape import ExplosionError
 
 UNIT = [(-1.0, 1.0)] * 2
 
@@ -163,7 +164,7 @@ def test_an_explosion_is_one_clear_error() -> None:
     landscape.step(np.ones((3, 1)), rng)
     for _ in range(154):
         landscape.step(np.zeros((3, 1)), rng)
-    with pytest.raises(OverflowError, match=r"stay finite.*in iteration 156 one"):
+    with pytest.raises(ExplosionError, match=r"stay finite.*in iteration 156 one"):
         landscape.step(np.zeros((3, 1)), rng)
 
 

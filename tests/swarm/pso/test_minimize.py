@@ -413,10 +413,15 @@ def test_nan_is_worse_than_all_and_warns_once() -> None:
 
 
 def test_errors_of_the_function_are_its_own() -> None:
-    def function(points: np.ndarray) -> np.ndarray:
-        raise ZeroDivisionError("mine")
+    calls = []
 
-    with pytest.raises(ZeroDivisionError, match="mine"):
+    def function(points: np.ndarray) -> np.ndarray:
+        calls.append(points)
+        if len(calls) == 3:
+            raise OverflowError("mine")
+        return sphere(points)
+
+    with pytest.raises(OverflowError, match="mine"):
         quickly(function=function)
 
 
@@ -437,6 +442,9 @@ def test_errors_of_the_function_are_its_own() -> None:
         ({"topology": "star"}, ValueError, "topology must be one of 'global', 'ring'"),
         ({"topology": 3}, TypeError, "or a Channel, such as Radius"),
         ({"topology": Nearest(40)}, ValueError, "k must be less than"),
+        ({"callback": 3}, TypeError, "callback must be a function of"),
+        ({"history": "yes"}, TypeError, "history must be"),
+        ({"vectorized": 2}, TypeError, "vectorized must be"),
         ({"update": "never"}, ValueError, "update must be one of"),
         ({"cognitive": [1.0, 2.0]}, ValueError, "one for each of the 40 agents"),
     ],

@@ -193,6 +193,23 @@ def test_moments_settle_where_the_theory_says(
     assert found.variance[-1] == pytest.approx(stationary[0], rel=1e-6, abs=1e-9)
 
 
+def test_moments_do_not_depend_on_where_zero_is() -> None:
+    here, there = (
+        position_moments(
+            0.7,
+            1.4,
+            1.2,
+            position=3.0 + offset,
+            personal_best=1.0 + offset,
+            local_best=-2.0 + offset,
+            steps=50,
+        )
+        for offset in (0.0, 2.0**40)
+    )
+    np.testing.assert_allclose(there.mean - 2.0**40, here.mean, atol=1e-3)
+    np.testing.assert_allclose(there.variance, here.variance, rtol=1e-12)
+
+
 @pytest.mark.parametrize(
     ("call", "error", "message"),
     [
@@ -206,6 +223,15 @@ def test_moments_settle_where_the_theory_says(
         (lambda: largest_acceleration(0.5, share=1.5), ValueError, "share must lie in"),
         (lambda: spectral_radius(0.5, -1.0, 1.0), ValueError, "cognitive must lie in"),
         (lambda: spectral_radius(math.nan, 1.0, 1.0), ValueError, "inertia"),
+        (lambda: spectral_radius(1e7, 1.0, 1.0), ValueError, "inertia must lie in"),
+        (lambda: is_stable(0.5, 1.0, 1e7), ValueError, "social must lie in"),
+        (
+            lambda: position_moments(
+                9, 1, 1, position=1, personal_best=0, local_best=0, steps=1_000
+            ),
+            ValueError,
+            r"steps must be fewer than \d\d\d, got 1000",
+        ),
         (lambda: spectral_radius([0.5, 0.6], [1, 2, 3], 1.0), ValueError, "shape"),
         (
             lambda: position_moments(

@@ -215,8 +215,8 @@ def test_particle_swarms() -> None:
         assert len(set(row["values"])) == 2
         # Everyone hears everyone: faster than on a ring.
         assert (row["median"] < 10.0) == (row["topology"] == "global")
-        assert row["rate"] > 0
     assert found["rank_tests"] == []
+    assert all(row["median"] > 0 for row in found["speed"])
     cases = [row["case"] for row in found["speed"]]
     assert cases[0] == "sphere, acl-gym"
     assert not any("pygmo" in case for case in cases)
@@ -241,8 +241,8 @@ def test_particle_swarms_of_peers(tmp_path: Path) -> None:
     assert set(found["versions"]) == {"pyswarms", "pygmo"}
     tests = {(test["topology"], test["peer"]) for test in found["rank_tests"]}
     assert len(tests) == len(found["rank_tests"]) == 4
-    for row in found["quality"]:
-        assert (row["median"] < 10.0) == (row["topology"] == "global")
+    for row in found["quality"]:  # some swarms of pyswarms stay at a bound
+        assert (min(row["values"]) < 10.0) == (row["topology"] == "global")
     assert list(tmp_path.iterdir()) == [], "pyswarms leaves no log behind"
 
 
@@ -252,7 +252,9 @@ def test_swarm_tunes_acl() -> None:
     )
     assert found["points"] == 4
     assert 0.0 <= found["tuned"]["epsilon"] <= 0.5
-    assert set(found["costs"]) == {"default", "middle of the range", "tuned"}
+    for row in found["fresh"]:
+        assert len(row["default"]) == len(row["tuned"]) == 2
+        assert min(row["tuned"]) >= 10.0 - 0.3, "the mean shortest path"
 
 
 def test_particle_swarm_figures(tmp_path: Path) -> None:

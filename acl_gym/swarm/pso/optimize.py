@@ -48,7 +48,7 @@ def minimize(
     inertia: Inertia = INERTIA,
     cognitive: ArrayLike = ACCELERATION,
     social: ArrayLike = ACCELERATION,
-    topology: str | Channel = "ring",
+    topology: str | Channel = "von_neumann",
     boundary: str = "reflect",
     velocity_limit: ArrayLike | None = None,
     order: str = "standard",
@@ -87,10 +87,10 @@ def minimize(
         cognitive: c1, >= 0, see `ParticleSwarm`.
         social: c2, >= 0, see `ParticleSwarm`.
         topology: who hears of whose best point: `"global"`, everyone of everyone's, which
-            is fast and settles soon; `"ring"`, each of the two beside it, and
-            `"von_neumann"`, each of the four beside it on a grid, which take longer and
-            find better minima where there are many; or any `Channel`, such as
-            `Radius(0.5)` or `Lossy(Ring(), 0.3)`.
+            is fast and settles soon; `"ring"`, each of the two beside it, which takes
+            longest and looks at most minima; `"von_neumann"`, each of the four beside it
+            on a grid (a ring if `n_particles` is prime), between the two; or any
+            `Channel`, such as `Radius(0.5)` or `Lossy(Ring(), 0.3)`.
         boundary: `"reflect"`, `"absorb"`, `"clip"` or `"none"`, see `Landscape`.
         velocity_limit: the largest absolute velocity, see `Landscape`.
         order: `"standard"`, or `"literal"` as (6.1) is printed, which explodes, see

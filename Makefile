@@ -3,7 +3,7 @@
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help install compare bench bench-peers peers-mushroom peers-pets test lint format build check-wheel clean distclean
+.PHONY: help install compare bench bench-peers peers-mushroom peers-pets peers-swarms test lint format build check-wheel clean distclean
 
 VENV := .venv
 BIN := $(VENV)/bin
@@ -15,6 +15,8 @@ MUSHROOM_VENV := .venv-mushroom
 MUSHROOM_STAMP := $(MUSHROOM_VENV)/.installed
 PETS_VENV := .venv-pets
 PETS_STAMP := $(PETS_VENV)/.installed
+SWARMS_VENV := .venv-swarms
+SWARMS_STAMP := $(SWARMS_VENV)/.installed
 
 # The first interpreter that works, is recent enough and can make an environment.
 PYTHON ?= $(shell for python in python3.11 python3; do \
@@ -94,6 +96,16 @@ $(PETS_STAMP): requirements.lock benchmarks/pets-requirements.txt
 	@$(PETS_VENV)/bin/python $(PIP_INSTALL) --no-deps --no-build-isolation -e .
 	@touch $@
 
+peers-swarms: $(STAMP) $(SWARMS_STAMP) ## Minimize with particle swarms of pyswarms and pygmo
+	PYTHONPATH=. $(SWARMS_VENV)/bin/python benchmarks/particle_swarms.py $(ARGS)
+
+$(SWARMS_STAMP): benchmarks/swarms-requirements.txt
+	@rm -rf $(SWARMS_VENV)
+	@$(BIN)/python -m venv $(SWARMS_VENV)
+	@echo "Installing pyswarms and pygmo into $(SWARMS_VENV): a minute, once"
+	@$(SWARMS_VENV)/bin/python $(PIP_INSTALL) -r benchmarks/swarms-requirements.txt
+	@touch $@
+
 test: $(STAMP) ## Run every test
 	$(BIN)/python -m pytest -n $(WORKERS) --dist worksteal $(ARGS)
 
@@ -126,4 +138,4 @@ clean: ## Remove builds and caches, including compiled kernels
 		-exec rm -rf {} +
 
 distclean: clean ## Remove .venv as well
-	rm -rf $(VENV) $(PEERS_VENV) $(MUSHROOM_VENV)
+	rm -rf $(VENV) $(PEERS_VENV) $(MUSHROOM_VENV) $(PETS_VENV) $(SWARMS_VENV)

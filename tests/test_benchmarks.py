@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import shutil
 import subprocess
 import sys
@@ -55,6 +56,18 @@ def test_double_bridge() -> None:
         "short": 0.0,
         "long": 1.0,
     }
+
+
+def test_moving_agents() -> None:
+    found = output_of("moving_agents.py")
+    for row in found["readings"].values():
+        assert row["measured"] == pytest.approx(row["factor"], abs=2e-3)
+    split, strict = found["readings"]["split"], found["readings"]["strict"]
+    assert split["centre_moved"] < 1e-14 < 1e-4 < strict["centre_moved"]
+    rows = {row["channel"]: row for row in found["channels"]}
+    everyone = rows["Everyone(include_self=True)"]
+    assert everyone["disagreement"] < 1e-12
+    assert rows["Radius(0.3, include_self=True)"]["disagreement"] > 0.1
 
 
 def test_aco_theory() -> None:
@@ -190,3 +203,63 @@ def test_changing_plants() -> None:
     assert kept["costs"][0] < 1.5 * kept["best"] < anew["costs"][0]
     assert kept["extra"] < anew["extra"]
     assert all(row["interactions"][-1] >= 10_000 for row in rows)
+
+
+def test_particle_swarms() -> None:
+    """Short searches, by acl-gym alone; peers have an environment of their own."""
+    chosen = ("--functions", "sphere", "--methods", "acl-gym", "as pygmo")
+    small = ("--seeds", "2", "--evaluations", "8000")
+    found = output_of("particle_swarms.py", *chosen, *small, *ONCE)
+    assert len(found["quality"]) == 2 * 2
+    for row in found["quality"]:
+        assert len(set(row["values"])) == 2
+        # Everyone hears everyone: faster than on a ring.
+        assert (row["median"] < 10.0) == (row["topology"] == "global")
+    assert found["rank_tests"] == []
+    assert all(row["median"] > 0 for row in found["speed"])
+    cases = [row["case"] for row in found["speed"]]
+    assert cases[0] == "sphere, acl-gym"
+    assert not any("pygmo" in case for case in cases)
+
+
+PEERS = FOLDER.parent / ".venv-swarms" / "bin" / "python"
+
+
+@pytest.mark.skipif(not PEERS.exists(), reason="needs .venv-swarms")
+def test_particle_swarms_of_peers(tmp_path: Path) -> None:
+    command = [str(PEERS), str(FOLDER / "particle_swarms.py"), "--json"]
+    small = ("--functions", "sphere", "--seeds", "2", "--evaluations", "8000")
+    done = subprocess.run(
+        [*command, *small, "--only", "quality"],
+        capture_output=True,
+        text=True,
+        check=True,
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(FOLDER.parent)},
+    )
+    found = json.loads(done.stdout)
+    assert set(found["versions"]) == {"pyswarms", "pygmo"}
+    tests = {(test["topology"], test["peer"]) for test in found["rank_tests"]}
+    assert len(tests) == len(found["rank_tests"]) == 4
+    for row in found["quality"]:  # some swarms of pyswarms stay at a bound
+        assert (min(row["values"]) < 10.0) == (row["topology"] == "global")
+    assert list(tmp_path.iterdir()) == [], "pyswarms leaves no log behind"
+
+
+def test_swarm_tunes_acl() -> None:
+    found = output_of(
+        "swarm_tunes_acl.py", "--iterations", "1", "--particles", "2", "--fresh", "2"
+    )
+    assert found["points"] == 4
+    assert 0.0 <= found["tuned"]["epsilon"] <= 0.5
+    for row in found["fresh"]:
+        assert len(row["default"]) == len(row["tuned"]) == 2
+        assert min(row["tuned"]) >= 10.0 - 0.3, "the mean shortest path"
+
+
+def test_particle_swarm_figures(tmp_path: Path) -> None:
+    found = output_of("particle_swarm_figures.py", "--seeds", "1")
+    assert found["spread"]["standard"] < 1.0
+    assert found["spread"]["as printed"] > 1e100
+    assert len(found["topologies"]) == 5 * 6
+    assert len(found["boundaries"]) == 5 * 4

@@ -1,0 +1,133 @@
+"""The minds of a particle swarm: personal bests, messages, attraction."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from acl_gym.swarm.inbox import Inbox
+from acl_gym.swarm.protocols import DynamicAgents
+from acl_gym.swarm.pso import kernels
+from acl_gym.swarm.pso.coefficients import ACCELERATION, of_each_particle
+from acl_gym.utils.typing import FloatArray
+
+
+class ParticleSwarm(DynamicAgents):
+    """The dynamic agents A_i of particle swarm optimization, §6.3.2.
+
+    Each remembers the best point that it has found, tells it to those who hear it, and
+    is attracted by it and by the best of those that it hears of:
+
+        u_i = c1 r1 (theta_pbest - theta_i) + c2 r2 (theta_lbest - theta_i)      (6.3)
+
+    - y_i = [F(theta_i), theta_i], from `Landscape.observe`.
+    - z_i: theta_pbest, its value, and theta_lbest. The personal best is over all time.
+      The text says so as well, but its formula compares the last two steps only.
+    - v_i: theta_pbest and its value. The thesis sends F(theta_i) with it, the value of
+      the present point, which says nothing about theta_pbest.
+    - theta_lbest is the best point in the messages w_i of this step, so the channel
+      decides whether the particle's own is among them. It is theta_pbest where nothing
+      was heard.
+    - r1 and r2 are uniform on [0, 1), drawn for each particle and each variable.
+
+    The lower a value, the better, where the thesis maximizes a fitness.
+
+    Args:
+        cognitive: c1, >= 0, the attraction by the personal best; a number, or one for
+            each particle.
+        social: c2, >= 0, the attraction by the local best; likewise.
+
+    Attributes:
+        best_values: F(theta_pbest), `(n,)`; infinite until a point was observed.
+        best_positions: theta_pbest, `(n, d)`.
+
+    Raises:
+        ValueError: an argument is out of range.
+    """
+
+    def __init__(
+        self, cognitive: ArrayLike = ACCELERATION, social: ArrayLike = ACCELERATION
+    ) -> None:
+        self.cognitive = cognitive
+        self.social = social
+        for name, value in (("cognitive", cognitive), ("social", social)):
+            of_each_particle(name, value, np.size(value), at_least=0)
+
+    def reset(self, n: int, rng: np.random.Generator) -> None:
+        """Forget all bests; see `DynamicAgents.reset`. Nothing is drawn."""
+        self._c1 = of_each_particle("cognitive", self.cognitive, n, at_least=0)
+        self._c2 = of_each_particle("social", self.social, n, at_least=0)
+        self.best_values = np.full(n, np.inf)
+        self.best_positions = np.empty((n, 0))
+        self._chosen = np.full(n, -1)
+
+    def observe(self, y: dict[str, FloatArray]) -> None:
+        """Replace personal bests by present points that are better.
+
+        Args:
+            y: see `Landscape.observe`.
+        """
+        self._position = y["position"]
+        if self.best_positions.shape != self._position.shape:  # the first observation
+            self.best_positions = self._position.copy()
+            self._heard = self.best_positions
+            n, d = self._position.shape
+            self._uniforms = np.empty((n, 2, d))
+        self.remember(slice(None), y)
+
+    def remember(self, rows: slice, y: dict[str, FloatArray]) -> None:
+        """Replace the personal bests of some particles, see `observe`.
+
+        Args:
+            rows: which.
+            y: what they observe, a row for each.
+        """
+        kernels.remember_best(
+            y["value"], y["position"], self.best_values[rows], self.best_positions[rows]
+        )
+
+    def send(self) -> dict[str, NDArray[Any]]:
+        """The personal bests: `value`, `(n,)`, and `position`, `(n, d)`."""
+        return {"value": self.best_values, "position": self.best_positions}
+
+    def hear(self, inbox: Inbox) -> None:
+        """Find the local bests."""
+        kernels.choose_local_best(
+            inbox.best("value"), inbox.messages["value"], self._chosen
+        )
+        self._heard = inbox.messages["position"]
+
+    def decide(self, rng: np.random.Generator) -> FloatArray:
+        """Draw r1 and r2, and return u, `(n, d)`."""
+        u = np.empty(self._position.shape)
+        self.attract(slice(None), self._position, self.draw(rng), u)
+        return u
+
+    def draw(self, rng: np.random.Generator) -> FloatArray:
+        """Draw r1 and r2 of an iteration, `(n, 2, d)`, valid until the next call."""
+        rng.random(out=self._uniforms)
+        return self._uniforms
+
+    def attract(
+        self, rows: slice, position: FloatArray, uniforms: FloatArray, u: FloatArray
+    ) -> None:
+        """Write into `u` what the bests add to the velocities of some particles.
+
+        Args:
+            rows: which.
+            position: where they are, a row for each.
+            uniforms: r1 and r2 of all particles, `(n, 2, d)`.
+            u: a row for each.
+        """
+        kernels.attract(
+            position,
+            self.best_positions[rows],
+            self._chosen[rows],
+            self._heard,
+            self._c1[rows],
+            self._c2[rows],
+            uniforms[rows],
+            u,
+        )

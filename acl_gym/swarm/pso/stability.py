@@ -1,0 +1,279 @@
+"""When particle swarms converge: exact moments of a particle whose bests stand still.
+
+While theta_pbest = p and theta_lbest = g do not change, the coordinates of a particle
+are independent of each other, and each follows a linear recursion with the random
+coefficient C = c1 r1 + c2 r2, where r1 and r2 are uniform on [0, 1]:
+
+    nu' = w nu + c1 r1 (p - theta) + c2 r2 (g - theta)
+    theta' = theta + nu'      in the standard order,
+    theta' = theta + nu       in the order in which (6.1) is printed.
+
+The means of (theta, nu) and the means of their products follow recursions with constant
+matrices. A swarm is **order-1 stable** if the means converge, and **order-2 stable** if
+the variances converge as well; the spectral radii of the two matrices decide. Nothing
+here is sampled.
+
+For c1 = c2 in the standard order the two conditions have closed forms: c1 + c2 <
+4 (1 + w), and c1 + c2 < 24 (1 - w^2) / (7 - 5 w) (R. Poli, "Mean and variance of the
+sampling distribution of particle swarm optimizers during stagnation", IEEE Transactions
+on Evolutionary Computation 13, 2009), with |w| < 1 and c1 + c2 > 0 in both.
+
+Common arguments:
+    inertia: w, in [-1e6, 1e6].
+    cognitive: c1, in [0, 1e6].
+    social: c2, in [0, 1e6].
+    order: `"standard"` or `"literal"`, see `acl_gym.swarm.pso.landscape.Landscape`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.optimize import brentq
+
+from acl_gym.swarm.pso.coefficients import ORDERS
+from acl_gym.utils import validation
+from acl_gym.utils.typing import FloatArray
+
+MEAN, VARIANCE = 1 / 2, 1 / 12
+"""Of a number that is uniform on [0, 1]."""
+
+MOST = 1e6
+"""The largest coefficient; squares of larger ones may not fit into a float."""
+
+
+def mean_matrix(
+    inertia: float, cognitive: float, social: float, order: str = "standard"
+) -> FloatArray:
+    """The matrix M of E[z'] = M E[z] + b for z = (theta, nu), shape `(2, 2)`."""
+    fixed, random = _recursion(inertia, order)
+    mean, _ = _moments_of_c(cognitive, social)
+    return fixed - mean * random
+
+
+def second_moment_matrix(
+    inertia: float, cognitive: float, social: float, order: str = "standard"
+) -> FloatArray:
+    """The matrix of the recursion of E[z z^T], z = (theta, nu), where p = g = 0.
+
+    Returns:
+        It takes the vector (E[theta^2], E[theta nu], E[nu^2]) to the next one, `(3, 3)`.
+    """
+    fixed, random = _recursion(inertia, order)
+    mean, square = _moments_of_c(cognitive, social)
+    full = (
+        np.kron(fixed, fixed)
+        - mean * (np.kron(fixed, random) + np.kron(random, fixed))
+        + square * np.kron(random, random)
+    )
+    # Of (theta theta, theta nu, nu theta, nu nu) the middle two are equal.
+    rows = full[[0, 1, 3]]
+    return np.column_stack([rows[:, 0], rows[:, 1] + rows[:, 2], rows[:, 3]])
+
+
+def spectral_radius(
+    inertia: ArrayLike,
+    cognitive: ArrayLike,
+    social: ArrayLike,
+    *,
+    moment: int = 2,
+    order: str = "standard",
+) -> FloatArray:
+    """By what factor the moments grow or shrink a step, in the long run.
+
+    Below 1 the swarm is stable of that order. The second moments bound the first: the
+    radius for `moment=2` is at least the square of that for `moment=1`.
+
+    Args:
+        inertia: w.
+        cognitive: c1.
+        social: c2; the three are broadcast against each other.
+        moment: 1, the means, or 2, the means of products.
+        order: see `acl_gym.swarm.pso.stability`.
+
+    Returns:
+        The radii, in the shape of the arguments.
+
+    Raises:
+        ValueError: an argument is out of range.
+    """
+    make = _matrix_of(moment)
+    arrays = np.broadcast_arrays(
+        *(
+            validation.real_array(name, values)
+            for name, values in (
+                ("inertia", inertia),
+                ("cognitive", cognitive),
+                ("social", social),
+            )
+        )
+    )
+    matrices = [
+        make(float(w), float(c1), float(c2), order)
+        for w, c1, c2 in zip(*(array.flat for array in arrays), strict=True)
+    ]
+    radii = np.abs(np.linalg.eigvals(np.array(matrices))).max(axis=-1)
+    return np.asarray(radii.reshape(arrays[0].shape))
+
+
+def is_stable(
+    inertia: float,
+    cognitive: float,
+    social: float,
+    *,
+    moment: int = 2,
+    order: str = "standard",
+) -> bool:
+    """Whether the moments converge, see `acl_gym.swarm.pso.stability`."""
+    return bool(
+        spectral_radius(inertia, cognitive, social, moment=moment, order=order) < 1.0
+    )
+
+
+def largest_acceleration(
+    inertia: float, *, moment: int = 2, order: str = "standard", share: float = 0.5
+) -> float:
+    """The least upper bound of c1 + c2 below which the moments converge.
+
+    Args:
+        inertia: w, in (-1, 1).
+        moment: 1, the means, or 2, the means of products.
+        order: see `acl_gym.swarm.pso.stability`.
+        share: c1 / (c1 + c2), in [0, 1].
+
+    Returns:
+        The bound; 0 where no swarm of this inertia is stable.
+
+    Raises:
+        ValueError: an argument is out of range.
+    """
+    inertia = validation.number("inertia", inertia, above=-1, below=1)
+    share = validation.number("share", share, at_least=0, at_most=1)
+    make = _matrix_of(moment)
+
+    def excess(total: float) -> float:
+        matrix = make(inertia, share * total, (1 - share) * total, order)
+        return float(np.abs(np.linalg.eigvals(matrix)).max()) - 1.0
+
+    # Stable values of c1 + c2 form an interval that begins at 0, where the radius is 1:
+    # a particle that nothing attracts stays where it has come to rest.
+    least, most = 1e-6, 10.0  # the largest bound of all, 8, is that of the means
+    if excess(least) >= 0.0:
+        return 0.0
+    return float(brentq(excess, least, most, xtol=1e-12))
+
+
+@dataclass(frozen=True)
+class Moments:
+    """Of one coordinate of a particle's position, step by step.
+
+    Attributes:
+        mean: E[theta], `(steps + 1,)`.
+        variance: of theta, `(steps + 1,)`.
+    """
+
+    mean: FloatArray
+    variance: FloatArray
+
+
+def position_moments(
+    inertia: float,
+    cognitive: float,
+    social: float,
+    *,
+    position: float,
+    velocity: float = 0.0,
+    personal_best: float,
+    local_best: float,
+    steps: int,
+    order: str = "standard",
+) -> Moments:
+    """Mean and variance of a position while the two bests stand still.
+
+    Args:
+        inertia: see `acl_gym.swarm.pso.stability`.
+        cognitive: see there.
+        social: see there.
+        position: theta at the beginning.
+        velocity: nu at the beginning.
+        personal_best: p.
+        local_best: g.
+        steps: how many, >= 0.
+        order: see `acl_gym.swarm.pso.stability`.
+
+    Returns:
+        Mean and variance at the steps 0 to `steps`.
+
+    Raises:
+        ValueError: an argument is out of range, or a moment larger than a float can hold.
+        TypeError: `steps` is not an integer.
+    """
+    steps = validation.integer("steps", steps, at_least=0)
+    fixed, random = _recursion(inertia, order)
+    c1, c2 = _accelerations(cognitive, social)
+    g = validation.number("local_best", local_best)
+    # Seen from the local best: squares of large coordinates would hide the variance.
+    p = validation.number("personal_best", personal_best) - g
+    start = [
+        validation.number("position", position) - g,
+        validation.number("velocity", velocity),
+        1.0,
+    ]
+    # z = (theta, nu, 1), and z' = (D + r1 P + r2 Q) z.
+    d, of_p, of_q = np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((3, 3))
+    d[:2, :2], d[2, 2] = fixed, 1.0
+    receives = random[:, 0]  # which of theta and nu the attraction enters
+    for matrix, c, best in ((of_p, c1, p), (of_q, c2, 0.0)):
+        matrix[:2, 0] = -c * receives
+        matrix[:2, 2] = c * best * receives
+    mean = d + MEAN * (of_p + of_q)
+    moment = np.outer(start, start)
+    means, variances = np.empty(steps + 1), np.empty(steps + 1)
+    for step in range(steps + 1):
+        if not np.isfinite(moment).all():
+            raise ValueError(
+                f"steps must be fewer than {step}, got {steps}: the moments of a swarm "
+                "that is not stable are then larger than a float can hold."
+            )
+        means[step] = moment[0, 2]
+        variances[step] = moment[0, 0] - moment[0, 2] ** 2
+        with np.errstate(over="ignore", invalid="ignore"):
+            moment = mean @ moment @ mean.T + VARIANCE * (
+                of_p @ moment @ of_p.T + of_q @ moment @ of_q.T
+            )
+    return Moments(means + g, np.maximum(variances, 0.0))
+
+
+def _recursion(inertia: float, order: str) -> tuple[FloatArray, FloatArray]:
+    """A and B of z' = (A - C B) z, z = (theta, nu), for p = g = 0."""
+    w = validation.number("inertia", inertia, at_least=-MOST, at_most=MOST)
+    if validation.one_of("order", order, ORDERS) == "standard":
+        return np.array([[1.0, w], [0.0, w]]), np.array([[1.0, 0.0], [1.0, 0.0]])
+    return np.array([[1.0, 1.0], [0.0, w]]), np.array([[0.0, 0.0], [1.0, 0.0]])
+
+
+def _accelerations(cognitive: float, social: float) -> tuple[float, float]:
+    """c1 and c2, checked."""
+    return (
+        validation.number("cognitive", cognitive, at_least=0, at_most=MOST),
+        validation.number("social", social, at_least=0, at_most=MOST),
+    )
+
+
+def _moments_of_c(cognitive: float, social: float) -> tuple[float, float]:
+    """E[C] and E[C^2] of C = c1 r1 + c2 r2."""
+    c1, c2 = _accelerations(cognitive, social)
+    mean = MEAN * (c1 + c2)
+    return mean, VARIANCE * (c1 * c1 + c2 * c2) + mean * mean
+
+
+def _matrix_of(moment: int) -> Callable[[float, float, float, str], FloatArray]:
+    if moment not in (1, 2):
+        raise ValueError(
+            f"moment must be 1, the means, or 2, the means of products, got "
+            f"{validation.shown(moment)}."
+        )
+    return mean_matrix if moment == 1 else second_moment_matrix

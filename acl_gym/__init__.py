@@ -10,9 +10,8 @@ from importlib import import_module
 from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
-from acl_gym.envs import register_environments
-
 if TYPE_CHECKING:
+    from acl_gym import swarm
     from acl_gym.agents.acl import ACL
     from acl_gym.agents.ant_system import AntColonySystem, AntSystem, MaxMinAntSystem
     from acl_gym.agents.q_learning import QLearning
@@ -138,6 +137,7 @@ _PUBLIC = {
     "learn_from_plant": "acl_gym.model_based",
     "plant": "acl_gym.envs.plant",
     "set_num_threads": "acl_gym.utils.threads",
+    "swarm": "acl_gym",  # a package, not a name in a module
     "value_iteration": "acl_gym.planning.value_iteration",
 }
 
@@ -209,6 +209,7 @@ __all__ = [
     "learn_from_plant",
     "plant",
     "set_num_threads",
+    "swarm",
     "value_iteration",
 ]
 
@@ -216,10 +217,19 @@ __all__ = [
 if find_spec("stable_baselines3") is None:
     __all__.remove("VectorEnvAdapter")
 
-register_environments()
+try:
+    import_module("gymnasium")
+except ImportError:  # `acl_gym.swarm` and `acl_gym.theory` work without it
+    pass
+else:
+    from acl_gym.envs import register_environments
+
+    register_environments()
 
 
 def __getattr__(name: str) -> Any:
+    if _PUBLIC.get(name) == __name__:
+        return import_module(f"{__name__}.{name}")
     if name in _PUBLIC:
         return getattr(import_module(_PUBLIC[name]), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -1,0 +1,222 @@
+"""What the agents of a swarm have received in a step."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from acl_gym.swarm.links import Links
+from acl_gym.swarm.rows import check_messages
+from acl_gym.utils import validation
+from acl_gym.utils.compiling import njit
+from acl_gym.utils.typing import FloatArray, IntArray
+
+
+class Inbox:
+    """The messages w_i of all agents, Definition 6.2: who hears whom, and what.
+
+    Messages are broadcast, so they are kept once for each sender and not once for each
+    link. Sums are made in the order of the senders' numbers, so that the same messages
+    give the same bits.
+
+    Args:
+        links: who hears whom.
+        messages: what each agent has sent, name -> `(n, ...)`.
+
+    Attributes:
+        links: see above.
+        messages: see above.
+
+    Raises:
+        TypeError: `messages` is no dict of arrays.
+        ValueError: an array does not have a row for each agent.
+
+    Example:
+        >>> import numpy as np
+        >>> inbox = Inbox(
+        ...     Links.from_lists([[0, 1], [1, 2], [2]]),
+        ...     {"cost": np.array([3.0, 2.0, 1.0])},
+        ... )
+        >>> inbox.best("cost")
+        array([1, 2, 2])
+        >>> inbox.mean(inbox.messages["cost"])
+        array([2.5, 1.5, 1. ])
+    """
+
+    __slots__ = ("links", "messages")
+
+    def __init__(self, links: Links, messages: dict[str, NDArray[Any]]) -> None:
+        check_messages(messages, links.n)
+        self.links = links
+        self.messages = messages
+
+    @property
+    def count(self) -> IntArray:
+        """How many agents each one has heard, `(n,)`."""
+        return self.links.degrees
+
+    def best(self, key: str) -> IntArray:
+        """Return for each agent whom it has heard the least value of.
+
+        Args:
+            key: a message of one number, `(n,)`, such as the cost of the best solution.
+
+        Returns:
+            Numbers of senders, `(n,)`; of equal values the sender with the lowest
+            number, -1 where an agent has heard nothing.
+
+        Raises:
+            ValueError: there is no such message, it is not one number, or a value is
+                NaN; infinity is allowed.
+        """
+        values = self._message(key)
+        if values.ndim != 1 or values.dtype.kind not in "biuf":
+            raise ValueError(
+                f"message {key!r} must be one real number for each agent, got an array "
+                f"of {values.dtype} and shape {values.shape}."
+            )
+        least = int(values.argmin())  # that of a NaN, if there is one
+        if values[least] != values[least]:
+            raise ValueError(
+                f"message {key!r} must not be NaN, got NaN from agent {least}; send "
+                "infinity where there is no value."
+            )
+        links = self.links
+        if links.complete:
+            return np.full(links.n, least)
+        if links.all_others:
+            found = np.full(links.n, least)
+            others = np.arange(links.n) != least
+            found[least] = np.flatnonzero(others)[values[others].argmin()] if links.n > 1 else -1  # fmt: skip
+            return found
+        found = np.empty(links.n, np.int64)
+        _best(np.ascontiguousarray(values), *links.csr(), found)
+        return found
+
+    def sum(self, rows: ArrayLike) -> FloatArray:
+        """Return for each agent the sum of `rows` over those that it has heard.
+
+        Args:
+            rows: of the senders, `(n, ...)`, such as `inbox.messages["x"]`.
+
+        Returns:
+            float64 of the shape of `rows`; 0 where an agent has heard nothing.
+
+        Raises:
+            ValueError: `rows` are not real numbers with a row for each agent.
+        """
+        links = self.links
+        array = validation.as_array(rows)
+        if (
+            array is None
+            or array.dtype.kind not in "biuf"
+            or array.ndim == 0
+            or array.shape[0] != links.n
+        ):
+            raise ValueError(
+                f"rows must be real numbers with a row for each of the {links.n} agents, "
+                f"got {validation.shown(rows)}."
+            )
+        flat = np.ascontiguousarray(array, np.float64).reshape(links.n, -1)
+        sums = np.empty_like(flat)
+        if links.complete:
+            _sum_everyone(flat, sums)
+        elif links.all_others:
+            _sum_others(flat, sums)
+        else:
+            _sum(flat, *links.csr(), sums)
+        return sums.reshape(array.shape)
+
+    def mean(self, rows: ArrayLike, default: ArrayLike = 0.0) -> FloatArray:
+        """Return for each agent the mean of `rows` over those that it has heard.
+
+        Args:
+            rows: of the senders, `(n, ...)`.
+            default: for agents that have heard nothing; broadcast to the shape of
+                `rows`.
+
+        Returns:
+            float64 of the shape of `rows`.
+
+        Raises:
+            ValueError: `rows` are not real numbers with a row for each agent.
+        """
+        sums, count = self.sum(rows), self.count
+        count = count.reshape(count.shape + (1,) * (sums.ndim - 1))
+        return np.where(count > 0, sums / np.maximum(count, 1), default)
+
+    def pairs(self, name: str) -> NDArray[Any]:
+        """Return a message link by link, `(n_links, ...)`: that of `links.sender`.
+
+        Raises:
+            ValueError: there is no such message.
+        """
+        rows: NDArray[Any] = self._message(name)[self.links.sender]
+        return rows
+
+    def _message(self, name: str) -> NDArray[Any]:
+        try:
+            return self.messages[name]
+        except KeyError:
+            raise ValueError(
+                f"there must be a message {name!r}, got {sorted(self.messages)}; let "
+                "send() of the agents return it."
+            ) from None
+
+    def __repr__(self) -> str:
+        """What was sent, to how many."""
+        return f"Inbox({self.links!r}, messages={sorted(self.messages)})"
+
+
+@njit
+def _best(
+    values: NDArray[Any], senders: IntArray, offsets: IntArray, found: IntArray
+) -> None:
+    for i in range(found.size):
+        best = -1
+        for link in range(offsets[i], offsets[i + 1]):
+            j = senders[link]
+            if best < 0 or values[j] < values[best]:
+                best = j
+        found[i] = best
+
+
+@njit
+def _sum(
+    rows: FloatArray, senders: IntArray, offsets: IntArray, sums: FloatArray
+) -> None:
+    for i in range(rows.shape[0]):
+        for k in range(rows.shape[1]):
+            sums[i, k] = 0.0
+        for link in range(offsets[i], offsets[i + 1]):
+            j = senders[link]
+            for k in range(rows.shape[1]):
+                sums[i, k] += rows[j, k]
+
+
+@njit
+def _sum_everyone(rows: FloatArray, sums: FloatArray) -> None:
+    total = np.zeros(rows.shape[1])
+    for j in range(rows.shape[0]):
+        for k in range(rows.shape[1]):
+            total[k] += rows[j, k]
+    for i in range(rows.shape[0]):
+        for k in range(rows.shape[1]):
+            sums[i, k] = total[k]
+
+
+@njit
+def _sum_others(rows: FloatArray, sums: FloatArray) -> None:
+    """What comes before an agent plus what comes after it: nothing is subtracted."""
+    n, d = rows.shape
+    for k in range(d):
+        before = 0.0
+        for i in range(n):
+            sums[i, k] = before
+            before += rows[i, k]
+        after = 0.0
+        for i in range(n - 1, -1, -1):
+            sums[i, k] += after
+            after += rows[i, k]

@@ -1,0 +1,279 @@
+"""Who hears whom: the neighborhoods of all agents of a swarm."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from acl_gym.utils import validation
+from acl_gym.utils.compiling import njit
+from acl_gym.utils.typing import BoolArray, IntArray
+
+_NOTHING: IntArray = np.empty(0, np.int64)
+
+
+class Links:
+    """The neighborhoods N_i of all agents, Definition 6.6; they do not change.
+
+    A link leads from a sender to a receiver: agent i hears agent j if j is in N_i. Make
+    them with `everyone`, `from_pairs` or `from_lists`.
+
+    Attributes:
+        n: the number of agents, >= 1.
+        n_links: the number of links.
+        complete: whether every agent hears all agents, itself included. Such links are
+            not written out, so that they need no memory; `receiver`, `sender` and
+            `offsets` are made when they are asked for.
+        all_others: whether every agent hears all agents but itself. Not written out
+            either.
+    """
+
+    __slots__ = ("_offsets", "_receiver", "_sender", "all_others", "complete", "n")
+
+    n: int
+    complete: bool
+    all_others: bool
+    _sender: IntArray
+    _offsets: IntArray
+    _receiver: IntArray | None  # made when it is asked for
+
+    def __init__(
+        self,
+        n: int,
+        sender: IntArray = _NOTHING,
+        offsets: IntArray = _NOTHING,
+        *,
+        complete: bool = False,
+        all_others: bool = False,
+    ) -> None:
+        # Not checked: `everyone`, `from_pairs` and `from_lists` are for users.
+        set_once = super().__setattr__
+        set_once("n", n)
+        set_once("complete", complete)
+        set_once("all_others", all_others)
+        set_once("_sender", sender)
+        set_once("_offsets", offsets)
+        set_once("_receiver", None)
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        raise AttributeError(
+            f"links do not change, got a new value for {name}; make others with "
+            "Links.from_pairs or Links.from_lists."
+        )
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        if self.is_implicit:
+            return _everyone, (self.n, self.complete)
+        return Links, (self.n, self._sender, self._offsets)
+
+    @classmethod
+    def everyone(cls, n: int, include_self: bool = True) -> Links:
+        """Let every agent hear all agents.
+
+        Args:
+            n: the number of agents, >= 1.
+            include_self: whether an agent hears itself.
+
+        Raises:
+            TypeError: `n` is not an integer.
+            ValueError: it is < 1.
+        """
+        n = validation.integer("n", n, at_least=1)
+        return cls(n, complete=include_self, all_others=not include_self)
+
+    @classmethod
+    def from_pairs(cls, n: int, receiver: ArrayLike, sender: ArrayLike) -> Links:
+        """Make links from pairs of agents, in any order; a repeated pair is one link.
+
+        Args:
+            n: the number of agents, >= 1.
+            receiver: who hears, `(n_links,)`, numbers from 0 to n - 1.
+            sender: whom, `(n_links,)`.
+
+        Raises:
+            TypeError: `n` is not an integer.
+            ValueError: the arrays are not such numbers, or not equally long.
+        """
+        n = validation.integer("n", n, at_least=1)
+        to, by = _agents("receiver", receiver, n), _agents("sender", sender, n)
+        if to.shape != by.shape:
+            raise ValueError(
+                "receiver and sender must be equally long, a pair for each link, got "
+                f"{to.size} and {by.size}."
+            )
+        pairs = np.unique(to * n + by)  # sorted by receiver, then by sender
+        counts = np.bincount(pairs // n, minlength=n)
+        return cls(n, pairs % n, _offsets_of(counts))
+
+    @classmethod
+    def from_lists(cls, lists: Sequence[ArrayLike]) -> Links:
+        """Make links from a list for each agent of those that it hears.
+
+        Args:
+            lists: N_i of each agent, numbers from 0 to n - 1, n being the number of
+                lists.
+
+        Raises:
+            ValueError: there is no list, or a list has other elements.
+        """
+        n = validation.integer("the number of lists", len(lists), at_least=1)
+        rows = [_agents(f"lists[{i}]", each, n) for i, each in enumerate(lists)]
+        receiver = np.repeat(np.arange(n), [row.size for row in rows])
+        return cls.from_pairs(n, receiver, np.concatenate(rows))
+
+    @property
+    def is_implicit(self) -> bool:
+        """Whether everyone hears everyone, or all others, and links are not written out."""
+        return self.complete or self.all_others
+
+    @property
+    def n_links(self) -> int:
+        """The number of links."""
+        if self.is_implicit:
+            return self.n * (self.n - self.all_others)
+        return int(self._sender.size)
+
+    @property
+    def degrees(self) -> IntArray:
+        """How many agents each one hears, `(n,)`."""
+        if self.is_implicit:
+            return np.full(self.n, self.n - self.all_others)
+        return np.diff(self._offsets)
+
+    @property
+    def offsets(self) -> IntArray:
+        """The links of receiver i are `offsets[i]:offsets[i + 1]`; `(n + 1,)`, read-only."""
+        if self.is_implicit:
+            each = self.n - self.all_others
+            return validation.read_only(np.arange(self.n + 1) * each)
+        return validation.read_only(self._offsets)
+
+    @property
+    def receiver(self) -> IntArray:
+        """Who hears, `(n_links,)`, in ascending order, read-only.
+
+        Raises:
+            ValueError: no memory is large enough, where everyone hears everyone.
+        """
+        if self.is_implicit:
+            _check_room(self.n_links)
+            return validation.read_only(
+                np.repeat(np.arange(self.n), self.n - self.all_others)
+            )
+        receiver = self._receiver
+        if receiver is None:
+            receiver = np.repeat(np.arange(self.n), np.diff(self._offsets))
+            super().__setattr__("_receiver", receiver)
+        return validation.read_only(receiver)
+
+    @property
+    def sender(self) -> IntArray:
+        """Whom, `(n_links,)`, in ascending order for each receiver, read-only.
+
+        Raises:
+            ValueError: no memory is large enough, where everyone hears everyone.
+        """
+        if self.is_implicit:
+            _check_room(self.n_links)
+            senders = np.tile(np.arange(self.n), (self.n, 1))
+            if self.all_others:
+                senders = senders[~np.eye(self.n, dtype=np.bool_)]
+            return validation.read_only(senders.reshape(-1))
+        return validation.read_only(self._sender)
+
+    @property
+    def is_symmetric(self) -> bool:
+        """Whether any two agents hear each other, or neither hears the other."""
+        return self.is_implicit or bool(_is_symmetric(self._sender, self._offsets))
+
+    def csr(self) -> tuple[IntArray, IntArray]:
+        """Return `sender` and `offsets` (compressed sparse rows) for kernels to read."""
+        if self.is_implicit:
+            return self.sender.copy(), self.offsets.copy()
+        return self._sender, self._offsets
+
+    def subset(self, kept: BoolArray) -> Links:
+        """Return some of these links.
+
+        Args:
+            kept: which of them, `(n_links,)`.
+
+        Raises:
+            ValueError: it is not such an array.
+        """
+        if kept.shape != (self.n_links,) or kept.dtype != np.bool_:
+            raise ValueError(
+                f"kept must be {self.n_links} flags, one for each link, got an array of "
+                f"{kept.dtype} and shape {kept.shape}."
+            )
+        counts = np.bincount(self.receiver[kept], minlength=self.n)
+        return Links(self.n, self.sender[kept], _offsets_of(counts))
+
+    def __repr__(self) -> str:
+        """How many agents and links there are."""
+        return f"Links(n={self.n}, n_links={self.n_links})"
+
+
+def _everyone(n: int, include_self: bool) -> Links:
+    """What `pickle` makes such links with."""
+    return Links.everyone(n, include_self)
+
+
+def _agents(name: str, numbers: ArrayLike, n: int) -> IntArray:
+    """Numbers of agents as an array, checked."""
+    array = validation.as_array(numbers)
+    if array is not None and array.size == 0 and array.ndim == 1:
+        return _NOTHING
+    if array is None or array.ndim != 1 or array.dtype.kind not in "iu":
+        raise ValueError(
+            f"{name} must be a list of numbers of agents, got "
+            f"{validation.shown(numbers)}."
+        )
+    if array.min() < 0 or array.max() >= n:
+        bad = array[(array < 0) | (array >= n)][0]
+        raise ValueError(
+            f"{name} must hold numbers of agents from 0 to {n - 1}, got {bad}."
+        )
+    return array.astype(np.int64)
+
+
+def _offsets_of(counts: NDArray[Any]) -> IntArray:
+    """Where the links of each receiver begin, and where the last ones end."""
+    offsets = np.zeros(counts.size + 1, np.int64)
+    np.cumsum(counts, out=offsets[1:])
+    return offsets
+
+
+def _check_room(n_links: int) -> None:
+    validation.check_memory(
+        f"{n_links:,} links",
+        16 * n_links,
+        "let each agent hear fewer others, or use Inbox.best and Inbox.sum, which need "
+        "no list of the links",
+    )
+
+
+@njit
+def link_of(receiver: int, sender: int, senders: IntArray, offsets: IntArray) -> int:
+    """The number of the link from a sender to a receiver; -1 where there is none."""
+    low, high = offsets[receiver], offsets[receiver + 1]
+    while low < high:
+        middle = (low + high) // 2
+        if senders[middle] < sender:
+            low = middle + 1
+        else:
+            high = middle
+    found = low < offsets[receiver + 1] and senders[low] == sender
+    return low if found else -1
+
+
+@njit
+def _is_symmetric(senders: IntArray, offsets: IntArray) -> bool:
+    for i in range(offsets.size - 1):
+        for link in range(offsets[i], offsets[i + 1]):
+            if link_of(senders[link], i, senders, offsets) < 0:
+                return False
+    return True

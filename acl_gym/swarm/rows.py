@@ -1,0 +1,117 @@
+"""Checks of arrays with one row for each agent."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from acl_gym.utils import validation
+from acl_gym.utils.compiling import njit
+from acl_gym.utils.typing import FloatArray
+
+FARTHEST = 1e150
+"""Squares of distances between positions up to this are finite."""
+
+
+def checked_positions(positions: Any, n: int | None = None) -> FloatArray:
+    """Return positions as a float64 array in C order, not copied if it is one already.
+
+    Args:
+        positions: of the agents, `(n, dim)`.
+        n: how many agents there must be; None: any number >= 1.
+
+    Raises:
+        ValueError: they do not have this shape, or one is NaN or farther away than
+            `FARTHEST`.
+    """
+    array = validation.as_array(positions)
+    if (
+        array is None
+        or array.dtype.kind not in "iuf"
+        or array.ndim != 2
+        or array.size == 0
+        or (n is not None and len(array) != n)
+    ):
+        many = "n" if n is None else n
+        raise ValueError(
+            f"positions must be an array of numbers of shape ({many}, dim), a row for "
+            f"each agent, got {validation.shown(positions)}."
+        )
+    rows = np.ascontiguousarray(array, dtype=np.float64)
+    agent = _first_beyond(rows, FARTHEST)
+    if agent >= 0:
+        raise ValueError(
+            f"positions must be numbers of at most {FARTHEST:g}, got {rows[agent]} for "
+            f"agent {agent}; look for what makes it diverge, such as too large a step."
+        )
+    return rows
+
+
+@njit
+def _first_beyond(rows: FloatArray, limit: float) -> int:
+    """The first row with an entry that is NaN or larger than the limit; -1: none."""
+    for i in range(rows.shape[0]):
+        for k in range(rows.shape[1]):
+            if not abs(rows[i, k]) <= limit:
+                return i
+    return -1
+
+
+def per_agent(
+    name: str, value: ArrayLike, n: int | None = None, **bounds: float
+) -> FloatArray:
+    """Return a parameter of the agents: one number for all, or one for each.
+
+    Args:
+        name: what messages call it.
+        value: a number, or `(n,)` numbers.
+        n: how many agents there are; None: not known yet.
+        **bounds: see `validation.Range`, of which infinity is inside if nothing bounds
+            it from above.
+
+    Returns:
+        An array without axes, or with one.
+
+    Raises:
+        ValueError: it is neither, or out of range.
+    """
+    array = validation.real_array(name, value, finite=False)
+    if array.ndim > 1 or (n is not None and array.ndim == 1 and array.size != n):
+        many = "" if n is None else f" of the {n} agents"
+        raise ValueError(
+            f"{name} must be a number, or one for each{many}, got an array of shape "
+            f"{array.shape}."
+        )
+    interval = validation.Range(**bounds)
+    open_above = interval.at_most is None and interval.below is None
+    for each in array.flat:
+        if float(each) not in interval and not (open_above and each == np.inf):
+            raise ValueError(f"{name} must lie in {interval}, got {each:g}.")
+    return array
+
+
+def check_messages(messages: dict[str, NDArray[Any]], n: int) -> None:
+    """Check that messages are arrays with a row for each agent.
+
+    Raises:
+        TypeError: they are not arrays under names.
+        ValueError: an array does not have a row for each agent.
+    """
+    if not isinstance(messages, dict):
+        raise TypeError(
+            "messages must be a dict of arrays, such as {'value': values}, got "
+            f"{validation.shown(messages)}."
+        )
+    for name, rows in messages.items():
+        if type(rows) is not np.ndarray and not isinstance(rows, np.ndarray):
+            raise TypeError(
+                f"message {name!r} must be an array with a row for each agent, got "
+                f"{validation.shown(rows)}."
+            )
+        if rows.ndim == 0 or rows.shape[0] != n:
+            raise ValueError(
+                f"message {name!r} must have a row for each of the {n} agents, got an "
+                f"array of shape {rows.shape}."
+            )

@@ -1,0 +1,152 @@
+"""Run a swarm of moving agents: Figure 6.1, step by step."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acl_gym.swarm.channel import Channel
+from acl_gym.swarm.protocols import DynamicAgents, Environment
+from acl_gym.swarm.rows import checked_positions
+from acl_gym.swarm.topologies import Everyone
+from acl_gym.utils import validation
+
+Callback = Callable[[int, DynamicAgents, Environment], Any]
+"""What `run` calls after each step: `(steps made, agents, environment)`. A function that
+returns False ends the run."""
+
+
+@dataclass
+class History:
+    """What a run came to.
+
+    Attributes:
+        steps: how many steps were made.
+        done: whether the environment has ended the run.
+        recorded: what was recorded, name -> `(steps + 1, ...)`: the initial value, and
+            that after each step.
+    """
+
+    steps: int = 0
+    done: bool = False
+    recorded: dict[str, NDArray[Any]] = field(default_factory=dict)
+
+    def __getitem__(self, name: str) -> NDArray[Any]:
+        """What was recorded under a name."""
+        return self.recorded[name]
+
+
+def run(
+    agents: DynamicAgents,
+    environment: Environment,
+    steps: int,
+    rng: np.random.Generator | int | None = None,
+    channel: Channel | None = None,
+    *,
+    stale: bool = False,
+    record: Collection[str] = (),
+    callback: Callback | None = None,
+) -> History:
+    """Let a swarm of moving agents run from its initial state.
+
+    In each step all agents observe the environment, send messages, hear what the channel
+    delivers, and decide on their inputs, by which particles and process then move.
+
+    Args:
+        agents: the dynamic agents A_i.
+        environment: their particles P_i and the process.
+        steps: the most steps to make, >= 0; the environment may be done before.
+        rng: the generator of all random numbers of the run, or its seed; None draws one.
+        channel: the channel C; None takes `Everyone()`.
+        stale: what the thesis has, literally: z_i(k + 1) = h_i(z_i(k), y_i(k), w_i(k)),
+            where w_i(k) comes from v_j(k) = phi_j(z_j(k)), so that agents hear what the
+            others sent before they made their present observation: the messages of the
+            step before. In the first step, where there are none, they hear those of this
+            step.
+        record: names of arrays to record, which are attributes of the environment, such
+            as `("x",)`.
+        callback: called after each step, see `Callback`.
+
+    Returns:
+        How many steps were made, and what was recorded.
+
+    Raises:
+        TypeError: an argument is of the wrong kind.
+        ValueError: an argument is out of range, or a position is NaN or infinite.
+    """
+    steps = validation.integer("steps", steps, at_least=0)
+    channel = Everyone() if channel is None else channel
+    _check_kinds(agents, environment, channel, record)
+    if not isinstance(rng, np.random.Generator):
+        rng = np.random.default_rng(validation.seed(rng, "rng"))
+
+    environment.reset(rng)
+    n = environment.n
+    checked_positions(environment.positions, n)
+    agents.reset(n, rng)
+    channel.reset(n)
+    history = History(done=bool(environment.done))
+    series: dict[str, list[NDArray[Any]]] = {name: [] for name in record}
+    _record(environment, series)
+    earlier: dict[str, NDArray[Any]] | None = None
+    while history.steps < steps and not history.done:
+        agents.observe(environment.observe())
+        sent = agents.send()
+        heard = sent if earlier is None else earlier
+        agents.hear(channel.deliver(heard, environment.positions, rng))
+        environment.step(agents.decide(rng), rng)
+        if stale:
+            earlier = _copied(agents.send())
+        checked_positions(environment.positions, n)
+        history.steps += 1
+        history.done = bool(environment.done)
+        _record(environment, series)
+        if callback is not None and _ends(callback(history.steps, agents, environment)):
+            break
+    history.recorded = {name: np.stack(rows) for name, rows in series.items()}
+    return history
+
+
+def _check_kinds(agents: Any, environment: Any, channel: Any, record: Any) -> None:
+    kinds = {
+        "agents": (agents, DynamicAgents),
+        "environment": (environment, Environment),
+        "channel": (channel, Channel),
+    }
+    for name, (given, kind) in kinds.items():
+        if not isinstance(given, kind):
+            raise TypeError(
+                f"{name} must be an object of a subclass of {kind.__name__}, got "
+                f"{validation.shown(given)}."
+            )
+    names = validation.elements(record)
+    if names is None or not all(isinstance(name, str) for name in names):
+        raise TypeError(
+            'record must be a collection of names, such as ("x",), got '
+            f"{validation.shown(record)}."
+        )
+
+
+def _record(environment: Environment, series: dict[str, list[NDArray[Any]]]) -> None:
+    for name, rows in series.items():
+        try:
+            rows.append(np.array(getattr(environment, name)))
+        except AttributeError:
+            raise ValueError(
+                f"record must name attributes of {type(environment).__name__}, such as "
+                f"'x', got {name!r}; use callback to look at anything else."
+            ) from None
+
+
+def _copied(messages: dict[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
+    """Messages that stay as they are when agents change what they know."""
+    return {name: np.array(rows) for name, rows in messages.items()}
+
+
+def _ends(answer: Any) -> bool:
+    """Whether a callback has returned False, Python's or NumPy's."""
+    return isinstance(answer, (bool, np.bool_)) and not answer

@@ -8,11 +8,15 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.special import xlogy
 
 from acl_gym.swarm.aggregation.kernels import BOUNDED, UNBOUNDED
 from acl_gym.swarm.rows import per_agent
 from acl_gym.utils import validation
 from acl_gym.utils.typing import FloatArray
+
+Parameter = float | FloatArray
+"""One number for all agents, or an array with one for each."""
 
 
 class Coefficients(NamedTuple):
@@ -43,8 +47,8 @@ class Interaction(ABC):
 
     kind: ClassVar[int]
 
-    attraction: ArrayLike
-    repulsion: ArrayLike
+    attraction: Parameter
+    repulsion: Parameter
 
     @abstractmethod
     def net_attraction(self, distance: ArrayLike) -> FloatArray:
@@ -72,7 +76,7 @@ class Interaction(ABC):
 
     @property
     @abstractmethod
-    def _rate(self) -> ArrayLike:
+    def _rate(self) -> Parameter:
         """1 / c."""
 
     def __call__(self, y: ArrayLike) -> FloatArray:
@@ -87,8 +91,7 @@ class Interaction(ABC):
         """
         y = np.asarray(y, dtype=np.float64)
         distance = np.sqrt(np.square(y).sum(axis=-1))
-        with np.errstate(divide="ignore"):
-            strength = np.where(distance > 0, self.net_attraction(distance), 0.0)
+        strength = np.where(distance > 0, self.net_attraction(distance), 0.0)
         return np.asarray(-y * strength[..., None])
 
     def coefficients(self, n: int) -> Coefficients:
@@ -134,9 +137,9 @@ class BoundedRepulsion(Interaction):
 
     kind = BOUNDED
 
-    attraction: ArrayLike = 1.0
-    repulsion: ArrayLike = 20.0
-    spread: ArrayLike = 0.2
+    attraction: Parameter = 1.0
+    repulsion: Parameter = 20.0
+    spread: Parameter = 0.2
 
     def __post_init__(self) -> None:
         _set(self, "attraction", at_least=0)
@@ -147,13 +150,13 @@ class BoundedRepulsion(Interaction):
         """a - b exp(-r^2 / c); see `Interaction.net_attraction`."""
         square = np.square(np.asarray(distance, dtype=np.float64))
         decay = np.exp(-square / self.spread)
-        return np.asarray(self.attraction - np.asarray(self.repulsion) * decay)
+        return np.asarray(self.attraction - self.repulsion * decay)
 
     def potential(self, distance: ArrayLike) -> FloatArray:
         """a r^2 / 2 + (b c / 2) exp(-r^2 / c); see `Interaction.potential`."""
         square = np.square(np.asarray(distance, dtype=np.float64))
-        height = 0.5 * np.asarray(self.repulsion) * self.spread
-        pull = 0.5 * np.asarray(self.attraction) * square
+        height = 0.5 * self.repulsion * self.spread
+        pull = 0.5 * self.attraction * square
         return np.asarray(pull + height * np.exp(-square / self.spread))
 
     @property
@@ -161,13 +164,13 @@ class BoundedRepulsion(Interaction):
         """sqrt(c ln(b / a)); see `Interaction.rest_distance`."""
         with np.errstate(divide="ignore", invalid="ignore"):
             ratio = np.asarray(self.repulsion) / np.asarray(self.attraction)
-            square = np.asarray(self.spread) * np.log(np.maximum(ratio, 1.0))
+            square = self.spread * np.log(np.maximum(ratio, 1.0))
         # Without either, nothing moves, at any distance.
         return np.sqrt(np.where(np.isnan(square), 0.0, square))
 
     @property
-    def _rate(self) -> ArrayLike:
-        return 1.0 / np.asarray(self.spread)
+    def _rate(self) -> Parameter:
+        return 1.0 / self.spread
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -184,23 +187,26 @@ class UnboundedRepulsion(Interaction):
 
     kind = UNBOUNDED
 
-    attraction: ArrayLike = 1.0
-    repulsion: ArrayLike = 0.6
+    attraction: Parameter = 1.0
+    repulsion: Parameter = 0.6
 
     def __post_init__(self) -> None:
         _set(self, "attraction", at_least=0)
         _set(self, "repulsion", at_least=0)
 
     def net_attraction(self, distance: ArrayLike) -> FloatArray:
-        """a - b / r^2; see `Interaction.net_attraction`."""
+        """a - b / r^2, -infinity where r = 0; see `Interaction.net_attraction`."""
         square = np.square(np.asarray(distance, dtype=np.float64))
-        return np.asarray(self.attraction - np.asarray(self.repulsion) / square)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            # Without repulsion there is none in one place either, where b / r^2 is 0 / 0.
+            repulsion = np.where(self.repulsion == 0.0, 0.0, self.repulsion / square)
+        return np.asarray(self.attraction - repulsion)
 
     def potential(self, distance: ArrayLike) -> FloatArray:
         """a r^2 / 2 - b ln(r); see `Interaction.potential`."""
         r = np.asarray(distance, dtype=np.float64)
-        pull = 0.5 * np.asarray(self.attraction) * np.square(r)
-        return np.asarray(pull - np.asarray(self.repulsion) * np.log(r))
+        pull = 0.5 * self.attraction * np.square(r)
+        return np.asarray(pull - xlogy(self.repulsion, r))
 
     @property
     def rest_distance(self) -> FloatArray:
@@ -210,13 +216,13 @@ class UnboundedRepulsion(Interaction):
         return np.sqrt(np.where(np.isnan(square), 0.0, square))
 
     @property
-    def _rate(self) -> ArrayLike:
+    def _rate(self) -> Parameter:
         return 0.0
 
 
 def _set(interaction: Interaction, name: str, **bounds: float) -> None:
     """Check a parameter and keep it as an array that cannot be changed."""
-    array = per_agent(name, getattr(interaction, name), **bounds)
+    array = per_agent(name, getattr(interaction, name), None, **bounds)
     if not np.isfinite(array).all():
         raise ValueError(f"{name} must be finite, got {validation.shown(array)}.")
     object.__setattr__(interaction, name, validation.read_only(array))

@@ -110,9 +110,8 @@ def of_links(
 ) -> None:
     """What the senders of an agent's links do; `own` and `heard` are `(n, dim)`.
 
-    Args:
-        sender: of each link, sorted by receiver.
-        offsets: the links of receiver i are `offsets[i]:offsets[i + 1]`.
+    `sender` and `offsets` are those of `Links`: the links of receiver i are
+    `offsets[i]:offsets[i + 1]`.
     """
     kind, attraction, repulsion, rate = law
     n, dim = own.shape
@@ -149,9 +148,8 @@ def of_radius(
 ) -> None:
     """What those do that are closer than an agent's radius, in the order of the cells.
 
-    Args:
-        cells: the fields of `Cells`.
-        radius: sigma of each agent, `(n,)`, at most that of the cells.
+    `cells` are the fields of `Cells`, and `radius` is sigma of each agent, `(n,)`, at most
+    that of the cells.
     """
     kind, attraction, repulsion, rate = law
     shape, first, agent, cell, place = cells
@@ -182,16 +180,16 @@ def of_radius(
                     count += (square < reach) & (j != at)
                     if count == BATCH:
                         weigh(weight, count, kind, a, b, c)
-                        for m in range(count):
-                            f0 -= weight[m] * y0[m]
-                            f1 -= weight[m] * y1[m]
-                            f2 -= weight[m] * y2[m]
+                        for one in range(count):
+                            f0 -= weight[one] * y0[one]
+                            f1 -= weight[one] * y1[one]
+                            f2 -= weight[one] * y2[one]
                         count = 0
         weigh(weight, count, kind, a, b, c)
-        for m in range(count):
-            f0 -= weight[m] * y0[m]
-            f1 -= weight[m] * y1[m]
-            f2 -= weight[m] * y2[m]
+        for one in range(count):
+            f0 -= weight[one] * y0[one]
+            f1 -= weight[one] * y1[one]
+            f2 -= weight[one] * y2[one]
         # The axes that are missing come first in the cells.
         force[i, dim - 1] = f2
         if dim > 1:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from acl_gym.swarm.aggregation.profiles import for_each
 from acl_gym.utils import validation
@@ -33,8 +32,8 @@ class Obstacles:
         ValueError: an attribute is out of range, or there is not one for each centre.
     """
 
-    centres: ArrayLike
-    radii: ArrayLike
+    centres: FloatArray
+    radii: float | FloatArray
     strength: float = 20.0
     reach: float = 0.5
 
@@ -53,7 +52,8 @@ class Obstacles:
         """grad U of all obstacles together, `(n, dim)`, at `(n, dim)` positions."""
         x = self._checked(positions)
         gradient = np.empty_like(x)
-        _slope(x, self.centres, self.radii, self.strength, self.reach, gradient)
+        radii = np.asarray(self.radii)
+        _slope(x, self.centres, radii, self.strength, self.reach, gradient)
         return gradient
 
     def value(self, positions: FloatArray) -> FloatArray:
@@ -79,7 +79,7 @@ class Obstacles:
             Which agents are stopped, `(n,)`.
         """
         stopped = np.zeros(len(positions), dtype=np.bool_)
-        stop_at_edges(positions, self.centres, self.radii, stopped)
+        stop_at_edges(positions, self.centres, np.asarray(self.radii), stopped)
         return stopped
 
     def _checked(self, positions: FloatArray) -> FloatArray:

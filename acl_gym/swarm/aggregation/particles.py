@@ -7,8 +7,8 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
 
+from acl_gym.swarm.aggregation.interaction import Parameter
 from acl_gym.swarm.rows import per_agent
 from acl_gym.utils import validation
 from acl_gym.utils.compiling import njit
@@ -55,7 +55,7 @@ class Kinematic(Particles):
 
     variables = 1
 
-    max_speed: ArrayLike = math.inf
+    max_speed: Parameter = math.inf
 
     def __post_init__(self) -> None:
         _set(self, "max_speed", above=0)
@@ -83,9 +83,9 @@ class PointMass(Particles):
 
     variables = 2
 
-    mass: ArrayLike = 1.0
-    damping: ArrayLike = 1.0
-    max_force: ArrayLike = math.inf
+    mass: Parameter = 1.0
+    damping: Parameter = 1.0
+    max_force: Parameter = math.inf
 
     def __post_init__(self) -> None:
         _set(self, "mass", above=0)
@@ -107,7 +107,7 @@ class PointMass(Particles):
         return moved
 
 
-def shortened(vectors: FloatArray, longest: ArrayLike) -> FloatArray:
+def shortened(vectors: FloatArray, longest: Parameter) -> FloatArray:
     """Return vectors `(n, dim)`, those that are longer than allowed shortened.
 
     Args:
@@ -170,5 +170,5 @@ def move_masses(
 
 def _set(particles: Particles, name: str, **bounds: float) -> None:
     """Check a parameter and keep it as an array that cannot be changed."""
-    array = per_agent(name, getattr(particles, name), **bounds)
+    array = per_agent(name, getattr(particles, name), None, **bounds)
     object.__setattr__(particles, name, validation.read_only(array))

@@ -41,7 +41,7 @@ class Plane(Profile):
         ValueError: it is no such array.
     """
 
-    slope: ArrayLike
+    slope: FloatArray
 
     def __post_init__(self) -> None:
         _set(self, slope=validation.real_array("slope", self.slope, ndim=1))
@@ -68,7 +68,7 @@ class Quadratic(Profile):
         ValueError: an attribute is not finite.
     """
 
-    centre: ArrayLike
+    centre: FloatArray
     curvature: float = 1.0
 
     def __post_init__(self) -> None:
@@ -105,9 +105,9 @@ class Gaussians(Profile):
         ValueError: an attribute is out of range, or there is not one for each centre.
     """
 
-    centres: ArrayLike
-    depths: ArrayLike = 1.0
-    widths: ArrayLike = 1.0
+    centres: FloatArray
+    depths: float | FloatArray = 1.0
+    widths: float | FloatArray = 1.0
 
     def __post_init__(self) -> None:
         centres = validation.real_array("centres", self.centres, ndim=2)
@@ -134,7 +134,8 @@ class Gaussians(Profile):
         x = _checked(positions, np.asarray(self.centres)[0])
         rows = np.ascontiguousarray(x, dtype=np.float64).reshape(-1, x.shape[-1])
         value, gradient = np.empty(len(rows)), np.empty_like(rows)
-        sum_gaussians(rows, self.centres, self.depths, self.widths, value, gradient)
+        depths, widths = np.asarray(self.depths), np.asarray(self.widths)
+        sum_gaussians(rows, self.centres, depths, widths, value, gradient)
         return value.reshape(x.shape[:-1]), gradient.reshape(x.shape)
 
 

@@ -86,7 +86,7 @@ class Lossy(Channel):
     def __init__(self, channel: Channel, p: float, symmetric: bool = False) -> None:
         self.channel = _checked_channel(channel)
         self.p = validation.number("p", p, at_least=0, at_most=1)
-        self.symmetric = bool(symmetric)
+        self.symmetric = validation.flag("symmetric", symmetric)
 
     def reset(self, n: int) -> None:
         """See `Channel.reset`."""
@@ -101,9 +101,10 @@ class Lossy(Channel):
         """See `Channel.deliver`."""
         inbox = self.channel.deliver(sent, x, rng)
         links = inbox.links
+        senders, offsets = links.csr()  # says so if there are too many
         drawn = rng.random(links.n_links)
         kept = np.empty(links.n_links, np.bool_)
-        _keep(*links.csr(), drawn, self.p, self.symmetric, kept)
+        _keep(senders, offsets, drawn, self.p, self.symmetric, kept)
         return Inbox(links.subset(kept), inbox.messages)
 
     def __repr__(self) -> str:

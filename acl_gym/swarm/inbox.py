@@ -84,12 +84,10 @@ class Inbox:
                 "infinity where there is no value."
             )
         links = self.links
-        if links.complete:
-            return np.full(links.n, least)
-        if links.all_others:
+        if links.is_implicit:
             found = np.full(links.n, least)
-            others = np.arange(links.n) != least
-            found[least] = np.flatnonzero(others)[values[others].argmin()] if links.n > 1 else -1  # fmt: skip
+            if links.all_others:
+                found[least] = _least_but(values, least)
             return found
         found = np.empty(links.n, np.int64)
         _best(np.ascontiguousarray(values), *links.csr(), found)
@@ -168,6 +166,12 @@ class Inbox:
     def __repr__(self) -> str:
         """What was sent, to how many."""
         return f"Inbox({self.links!r}, messages={sorted(self.messages)})"
+
+
+def _least_but(values: NDArray[Any], best: int) -> int:
+    """The number of the least value when the best one does not count; -1: no other."""
+    others = np.delete(np.arange(values.size), best)
+    return int(others[values[others].argmin()]) if others.size else -1
 
 
 @njit

@@ -1,4 +1,4 @@
-"""Who hears whom: the neighborhoods of all agents of a swarm."""
+"""Who hears whom: the neighbourhoods of all agents of a swarm."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _NOTHING: IntArray = np.empty(0, np.int64)
 
 
 class Links:
-    """The neighborhoods N_i of all agents, Definition 6.6; they do not change.
+    """The neighbourhoods N_i of all agents, Definition 6.6; they do not change.
 
     A link leads from a sender to a receiver: agent i hears agent j if j is in N_i. Make
     them with `everyone`, `from_pairs` or `from_lists`.
@@ -82,6 +82,7 @@ class Links:
             ValueError: it is < 1.
         """
         n = validation.integer("n", n, at_least=1)
+        include_self = validation.flag("include_self", include_self)
         return cls(n, complete=include_self, all_others=not include_self)
 
     @classmethod

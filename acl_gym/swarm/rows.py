@@ -60,7 +60,12 @@ def _first_beyond(rows: FloatArray, limit: float) -> int:
 
 
 def per_agent(
-    name: str, value: ArrayLike, n: int | None = None, **bounds: float
+    name: str,
+    value: ArrayLike,
+    n: int | None = None,
+    *,
+    infinite: bool = False,
+    **bounds: float,
 ) -> FloatArray:
     """Return a parameter of the agents: one number for all, or one for each.
 
@@ -68,8 +73,8 @@ def per_agent(
         name: what messages call it.
         value: a number, or `(n,)` numbers.
         n: how many agents there are; None: not known yet.
-        **bounds: see `validation.Range`, of which infinity is inside if nothing bounds
-            it from above.
+        infinite: whether infinity counts as inside the range.
+        **bounds: of the range, see `validation.Range`.
 
     Returns:
         An array without axes, or with one.
@@ -85,10 +90,21 @@ def per_agent(
             f"{array.shape}."
         )
     interval = validation.Range(**bounds)
-    open_above = interval.at_most is None and interval.below is None
-    for each in array.flat:
-        if float(each) not in interval and not (open_above and each == np.inf):
-            raise ValueError(f"{name} must lie in {interval}, got {each:g}.")
+    inside = np.isfinite(array)
+    if interval.above is not None:
+        inside &= array > interval.above
+    if interval.at_least is not None:
+        inside &= array >= interval.at_least
+    if interval.at_most is not None:
+        inside &= array <= interval.at_most
+    if interval.below is not None:
+        inside &= array < interval.below
+    if infinite:
+        inside |= array == np.inf
+    if not inside.all():
+        also = ", or be infinite" if infinite else ""
+        bad = array[~inside].flat[0]
+        raise ValueError(f"{name} must lie in {interval}{also}, got {bad:g}.")
     return array
 
 
@@ -105,7 +121,7 @@ def check_messages(messages: dict[str, NDArray[Any]], n: int) -> None:
             f"{validation.shown(messages)}."
         )
     for name, rows in messages.items():
-        if type(rows) is not np.ndarray and not isinstance(rows, np.ndarray):
+        if not isinstance(rows, np.ndarray):
             raise TypeError(
                 f"message {name!r} must be an array with a row for each agent, got "
                 f"{validation.shown(rows)}."

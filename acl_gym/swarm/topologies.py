@@ -3,22 +3,23 @@
 from __future__ import annotations
 
 import math
+from abc import abstractmethod
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from acl_gym.swarm.cells import nearest, within_radius
 from acl_gym.swarm.channel import Topology
 from acl_gym.swarm.links import Links
+from acl_gym.swarm.near import nearest, within_radius
 from acl_gym.swarm.rows import checked_positions, per_agent
 from acl_gym.utils import validation
 from acl_gym.utils.typing import FloatArray
 
 
-class _Fixed(Topology):
-    """A topology that depends on the number of agents only."""
+class _ByNumber(Topology):
+    """A topology of agents that know each other's numbers, wherever they are."""
 
-    _kept: Links | None = None
+    _kept: Links | None = None  # of the last number of agents
 
     def links(self, x: FloatArray) -> Links:
         """See `Topology.links`; positions do not matter."""
@@ -27,11 +28,12 @@ class _Fixed(Topology):
             self._kept = self._links_of(n)
         return self._kept
 
+    @abstractmethod
     def _links_of(self, n: int) -> Links:
-        raise NotImplementedError
+        """Say who hears whom among n agents."""
 
 
-class Everyone(_Fixed):
+class Everyone(_ByNumber):
     """Every agent hears all agents. Time and memory are O(n).
 
     Args:
@@ -39,7 +41,7 @@ class Everyone(_Fixed):
     """
 
     def __init__(self, include_self: bool = True) -> None:
-        self.include_self = bool(include_self)
+        self.include_self = validation.flag("include_self", include_self)
 
     def _links_of(self, n: int) -> Links:
         return Links.everyone(n, self.include_self)
@@ -49,11 +51,11 @@ class Everyone(_Fixed):
         return f"Everyone(include_self={self.include_self})"
 
 
-class Ring(_Fixed):
+class Ring(_ByNumber):
     """The agents form a ring in the order of their numbers.
 
     Args:
-        k: how many neighbors an agent hears on each side, >= 1. Where the ring is so
+        k: how many neighbours an agent hears on each side, >= 1. Where the ring is so
             short that they meet, it hears all agents.
         include_self: whether an agent hears itself.
 
@@ -64,7 +66,7 @@ class Ring(_Fixed):
 
     def __init__(self, k: int = 1, include_self: bool = True) -> None:
         self.k = validation.integer("k", k, at_least=1)
-        self.include_self = bool(include_self)
+        self.include_self = validation.flag("include_self", include_self)
 
     def _links_of(self, n: int) -> Links:
         if 2 * self.k + 1 >= n:
@@ -81,7 +83,7 @@ class Ring(_Fixed):
         return f"Ring(k={self.k}, include_self={self.include_self})"
 
 
-class VonNeumann(_Fixed):
+class VonNeumann(_ByNumber):
     """The agents form a grid whose ends meet; each hears the four beside it.
 
     Args:
@@ -100,7 +102,7 @@ class VonNeumann(_Fixed):
         if rows is not None:
             rows = validation.integer("rows", rows, at_least=1)
         self.rows = rows
-        self.include_self = bool(include_self)
+        self.include_self = validation.flag("include_self", include_self)
 
     def _links_of(self, n: int) -> Links:
         rows = self.rows
@@ -142,8 +144,8 @@ class Radius(Topology):
     """
 
     def __init__(self, sigma: ArrayLike, include_self: bool = True) -> None:
-        self.sigma = per_agent("sigma", sigma, at_least=0)
-        self.include_self = bool(include_self)
+        self.sigma = per_agent("sigma", sigma, infinite=True, at_least=0)
+        self.include_self = validation.flag("include_self", include_self)
 
     def links(self, x: FloatArray) -> Links:
         """See `Topology.links`.
@@ -153,8 +155,8 @@ class Radius(Topology):
         """
         x = checked_positions(x)
         n = len(x)
-        sigma = np.broadcast_to(per_agent("sigma", self.sigma, n, at_least=0), n)
-        return Links(n, *within_radius(x, sigma.copy(), self.include_self))
+        sigma = per_agent("sigma", self.sigma, n, infinite=True, at_least=0)
+        return Links(n, *within_radius(x, np.full(n, sigma), self.include_self))
 
     def __repr__(self) -> str:
         """The call that makes it."""
@@ -164,8 +166,9 @@ class Radius(Topology):
 class Nearest(Topology):
     """Each agent hears the k others that are nearest to it.
 
-    Of equally distant ones those with the lowest numbers. An agent may hear another one
-    that does not hear it.
+    An agent may hear another one that does not hear it. Where others are equally
+    distant, it is left open which of them it hears; in the same positions it is always
+    the same ones.
 
     Args:
         k: how many, >= 1, and less than the number of agents.
@@ -179,7 +182,7 @@ class Nearest(Topology):
 
     def __init__(self, k: int, include_self: bool = False) -> None:
         self.k = validation.integer("k", k, at_least=1)
-        self.include_self = bool(include_self)
+        self.include_self = validation.flag("include_self", include_self)
 
     def links(self, x: FloatArray) -> Links:
         """See `Topology.links`.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pickle
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -18,12 +19,12 @@ def as_lists(links: Links) -> list[list[int]]:
 
 
 @st.composite
-def neighborhoods(draw: st.DrawFn) -> list[list[int]]:
+def neighbourhoods(draw: st.DrawFn) -> list[list[int]]:
     n = draw(st.integers(1, 8))
     return [draw(st.lists(st.integers(0, n - 1), max_size=10)) for _ in range(n)]
 
 
-@given(neighborhoods(), st.randoms())
+@given(neighbourhoods(), st.randoms())
 def test_links_are_sets_sorted_by_receiver_then_sender(lists, random) -> None:
     wanted = [sorted(set(each)) for each in lists]
     pairs = [(i, j) for i, each in enumerate(lists) for j in each]
@@ -57,3 +58,55 @@ def test_everyone_is_written_out_on_demand(n: int, include_self: bool) -> None:
         assert each.is_symmetric
     some = links.subset(links.sender == 0)
     assert as_lists(some) == [[j for j in w if j == 0] for w in wanted]
+
+
+def test_links_do_not_change() -> None:
+    links = Links.from_lists([[1], [0]])
+    with pytest.raises(AttributeError, match="links do not change"):
+        links.n = 3
+    for array in (links.sender, links.receiver, links.offsets):
+        with pytest.raises(ValueError, match="read-only"):
+            array[0] = 1
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ((2, [0], [2]), "sender must hold numbers of agents from 0 to 1, got 2"),
+        ((2, [-1], [0]), "receiver must hold numbers of agents from 0 to 1, got -1"),
+        ((2, [0, 1], [0]), "equally long.*got 2 and 1"),
+        ((2, [0.5], [0]), "receiver must be a list of numbers of agents"),
+        ((2, [[0]], [[0]]), "receiver must be a list of numbers of agents"),
+        ((0, [], []), "n must be at least 1"),
+    ],
+)
+def test_pairs_must_be_numbers_of_agents(arguments, words) -> None:
+    with pytest.raises(ValueError, match=words):
+        Links.from_pairs(*arguments)
+
+
+def test_lists_must_be_numbers_of_agents() -> None:
+    with pytest.raises(ValueError, match=r"lists\[1\] must hold .*from 0 to 1, got 5"):
+        Links.from_lists([[0], [5]])
+    with pytest.raises(ValueError, match="the number of lists must be at least 1"):
+        Links.from_lists([])
+
+
+def test_too_many_links_are_not_written_out() -> None:
+    links = Links.everyone(10**7)
+    assert links.n_links == 10**14
+    for name in ("receiver", "sender"):
+        with pytest.raises(ValueError, match=r"100,000,000,000,000 links must fit"):
+            getattr(links, name)
+
+
+@pytest.mark.parametrize(
+    "kept", [np.ones(3, np.bool_), np.ones(2), np.ones((2, 1), bool)]
+)
+def test_a_subset_needs_a_flag_for_each_link(kept) -> None:
+    with pytest.raises(ValueError, match="kept must be 2 flags"):
+        Links.from_lists([[1], [0]]).subset(kept)
+
+
+def test_repr_says_how_many_there_are() -> None:
+    assert repr(Links.from_lists([[1], []])) == "Links(n=2, n_links=1)"

@@ -33,6 +33,7 @@ class Cells(NamedTuple):
         agent: the numbers of the agents, sorted by cells, then by number, `(n,)`.
         cell: the cell of each of these, `(n,)`.
         place: where each of these is, `(3, n)`.
+        width: of the cells along each axis, `(3,)`; infinity where there is one cell.
     """
 
     shape: IntArray
@@ -40,12 +41,13 @@ class Cells(NamedTuple):
     agent: IntArray
     cell: IntArray
     place: FloatArray
+    width: FloatArray
 
 
 @njit
 def sort_into_cells(
     positions: FloatArray, radius: float
-) -> tuple[IntArray, IntArray, IntArray, IntArray, FloatArray]:
+) -> tuple[IntArray, IntArray, IntArray, IntArray, FloatArray, FloatArray]:
     """Sort agents by cells: the fields of `Cells`.
 
     Args:
@@ -56,6 +58,7 @@ def sort_into_cells(
     absent = MOST_AXES - dim
     shape = np.ones(MOST_AXES, np.int64)
     low, scale = np.zeros(MOST_AXES), np.zeros(MOST_AXES)
+    width = np.full(MOST_AXES, np.inf)
     most = max(1.0, np.floor((2.0 * n) ** (1.0 / dim)))
     for k in range(dim):
         least = largest = positions[0, k]
@@ -68,6 +71,8 @@ def sort_into_cells(
             axis = absent + k
             shape[axis] = int(count)
             low[axis], scale[axis] = least, count / extent
+            if count > 1.0:
+                width[axis] = extent / count
 
     cell_of = np.empty(n, np.int64)
     first = np.zeros(shape[0] * shape[1] * shape[2] + 1, np.int64)
@@ -92,7 +97,7 @@ def sort_into_cells(
         agent[at], cell_sorted[at] = i, cell
         for k in range(dim):
             place[absent + k, at] = positions[i, k]
-    return shape, first, agent, cell_sorted, place
+    return shape, first, agent, cell_sorted, place, width
 
 
 @njit(inline="always")

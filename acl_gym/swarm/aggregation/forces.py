@@ -76,7 +76,7 @@ def forces_within(
     """
     x = checked_positions(positions)
     n, dim = x.shape
-    sigma = per_agent("radius", radius, n, above=0)
+    sigma = per_agent("radius", radius, n, infinite=True, above=0)
     largest = float(sigma.max())
     if largest == math.inf and sigma.min() == math.inf:
         return forces_over_links(x, x, Links.everyone(n), interaction)

@@ -142,9 +142,9 @@ class BoundedRepulsion(Interaction):
     spread: Parameter = 0.2
 
     def __post_init__(self) -> None:
-        _set(self, "attraction", at_least=0)
-        _set(self, "repulsion", at_least=0)
-        _set(self, "spread", above=0)
+        _set(self, "attraction")
+        _set(self, "repulsion")
+        _set(self, "spread", or_zero=False)
 
     def net_attraction(self, distance: ArrayLike) -> FloatArray:
         """a - b exp(-r^2 / c); see `Interaction.net_attraction`."""
@@ -191,8 +191,8 @@ class UnboundedRepulsion(Interaction):
     repulsion: Parameter = 0.6
 
     def __post_init__(self) -> None:
-        _set(self, "attraction", at_least=0)
-        _set(self, "repulsion", at_least=0)
+        _set(self, "attraction")
+        _set(self, "repulsion")
 
     def net_attraction(self, distance: ArrayLike) -> FloatArray:
         """a - b / r^2, -infinity where r = 0; see `Interaction.net_attraction`."""
@@ -220,9 +220,8 @@ class UnboundedRepulsion(Interaction):
         return 0.0
 
 
-def _set(interaction: Interaction, name: str, **bounds: float) -> None:
+def _set(interaction: Interaction, name: str, *, or_zero: bool = True) -> None:
     """Check a parameter and keep it as an array that cannot be changed."""
-    array = per_agent(name, getattr(interaction, name), None, **bounds)
-    if not np.isfinite(array).all():
-        raise ValueError(f"{name} must be finite, got {validation.shown(array)}.")
+    end = {"at_least": 0.0} if or_zero else {"above": 0.0}
+    array = per_agent(name, getattr(interaction, name), None, infinite=False, **end)
     object.__setattr__(interaction, name, validation.read_only(array))

@@ -152,7 +152,7 @@ def of_radius(
     that of the cells.
     """
     kind, attraction, repulsion, rate = law
-    shape, first, agent, cell, place = cells
+    shape, first, agent, cell, place, _ = cells
     n, dim = force.shape
     planes, rows, columns = shape
     y0, y1, y2 = np.empty(BATCH), np.empty(BATCH), np.empty(BATCH)
@@ -265,7 +265,7 @@ def sum_radius_in_parallel(
 ) -> None:
     """Do what `sum_radius` does, its blocks shared among threads."""
     kind, attraction, repulsion, rate = law
-    shape, first, agent, cell, place = cells
+    shape, first, agent, cell, place, width = cells
     for block in prange((len(force) + BLOCK - 1) // BLOCK):
-        grid = shape, first, agent, cell, place
+        grid = shape, first, agent, cell, place, width
         of_radius(grid, radius, (kind, attraction, repulsion, rate), force, block)

@@ -58,7 +58,7 @@ class Kinematic(Particles):
     max_speed: Parameter = math.inf
 
     def __post_init__(self) -> None:
-        _set(self, "max_speed", above=0)
+        _set(self, "max_speed", infinite=True)
 
     def advance(self, x: FloatArray, u: FloatArray, time_step: float) -> FloatArray:
         """See `Particles.advance`."""
@@ -88,12 +88,9 @@ class PointMass(Particles):
     max_force: Parameter = math.inf
 
     def __post_init__(self) -> None:
-        _set(self, "mass", above=0)
-        _set(self, "damping", at_least=0)
-        _set(self, "max_force", above=0)
-        for name in ("mass", "damping"):
-            if not np.isfinite(getattr(self, name)).all():
-                raise ValueError(f"{name} must be finite, got infinity.")
+        _set(self, "mass")
+        _set(self, "damping", or_zero=True)
+        _set(self, "max_force", infinite=True)
 
     def advance(self, x: FloatArray, u: FloatArray, time_step: float) -> FloatArray:
         """See `Particles.advance`."""
@@ -168,7 +165,11 @@ def move_masses(
             moved[i, dim + k] = decay * speed + of_speed * push * force[i, k]
 
 
-def _set(particles: Particles, name: str, **bounds: float) -> None:
-    """Check a parameter and keep it as an array that cannot be changed."""
-    array = per_agent(name, getattr(particles, name), None, **bounds)
+def _set(
+    particles: Particles, name: str, *, or_zero: bool = False, infinite: bool = False
+) -> None:
+    """Check a parameter > 0 and keep it as an array that cannot be changed."""
+    end = {"at_least": 0.0} if or_zero else {"above": 0.0}
+    given = getattr(particles, name)
+    array = per_agent(name, given, None, infinite=infinite, **end)
     object.__setattr__(particles, name, validation.read_only(array))

@@ -210,7 +210,9 @@ def test_bad_input() -> None:
         forces_within([[0.0, math.nan]], law, 1.0)
     with pytest.raises(ValueError, match=r"shape \(4, dim\)"):
         forces_over_links(x, x, Links.everyone(4), law)
-    with pytest.raises(ValueError, match=r"radius must lie in \(0, inf\), got 0"):
+    with pytest.raises(
+        ValueError, match=r"radius must lie in \(0, inf\), or be infinite, got 0"
+    ):
         forces_within(x, law, 0.0)
     with pytest.raises(ValueError, match="radius must be a number, or one for each"):
         forces_within(x, law, [1.0, 2.0])

@@ -70,7 +70,7 @@ def test_rest_distances() -> None:
     ("name", "value", "message"),
     [
         ("attraction", -1.0, r"attraction must lie in \[0, inf\), got -1"),
-        ("attraction", math.inf, "attraction must be finite"),
+        ("attraction", math.inf, r"attraction must lie in \[0, inf\), got inf"),
         ("repulsion", math.nan, r"repulsion must lie in \[0, inf\), got nan"),
         ("repulsion", [[1.0]], "repulsion must be a number, or one for each"),
         ("repulsion", "b", "repulsion must be an array of real numbers, got 'b'"),

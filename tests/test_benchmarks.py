@@ -57,6 +57,18 @@ def test_double_bridge() -> None:
     }
 
 
+def test_moving_agents() -> None:
+    found = output_of("moving_agents.py")
+    for row in found["readings"].values():
+        assert row["measured"] == pytest.approx(row["factor"], abs=2e-3)
+    split, strict = found["readings"]["split"], found["readings"]["strict"]
+    assert split["centre_moved"] < 1e-14 < 1e-4 < strict["centre_moved"]
+    rows = {row["channel"]: row for row in found["channels"]}
+    everyone = rows["Everyone(include_self=True)"]
+    assert everyone["disagreement"] < 1e-12
+    assert rows["Radius(0.3, include_self=True)"]["disagreement"] > 0.1
+
+
 def test_aco_theory() -> None:
     for row in output_of("aco_theory.py", "--colonies", "50")["rows"]:
         assert row["highest_level"] <= 1 + 1e-12

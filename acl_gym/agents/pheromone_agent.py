@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from acl_gym.agents.base import TabularAgent
@@ -73,8 +72,6 @@ class PheromoneAgent(TabularAgent):
         allowed: BoolArray | None = rollout.allowed()
         if not self.tabu:
             return allowed
-        if allowed is None:
-            allowed = np.ones((rollout._ants.size, self.n_actions), np.bool_)
         return solutions.untried(rollout._ants, index, allowed)
 
     def _empty_solutions(self) -> Solutions:

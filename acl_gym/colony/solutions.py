@@ -227,7 +227,7 @@ class Solutions(Fixed):
         return self._rows
 
     def untried(
-        self, ants: IntArray, index: CellArray, allowed: BoolArray
+        self, ants: IntArray, index: CellArray, allowed: BoolArray | None
     ) -> BoolArray:
         """The tabu list of §3.4.2: no action twice from the same state in a trial.
 
@@ -238,12 +238,14 @@ class Solutions(Fixed):
         Args:
             ants: the ants that choose, `(m,)`.
             index: their cells, `(m, 1)`.
-            allowed: the actions they may take, `(m, n_actions)`.
+            allowed: the actions they may take, `(m, n_actions)`; None: all.
 
         Returns:
             The allowed actions that each ant has not yet taken in its cell,
             `(m, n_actions)`.
         """
+        if allowed is None:
+            allowed = np.ones((ants.size, self._n_actions), np.bool_)
         left = allowed.copy()
         if self._rows is not None:
             _strike_tried(

@@ -62,11 +62,10 @@ def run(
         steps: the most steps to make, >= 0; the environment may be done before.
         rng: the generator of all random numbers of the run, or its seed; None draws one.
         channel: the channel C; None takes `Everyone()`.
-        stale: what the thesis has, literally: z_i(k + 1) = h_i(z_i(k), y_i(k), w_i(k)),
-            where w_i(k) comes from v_j(k) = phi_j(z_j(k)), so that agents hear what the
-            others sent before they made their present observation: the messages of the
-            step before. In the first step, where there are none, they hear those of this
-            step.
+        stale: follow Definition 6.2 to the letter: z_i(k + 1) = h_i(z_i(k), y_i(k),
+            w_i(k)), where w_i(k) comes from v_j(k) = phi_j(z_j(k)). Agents then send
+            before they observe, and so hear what others knew in the step before. In the
+            first step, in which they know nothing before, they observe first.
         record: names of arrays to record, which are attributes of the environment, such
             as `("x",)`.
         callback: called after each step, see `Callback`.
@@ -80,7 +79,8 @@ def run(
     """
     steps = validation.integer("steps", steps, at_least=0)
     channel = Everyone() if channel is None else channel
-    _check_kinds(agents, environment, channel, record)
+    _check_kinds(agents, environment, channel, record, callback)
+    stale = validation.flag("stale", stale)
     if not isinstance(rng, np.random.Generator):
         rng = np.random.default_rng(validation.seed(rng, "rng"))
 
@@ -92,15 +92,15 @@ def run(
     history = History(done=bool(environment.done))
     series: dict[str, list[NDArray[Any]]] = {name: [] for name in record}
     _record(environment, series)
-    earlier: dict[str, NDArray[Any]] | None = None
     while history.steps < steps and not history.done:
-        agents.observe(environment.observe())
-        sent = agents.send()
-        heard = sent if earlier is None else earlier
-        agents.hear(channel.deliver(heard, environment.positions, rng))
+        if stale and history.steps > 0:
+            sent = _copied(agents.send())  # observing may change the same arrays
+            agents.observe(environment.observe())
+        else:
+            agents.observe(environment.observe())
+            sent = agents.send()
+        agents.hear(channel.deliver(sent, environment.positions, rng))
         environment.step(agents.decide(rng), rng)
-        if stale:
-            earlier = _copied(agents.send())
         checked_positions(environment.positions, n)
         history.steps += 1
         history.done = bool(environment.done)
@@ -111,7 +111,9 @@ def run(
     return history
 
 
-def _check_kinds(agents: Any, environment: Any, channel: Any, record: Any) -> None:
+def _check_kinds(
+    agents: Any, environment: Any, channel: Any, record: Any, callback: Any
+) -> None:
     kinds = {
         "agents": (agents, DynamicAgents),
         "environment": (environment, Environment),
@@ -129,6 +131,11 @@ def _check_kinds(agents: Any, environment: Any, channel: Any, record: Any) -> No
             'record must be a collection of names, such as ("x",), got '
             f"{validation.shown(record)}."
         )
+    if callback is not None and not callable(callback):
+        raise TypeError(
+            "callback must be a function of (step, agents, environment), got "
+            f"{validation.shown(callback)}."
+        )
 
 
 def _record(environment: Environment, series: dict[str, list[NDArray[Any]]]) -> None:
@@ -143,7 +150,6 @@ def _record(environment: Environment, series: dict[str, list[NDArray[Any]]]) -> 
 
 
 def _copied(messages: dict[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
-    """Messages that stay as they are when agents change what they know."""
     return {name: np.array(rows) for name, rows in messages.items()}
 
 

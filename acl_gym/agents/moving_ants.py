@@ -1,0 +1,323 @@
+"""Ant Colony Learning as a swarm of moving agents, §6.3.1.
+
+The same colony as `ACL`, cut along the framework of chapter 6: what an ant knows and
+decides is one part, what is outside of it another, and between them are observations,
+inputs and messages only. `acl_gym.swarm.run` then learns the same pheromone, to the bit.
+
+| §6.3.1 | here |
+| --- | --- |
+| moving agent M_c | row c of `Ants` and of `StigmergyEnvironment` |
+| particle P_c, its state x_c | row c of `StigmergyEnvironment.x` |
+| process, its transition x_c <- f(x_c, u_c) | the vector environment, in `StigmergyEnvironment.step` |
+| process state psi: the pheromone levels | `StigmergyEnvironment.pheromone` |
+| observation y_c = [x_c, tau_u(x_c), ...] | row c of `Observations` |
+| U(x_c) | `Observations.allowed` |
+| binary signal that the goal is reached | `Observations.walking`, the ants without it |
+| dynamic agent A_c, decision rule pi_c | `Ants`, `Ants.decide`: §3.3.1 over cells of the partition |
+| internal state z_c with the partial solution s_p,c | `Ants.solutions`, and a clock |
+| message v_c: this ant is done | `Ants.send`: how many trials it has finished |
+| message w_c: all ants are done | `Ants.hear` |
+| input u_c | row c of `Inputs` |
+| local pheromone update (4.12) by the process | `StigmergyEnvironment.step`, after a move |
+| cost of the final solution, from the process | `StigmergyEnvironment.costs` |
+| global pheromone update (4.15) by the process | `StigmergyEnvironment.step`, once all ants ask for it |
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acl_gym.agents.acl import ACL
+from acl_gym.colony.costs import solution_costs
+from acl_gym.colony.deposits import checked_deposits
+from acl_gym.colony.pheromone import Pheromone
+from acl_gym.colony.selection import choose_actions
+from acl_gym.colony.solutions import Solutions
+from acl_gym.colony.update_rule import TrialResult, UpdateRule
+from acl_gym.colony.update_rules import as_update, watched
+from acl_gym.evaluation.rollout import Rollout
+from acl_gym.partitions import locate_checked
+from acl_gym.swarm import DynamicAgents, Environment, Inbox
+from acl_gym.utils import validation
+from acl_gym.utils.typing import BoolArray, CellArray, FloatArray, IntArray
+
+__all__ = ["Ants", "Inputs", "Observations", "StigmergyEnvironment"]
+
+
+class Observations(NamedTuple):
+    """What the ants observe, y_c of all of them.
+
+    Attributes:
+        state: x_c, as the vector environment shows it, `(n, ...)`.
+        walking: the m ants whose walk is not over, `(m,)`; the others have reached the
+            goal, or the environment has ended their walk.
+        allowed: U(x_c) of those, `(m, n_actions)`; None: all actions.
+        pheromone: tau_u(x_c) for all u. Ants share the table, and each of them reads the
+            levels of the cells that it is in, so that nothing is copied.
+        trial: k, how many trials have ended.
+    """
+
+    state: NDArray[Any]
+    walking: IntArray
+    allowed: BoolArray | None
+    pheromone: Pheromone
+    trial: int
+
+
+class Inputs(NamedTuple):
+    """What the ants do, u_c of all of them.
+
+    Attributes:
+        ants: those that act, `(m,)`.
+        actions: what they do, `(m,)`.
+        cells: those for which they chose it, `(m, k)`, where the process decays the
+            pheromone.
+        degrees: of these cells, `(m, k)`.
+        asks: which ants ask for the global update, `(n,)`.
+        solutions: the trajectories of all ants, along which they then walk back.
+    """
+
+    ants: IntArray
+    actions: IntArray
+    cells: CellArray
+    degrees: FloatArray
+    asks: BoolArray
+    solutions: Solutions
+
+
+class Ants(DynamicAgents):
+    """The dynamic agents A_c of a colony, §6.3.1.
+
+    An ant asks for the global update as soon as it hears from all ants that they are
+    done, or when its clock shows T. It counts on hearing all of them: in a channel that
+    loses messages or carries them to a few only it waits for its clock. What it sends is
+    the number of trials that it has finished, not a flag, so that a message that arrives
+    late is not taken for one of the next trial.
+
+    Args:
+        colony: whose partition, selection rule, alpha, beta, epsilon, tabu list and T to
+            take; it is not changed.
+
+    Attributes:
+        solutions: the partial solutions s_p,c, a part of z_c.
+
+    Raises:
+        TypeError: `colony` is not an `ACL`.
+        ValueError: it has no environment.
+    """
+
+    solutions: Solutions
+
+    def __init__(self, colony: ACL) -> None:
+        _check_colony(colony)
+        self.partition = colony.partition
+        self.selection = colony.selection
+        self.alpha, self.beta, self.epsilon = colony.alpha, colony.beta, colony.epsilon
+        self.tabu = colony.tabu
+        self.max_steps = colony.max_steps
+        self.n_actions = colony.n_actions
+
+    def reset(self, n: int, rng: np.random.Generator) -> None:
+        """Begin with empty solutions; nothing is drawn."""
+        self.solutions = Solutions(n, self.max_steps, self.n_actions, self.partition)
+        self._trial = -1  # not one of the environment's
+        self._all_done = np.zeros(n, np.bool_)
+
+    def observe(self, y: Observations) -> None:
+        """Take in what the ants observe; a new trial begins with an empty solution."""
+        if y.trial != self._trial:
+            self._trial, self._clock = y.trial, 0
+            self.solutions.clear()
+        self._seen = y
+        self._finished = np.full(self.solutions.n_ants, y.trial + 1)
+        self._finished[y.walking] = y.trial
+
+    def send(self) -> dict[str, NDArray[Any]]:
+        """How many trials each ant has finished."""
+        return {"finished": self._finished}
+
+    def hear(self, inbox: Inbox) -> None:
+        """Note which ants have heard from all ants that they are done."""
+        done = inbox.messages["finished"] > self._trial
+        self._all_done = inbox.sum(done) == self.solutions.n_ants
+
+    def decide(self, rng: np.random.Generator) -> Inputs:
+        """Choose actions by the selection rule, or ask for the global update.
+
+        The chosen pairs become part of the solutions. Two numbers are drawn for each ant
+        that chooses.
+        """
+        y = self._seen
+        in_time = self._clock < self.max_steps
+        self._clock += 1
+        ants = y.walking if in_time else y.walking[:0]
+        index = np.empty((ants.size, self.partition.cells_per_state), np.int32)
+        degree = np.empty(index.shape)
+        actions = np.empty(0, np.int64)
+        if ants.size:
+            levels = y.pheromone.levels
+            locate_checked(self.partition, y.state, ants, index, degree, len(levels))
+            # The table keeps the probabilities that follow from levels and exponents.
+            y.pheromone.alpha = ACL.alpha.at(self, self._trial)
+            y.pheromone.beta = ACL.beta.at(self, self._trial)
+            allowed = y.allowed
+            if self.tabu:
+                allowed = self.solutions.untried(ants, index, allowed)
+            epsilon = ACL.epsilon.at(self, self._trial)
+            actions = choose_actions(
+                self.selection, y.pheromone, index, degree, epsilon, rng, allowed
+            )
+            self.solutions.append(ants, y.state, index, actions)
+        asks = self._all_done | (not in_time)
+        return Inputs(ants, actions, index, degree, asks, self.solutions)
+
+
+class StigmergyEnvironment(Environment):
+    """The environment of a colony: particles, and a process that bears pheromone.
+
+    A run is a number of trials. In a trial the particles begin where the vector
+    environment puts them; once all ants ask for it, the process reinforces the pheromone
+    along their solutions, and the next trial begins. A trial takes a step for each move
+    of the ant that walks longest, and one for the global update.
+
+    Args:
+        colony: whose vector environment, initial pheromone, gamma, rho, cost, deposit
+            and update rule to take. It is not changed; where it has learned already, its
+            pheromone and its count of trials are what this begins with.
+        trials: K, how many trials to make, >= 1.
+
+    Attributes:
+        x: x_c of all ants, `(n, d)`, as far as they are observed.
+        pheromone: psi, the levels.
+        costs: J of each ant, an array `(n,)` for each trial that has ended.
+
+    Raises:
+        TypeError: `colony` is not an `ACL`, or `trials` not an integer.
+        ValueError: it has no environment, `trials` is < 1, or the colony is none of the
+            framework: in which ants deposit one by one (`schedule="asynchronous"`), or
+            choose one after the other on what the last one has changed
+            (`update="in_turn"`).
+
+    Example:
+        >>> import gymnasium as gym
+        >>> from acl_gym import ACL
+        >>> from acl_gym.swarm import run
+        >>> env = gym.make_vec("acl_gym/GridSearch2D-v0", num_envs=20)
+        >>> colony = ACL(env, seed=0)
+        >>> ants, environment = Ants(colony), StigmergyEnvironment(colony, trials=3)
+        >>> history = run(ants, environment, 10_000, colony.rng)
+        >>> history.done, len(environment.costs)
+        (True, 3)
+        >>> colony.set_table(environment.pheromone.levels)
+    """
+
+    def __init__(self, colony: ACL, trials: int) -> None:
+        _check_colony(colony)
+        if colony.is_asynchronous:
+            raise ValueError(
+                "colony must be synchronous: all ants ask for the global update "
+                'together, got schedule="asynchronous"; let it learn by itself.'
+            )
+        if type(colony.update).choose is not UpdateRule.choose:
+            raise ValueError(
+                "colony must let all ants choose on the same observation, got the "
+                f"update rule {validation.shown(colony.update)}; let it learn by itself."
+            )
+        self.trials = validation.integer("trials", trials, at_least=1)
+        self._rollout = Rollout(colony.rollout.env, colony.max_steps)
+        self._levels = colony.table.copy()
+        self._tau0, self._heuristic = colony.tau0, colony.heuristic
+        self._first_trial = colony.trials
+        self._update = as_update(colony.update)
+        self._local_decay = colony.local_decay
+        self._global_decay = colony.global_decay
+        self._cost, self._deposit = colony.cost, colony.deposit
+
+    def reset(self, rng: np.random.Generator) -> None:
+        """Begin the first trial with the initial pheromone."""
+        n_cells, n_actions = self._levels.shape
+        # The ants set the exponents, which are a part of their selection rule.
+        self.pheromone = Pheromone(
+            n_cells, n_actions, self._tau0, alpha=1.0, heuristic=self._heuristic
+        )
+        self.pheromone.set_levels(self._levels)
+        self._rule = watched(as_update(self._update), n_actions)
+        self.costs: list[FloatArray] = []
+        self._begin_trial(rng)
+
+    @property
+    def done(self) -> bool:
+        """Whether all trials have been made."""
+        return len(self.costs) == self.trials
+
+    def observe(self) -> Observations:
+        """Return y_c of all ants."""
+        return Observations(
+            self._observation,
+            self._rollout.ants.copy(),
+            self._rollout.allowed(),
+            self.pheromone,
+            self._trial,
+        )
+
+    def step(self, u: Inputs, rng: np.random.Generator) -> None:
+        """Move the particles and decay the pheromone, or end the trial.
+
+        Raises:
+            ValueError: a solution's cost is not positive and finite.
+        """
+        if u.asks.all():
+            self._end_trial(u.solutions)
+            if not self.done:
+                self._begin_trial(rng)
+        elif u.ants.size:
+            self._take_in(self._rollout.move(u.actions))
+            self._rule.local_update(
+                self.pheromone, u.cells, u.degrees, u.actions, self._local_decay
+            )
+
+    @property
+    def _trial(self) -> int:
+        return self._first_trial + len(self.costs)
+
+    @property
+    def _needs_episodes(self) -> bool:
+        return self._cost is not None or self._update.needs_episodes
+
+    def _begin_trial(self, rng: np.random.Generator) -> None:
+        seed = int(rng.integers(2**31))
+        self._take_in(self._rollout.start(seed=seed, record=self._needs_episodes))
+        self._rule.start_trial(self.pheromone, self._trial)
+
+    def _end_trial(self, solutions: Solutions) -> None:
+        rollout = self._rollout
+        episodes = rollout.episodes() if self._needs_episodes else None
+        costs = rollout.cost
+        if self._cost is not None and episodes is not None:
+            costs = solution_costs(self._cost, episodes)
+        deposits = self._deposit(costs, self.pheromone.tau0)
+        result = TrialResult(
+            solutions,
+            costs,
+            checked_deposits(deposits, costs.size),
+            rollout.terminated,
+            episodes,
+        )
+        self._rule.global_update(
+            self.pheromone, result, self._local_decay, self._global_decay
+        )
+        self.pheromone.check_levels()
+        self.costs.append(costs)
+
+    def _take_in(self, observation: NDArray[Any]) -> None:
+        self._observation = observation
+        self.x = observation.reshape(len(observation), -1).astype(np.float64)
+
+
+def _check_colony(colony: Any) -> None:
+    if not isinstance(colony, ACL):
+        raise TypeError(f"colony must be an ACL, got {validation.shown(colony)}.")
+    colony.rollout.num_envs  # noqa: B018 - says so if there is no environment

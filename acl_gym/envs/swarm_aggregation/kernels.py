@@ -82,7 +82,8 @@ def look_around(
                             k -= 1
                         squares[k], who[k] = square, j
                         found = min(found + 1, count)
-            seen = ring * narrowest  # all within this distance have been seen
+            # All within this distance have been seen; one cell may be infinitely wide.
+            seen = ring * narrowest if ring > 0 else 0.0
             needed = collision_distance
             if limited:
                 needed = max(needed, sensing_radius)

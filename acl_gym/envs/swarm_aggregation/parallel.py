@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Mapping
 from typing import Any
 
@@ -76,13 +77,12 @@ class SwarmAggregationParallelEnv(
         self.render_mode = render_mode
         self.possible_agents = [f"agent_{i}" for i in range(self._env.num_envs)]
         self.agents: list[str] = []
-        # One for each agent: they have random numbers of their own.
-        self.observation_spaces = dict.fromkeys(
-            self.possible_agents, self._env.system.observation_space
-        )
-        self.action_spaces = dict.fromkeys(
-            self.possible_agents, self._env.system.action_space
-        )
+        # Each agent has its own, because spaces hold random numbers.
+        names, system = self.possible_agents, self._env.system
+        self.observation_spaces = {
+            agent: copy.copy(system.observation_space) for agent in names
+        }
+        self.action_spaces = {agent: copy.copy(system.action_space) for agent in names}
 
     def observation_space(self, agent: str) -> spaces.Box:
         """What an agent observes; always the same object."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, ClassVar
 
@@ -113,11 +113,7 @@ class SwarmAggregation:
                 "followers", self.followers, at_least=0, at_most=MOST_FOLLOWERS
             )
         for name in ("point_mass", "continuous"):
-            if not isinstance(getattr(self, name), bool):
-                raise TypeError(
-                    f"{name} must be True or False, got "
-                    f"{validation.shown(getattr(self, name))}."
-                )
+            values[name] = validation.flag(name, getattr(self, name))
         for name in _POSITIVE:
             values[name] = validation.number(name, getattr(self, name), above=0)
         for name in _NOT_NEGATIVE:
@@ -243,10 +239,6 @@ class SwarmAggregation:
                 f"row {row}."
             )
         return array
-
-    def parameters(self) -> dict[str, Any]:
-        """All fields by their names."""
-        return {each.name: getattr(self, each.name) for each in fields(self)}
 
     def _check_places(self) -> None:
         for x, y, radius in self.obstacles:

@@ -75,6 +75,8 @@ class SwarmAggregationVectorEnv(ChoosesAutoreset, VectorEnv[FloatArray, Any, Any
         "autoreset_mode": AutoresetMode.NEXT_STEP,
     }
     system_type: ClassVar[type[SwarmAggregation]] = SwarmAggregation
+    slots_share_a_world: ClassVar[bool] = True
+    """Its slots cannot be taken apart, as the slots of other environments can."""
 
     def __init__(
         self,

@@ -114,12 +114,30 @@ def shortened(vectors: FloatArray, longest: Parameter) -> FloatArray:
     limit = np.asarray(longest)
     if limit.ndim == 0 and limit == math.inf:
         return vectors
-    # By the largest coordinate first, whose square could overflow.
-    size = np.abs(vectors).max(axis=1, initial=0.0)
-    scale = np.where(size > 0, size, 1.0)
-    norm = scale * np.sqrt(np.square(vectors / scale[:, None]).sum(axis=1))
-    share = np.where(norm > limit, limit / np.maximum(norm, 1e-300), 1.0)
-    return np.asarray(vectors * share[:, None])
+    short = np.empty(vectors.shape)
+    _shorten(vectors, limit.reshape(-1), short)
+    return short
+
+
+@njit
+def _shorten(vectors: FloatArray, limits: FloatArray, short: FloatArray) -> None:
+    """Write vectors of at most the norm `limits[i]`, or `limits[0]`, into `short`."""
+    n, dim = vectors.shape
+    for i in range(n):
+        limit = limits[i] if limits.size > 1 else limits[0]
+        largest = 0.0
+        for k in range(dim):
+            largest = max(largest, abs(vectors[i, k]))
+        scale, square = 1.0, 0.0
+        if largest > 0.0:
+            # Divided by the largest coordinate, none has a square that overflows.
+            for k in range(dim):
+                square += (vectors[i, k] / largest) ** 2
+            norm = np.sqrt(square)
+            if norm > limit / largest:
+                scale = limit / largest / norm
+        for k in range(dim):
+            short[i, k] = vectors[i, k] * scale
 
 
 @njit

@@ -18,17 +18,28 @@ _NOTHING: IntArray = np.empty(0, np.int64)
 class Links:
     """The neighbourhoods N_i of all agents, Definition 6.6; they do not change.
 
-    A link leads from a sender to a receiver: agent i hears agent j if j is in N_i. Make
-    them with `everyone`, `from_pairs` or `from_lists`.
+    A link leads from a sender to a receiver: agent i hears agent j if j is in N_i. Links
+    are most easily made with `everyone`, `from_pairs` or `from_lists`.
+
+    Args:
+        n: the number of agents, >= 1.
+        sender: whom the receivers hear, `(n_links,)` int64: the numbers of those that
+            agent 0 hears in ascending order, then of those that agent 1 hears, and so on.
+        offsets: the senders of receiver i are `sender[offsets[i]:offsets[i + 1]]`,
+            `(n + 1,)` int64.
 
     Attributes:
-        n: the number of agents, >= 1.
+        n: the number of agents.
         n_links: the number of links.
         complete: whether every agent hears all agents, itself included. Such links are
             not written out, so that they need no memory; `receiver`, `sender` and
             `offsets` are made when they are asked for.
         all_others: whether every agent hears all agents but itself. Not written out
             either.
+
+    Raises:
+        TypeError: `n` is not an integer.
+        ValueError: the arrays are not as described.
     """
 
     __slots__ = ("_offsets", "_receiver", "_sender", "all_others", "complete", "n")
@@ -40,16 +51,35 @@ class Links:
     _offsets: IntArray
     _receiver: IntArray | None  # made when it is asked for
 
-    def __init__(
+    def __init__(self, n: int, sender: IntArray, offsets: IntArray) -> None:
+        n = validation.integer("n", n, at_least=1)
+        for array in (sender, offsets):
+            if not isinstance(array, np.ndarray) or array.dtype != np.int64:
+                raise ValueError(
+                    "sender and offsets must be arrays of int64, got "
+                    f"{validation.shown(array)}; use Links.from_pairs for others."
+                )
+        if (
+            sender.ndim != 1
+            or offsets.shape != (n + 1,)
+            or not _in_rows(sender, offsets)
+        ):
+            raise ValueError(
+                f"offsets must be n + 1 = {n + 1} numbers that rise from 0 to the number "
+                f"of links, and senders from 0 to {n - 1} must ascend between them, got "
+                f"offsets {validation.shown(offsets)} for {sender.size} senders; use "
+                "Links.from_pairs for links in any order."
+            )
+        self._set(n, sender, offsets)
+
+    def _set(
         self,
         n: int,
         sender: IntArray = _NOTHING,
         offsets: IntArray = _NOTHING,
-        *,
         complete: bool = False,
         all_others: bool = False,
     ) -> None:
-        # Not checked: `everyone`, `from_pairs` and `from_lists` are for users.
         set_once = super().__setattr__
         set_once("n", n)
         set_once("complete", complete)
@@ -83,7 +113,9 @@ class Links:
         """
         n = validation.integer("n", n, at_least=1)
         include_self = validation.flag("include_self", include_self)
-        return cls(n, complete=include_self, all_others=not include_self)
+        links = cls.__new__(cls)
+        links._set(n, complete=include_self, all_others=not include_self)
+        return links
 
     @classmethod
     def from_pairs(cls, n: int, receiver: ArrayLike, sender: ArrayLike) -> Links:
@@ -255,6 +287,23 @@ def _check_room(n_links: int) -> None:
         "let each agent hear fewer others, or use Inbox.best and Inbox.sum, which need "
         "no list of the links",
     )
+
+
+@njit
+def _in_rows(senders: IntArray, offsets: IntArray) -> bool:
+    """Whether senders ascend, and exist, in the row of each receiver."""
+    n = offsets.size - 1
+    if offsets[0] != 0 or offsets[n] != senders.size:
+        return False
+    for i in range(n):
+        if not offsets[i] <= offsets[i + 1] <= senders.size:
+            return False
+        before = -1
+        for link in range(offsets[i], offsets[i + 1]):
+            if not before < senders[link] < n:
+                return False
+            before = senders[link]
+    return True
 
 
 @njit

@@ -181,7 +181,14 @@ class Silence(Topology):
         return Links.from_lists([[]] * len(x))
 
 
-@pytest.mark.parametrize("channel", [Ring(), Silence()], ids=["ring", "silence"])
+class OneHears(Topology):
+    """Ant 0 hears all, the others nobody."""
+
+    def links(self, x: Any) -> Links:
+        return Links.from_lists([range(len(x)), *[[]] * (len(x) - 1)])
+
+
+@pytest.mark.parametrize("channel", [Ring(), Silence(), OneHears()])
 def test_ants_that_do_not_hear_from_all_wait_for_their_clock(channel: Channel) -> None:
     settings = {"max_steps": 5000, "alpha": 1.0}
     levels, steps = lengths(colony(GRID, **settings), 3, None)

@@ -110,3 +110,34 @@ def test_a_subset_needs_a_flag_for_each_link(kept) -> None:
 
 def test_repr_says_how_many_there_are() -> None:
     assert repr(Links.from_lists([[1], []])) == "Links(n=2, n_links=1)"
+
+
+@given(neighbourhoods())
+def test_rows_of_senders_are_taken_as_they_are(lists) -> None:
+    links = Links.from_lists(lists)
+    again = Links(links.n, links.sender.copy(), links.offsets.copy())
+    assert as_lists(again) == as_lists(links)
+
+
+@pytest.mark.parametrize(
+    ("sender", "offsets"),
+    [
+        ([0, 1], [0, 1]),  # a row is missing
+        ([0, 1], [0, 1, 1]),  # a sender is left over
+        ([0, 1], [1, 1, 2]),
+        ([0, 1], [0, 3, 2]),
+        ([1, 0], [0, 2, 2]),  # does not ascend
+        ([0, 0], [0, 2, 2]),  # twice
+        ([0, 2], [0, 1, 2]),  # there is no agent 2
+        ([0, -1], [0, 1, 2]),
+        ([[0, 1]], [0, 1, 2]),
+    ],
+)
+def test_rows_of_senders_are_checked(sender, offsets) -> None:
+    arrays = np.array(sender), np.array(offsets)
+    with pytest.raises(ValueError, match=r"offsets must be n \+ 1 = 3 numbers"):
+        Links(2, *arrays)
+    with pytest.raises(ValueError, match="must be arrays of int64"):
+        Links(2, *(each.astype(float) for each in arrays))
+    with pytest.raises(ValueError, match="must be arrays of int64"):
+        Links(2, sender, offsets)

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from acl_gym.swarm.aggregation.cells import MOST_AXES
+from acl_gym.swarm.cells import MOST_AXES
 from acl_gym.utils.compiling import njit
 from acl_gym.utils.typing import FloatArray, IntArray
 

@@ -11,8 +11,8 @@ import numpy as np
 from acl_gym.envs.swarm_aggregation.kernels import look_around
 from acl_gym.envs.swarm_aggregation.system import SwarmAggregation
 from acl_gym.swarm.aggregation import forces_within
-from acl_gym.swarm.aggregation.cells import sort_into_cells
 from acl_gym.swarm.aggregation.particles import shortened
+from acl_gym.swarm.cells import sort_into_cells
 from acl_gym.utils import validation
 from acl_gym.utils.typing import BoolArray, FloatArray, IntArray
 

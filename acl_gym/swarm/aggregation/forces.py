@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from acl_gym.swarm.aggregation import kernels
-from acl_gym.swarm.aggregation.cells import MOST_AXES, sort_into_cells
 from acl_gym.swarm.aggregation.interaction import Interaction
+from acl_gym.swarm.cells import MOST_AXES, sort_into_cells
 from acl_gym.swarm.links import Links
 from acl_gym.swarm.rows import checked_positions, per_agent
 from acl_gym.utils import threads

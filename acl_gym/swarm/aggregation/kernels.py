@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 from numba import prange
 
-from acl_gym.swarm.aggregation.cells import beside
+from acl_gym.swarm.cells import beside
 from acl_gym.utils.compiling import njit
 from acl_gym.utils.fast_math import exponential
 from acl_gym.utils.threads import shared_among_threads

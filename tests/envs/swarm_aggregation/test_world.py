@@ -14,7 +14,7 @@ from hypothesis.extra.numpy import arrays
 from acl_gym.envs.swarm_aggregation import SwarmAggregation
 from acl_gym.envs.swarm_aggregation.kernels import look_around
 from acl_gym.envs.swarm_aggregation.world import World
-from acl_gym.swarm.aggregation.cells import sort_into_cells
+from acl_gym.swarm.cells import sort_into_cells
 from tests.envs.swarm_aggregation import reference_world as reference
 
 RNG = np.random.default_rng

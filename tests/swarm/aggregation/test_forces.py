@@ -19,7 +19,7 @@ from acl_gym.swarm.aggregation import (
     forces_within,
     kernels,
 )
-from acl_gym.swarm.aggregation.cells import Cells, sort_into_cells
+from acl_gym.swarm.cells import Cells, sort_into_cells
 from acl_gym.utils import threads
 from tests.swarm.aggregation import reference
 from tests.swarm.aggregation.cases import interactions, positions

@@ -17,7 +17,7 @@ from acl_gym.utils.typing import FloatArray, IntArray
 MOST_AXES = 3
 """Axes of a grid: with more, cells would be many and mostly empty."""
 
-_SLACK = 1.0 + 1e-9
+SLACK = 1.0 + 1e-9
 """Cells are wider than the radius by this factor, so that rounding moves nobody too far."""
 
 
@@ -66,7 +66,7 @@ def sort_into_cells(
             least = min(least, positions[i, k])
             largest = max(largest, positions[i, k])
         extent = largest - least
-        count = min(most, np.floor(extent / (radius * _SLACK)))
+        count = min(most, np.floor(extent / (radius * SLACK)))
         if count >= 1.0 and extent < np.inf:
             axis = absent + k
             shape[axis] = int(count)

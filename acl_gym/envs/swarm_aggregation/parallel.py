@@ -142,16 +142,18 @@ class SwarmAggregationParallelEnv(
             )
         rows = np.array([actions[agent] for agent in self.agents])
         observations, rewards, terminated, truncated, infos = self._env.step(rows)
-        told = {
-            agent: {name: infos[name][i].item() for name in ("distance", "collisions")}
-            for i, agent in enumerate(self.agents)
-        }
+        told = [
+            {"distance": distance, "collisions": collisions}
+            for distance, collisions in zip(
+                infos["distance"].tolist(), infos["collisions"].tolist(), strict=True
+            )
+        ]
         results = (
             self._of_each(observations),
             self._of_each(rewards.tolist()),
             self._of_each(terminated.tolist()),
             self._of_each(truncated.tolist()),
-            told,
+            self._of_each(told),
         )
         if truncated.all():
             self.agents = []

@@ -177,6 +177,8 @@ def test_messages_that_are_a_step_old_move_the_centre() -> None:
     """Definition 6.2 read literally: y = x_i(k) - x_j(k - 1) is not odd in i and j."""
     assert drift(Everyone()) < 1e-14
     assert drift(Everyone(), stale=True) > 1e-3
+    # The same as a channel that is a step late.
+    assert drift(Everyone(), stale=True) == drift(Delayed(Everyone(), 1))
 
 
 def test_agents_that_differ_do_not_keep_it_either() -> None:

@@ -117,6 +117,9 @@ class Environment:
     def vector(self, slots: int, real_inputs: bool = False) -> VectorEnv[Any, Any, Any]:
         """Make it with some slots; one of this package natively.
 
+        Where the slots of a native environment would share a world, how many there are
+        would be a part of the task. Then each slot has a single environment of its own.
+
         Args:
             slots: how many.
             real_inputs: whether its actions may be a Box.
@@ -129,9 +132,8 @@ class Environment:
 
         self.check_id()
         self._check_arguments()
-        native = gym.registry[self.name].vector_entry_point is not None
         with bad_arguments():
-            if self.bins is None and native:
+            if self.bins is None and self._has_native_slots():
                 env: VectorEnv[Any, Any, Any] = gym.make_vec(
                     self.name, num_envs=slots, **self.arguments
                 )
@@ -148,6 +150,14 @@ class Environment:
             keywords["render_mode"] = render_mode
         env = gym.make(self.name, **keywords)
         return env if self.bins is None else _discretized(self.name, env, self.bins)
+
+    def _has_native_slots(self) -> bool:
+        """Whether there is a native vector environment, whose slots are independent."""
+        entry_point: Any = gym.registry[self.name].vector_entry_point
+        if self.is_own and isinstance(entry_point, str):
+            entry_point = load_env_creator(entry_point)
+        shared = getattr(entry_point, "slots_share_a_world", False)
+        return entry_point is not None and not shared
 
     def _check_arguments(self) -> None:
         for name in self.arguments:

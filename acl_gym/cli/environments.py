@@ -18,6 +18,7 @@ from gymnasium.envs.registration import load_env_creator
 
 from acl_gym.cli.errors import BadArgumentError, bad_arguments
 from acl_gym.envs import ENVIRONMENTS
+from acl_gym.utils.vector_envs import has_independent_slots
 
 if TYPE_CHECKING:
     from gymnasium.vector import VectorEnv
@@ -133,7 +134,7 @@ class Environment:
         self.check_id()
         self._check_arguments()
         with bad_arguments():
-            if self.bins is None and self._has_native_slots():
+            if self.bins is None and has_independent_slots(self.name):
                 env: VectorEnv[Any, Any, Any] = gym.make_vec(
                     self.name, num_envs=slots, **self.arguments
                 )
@@ -150,14 +151,6 @@ class Environment:
             keywords["render_mode"] = render_mode
         env = gym.make(self.name, **keywords)
         return env if self.bins is None else _discretized(self.name, env, self.bins)
-
-    def _has_native_slots(self) -> bool:
-        """Whether there is a native vector environment, whose slots are independent."""
-        entry_point: Any = gym.registry[self.name].vector_entry_point
-        if self.is_own and isinstance(entry_point, str):
-            entry_point = load_env_creator(entry_point)
-        shared = getattr(entry_point, "slots_share_a_world", False)
-        return entry_point is not None and not shared
 
     def _check_arguments(self) -> None:
         for name in self.arguments:

@@ -3,7 +3,7 @@
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help install compare bench bench-peers peers-mushroom peers-pets peers-swarms test lint format build check-wheel clean distclean
+.PHONY: help install compare bench bench-peers peers-mushroom peers-pets peers-swarms peers-mpe2 test lint format build check-wheel clean distclean
 
 VENV := .venv
 BIN := $(VENV)/bin
@@ -17,6 +17,8 @@ PETS_VENV := .venv-pets
 PETS_STAMP := $(PETS_VENV)/.installed
 SWARMS_VENV := .venv-swarms
 SWARMS_STAMP := $(SWARMS_VENV)/.installed
+MPE2_VENV := .venv-mpe2
+MPE2_STAMP := $(MPE2_VENV)/.installed
 
 # The first interpreter that works, is recent enough and can make an environment.
 PYTHON ?= $(shell for python in python3.11 python3; do \
@@ -106,6 +108,16 @@ $(SWARMS_STAMP): benchmarks/swarms-requirements.txt
 	@$(SWARMS_VENV)/bin/python $(PIP_INSTALL) -r benchmarks/swarms-requirements.txt
 	@touch $@
 
+peers-mpe2: $(STAMP) $(MPE2_STAMP) ## Measure swarms beside mpe2's simple_spread
+	$(BIN)/python benchmarks/swarm_aggregation.py $(ARGS)
+
+$(MPE2_STAMP): benchmarks/mpe2-requirements.txt
+	@rm -rf $(MPE2_VENV)
+	@$(BIN)/python -m venv $(MPE2_VENV)
+	@echo "Installing mpe2 into $(MPE2_VENV): a minute, once"
+	@$(MPE2_VENV)/bin/python $(PIP_INSTALL) -r benchmarks/mpe2-requirements.txt
+	@touch $@
+
 test: $(STAMP) ## Run every test
 	$(BIN)/python -m pytest -n $(WORKERS) --dist worksteal $(ARGS)
 
@@ -138,4 +150,4 @@ clean: ## Remove builds and caches, including compiled kernels
 		-exec rm -rf {} +
 
 distclean: clean ## Remove .venv as well
-	rm -rf $(VENV) $(PEERS_VENV) $(MUSHROOM_VENV) $(PETS_VENV) $(SWARMS_VENV)
+	rm -rf $(VENV) $(PEERS_VENV) $(MUSHROOM_VENV) $(PETS_VENV) $(SWARMS_VENV) $(MPE2_VENV)

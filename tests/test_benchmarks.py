@@ -70,6 +70,36 @@ def test_moving_agents() -> None:
     assert rows["Radius(0.3, include_self=True)"]["disagreement"] > 0.1
 
 
+def test_swarm_aggregation() -> None:
+    sizes = ["--agents", "40,80", "--seconds", "0.01", "--repetitions", "1"]
+    found = output_of("swarm_aggregation.py", *sizes, "--no-peer")
+    assert len(found["rows"]) == 8
+    for row in found["rows"]:
+        rate = row["agents"] / row["seconds"]
+        assert row["agent_steps_per_second"] == pytest.approx(rate)
+    assert set(found["growth"]) == {"forces", "run", "environment", "pettingzoo"}
+    assert found["simple_spread"] is None
+
+
+def test_swarm_aggregation_figures() -> None:
+    found = output_of("swarm_aggregation_figures.py")
+    for row in found["sizes"]:
+        assert row["rms"] <= row["size"] < row["size_bound"]
+        assert row["rms"] < row["rms_bound"]
+    assert found["law"]["largest_error"] < 1e-6
+    moved = {row["channel"]: row["moved"] for row in found["centres"]}
+    assert moved["Everyone()"] < 1e-12 < 1e-3 < moved["Nearest(5)"]
+
+
+def test_swarm_aggregation_learning() -> None:
+    found = output_of("swarm_aggregation_learning.py", "--methods", "rule,mean,stay")
+    rule, mean, stay = found["runs"]
+    assert rule["cost"] < stay["cost"] < mean["cost"]
+    for run in found["runs"]:
+        parts = run["distance"] + run["collisions"]
+        assert run["cost"] == pytest.approx(parts)
+
+
 def test_aco_theory() -> None:
     for row in output_of("aco_theory.py", "--colonies", "50")["rows"]:
         assert row["highest_level"] <= 1 + 1e-12

@@ -18,6 +18,7 @@ from gymnasium.envs.registration import load_env_creator
 
 from acl_gym.cli.errors import BadArgumentError, bad_arguments
 from acl_gym.envs import ENVIRONMENTS
+from acl_gym.utils.vector_envs import has_independent_slots
 
 if TYPE_CHECKING:
     from gymnasium.vector import VectorEnv
@@ -117,6 +118,9 @@ class Environment:
     def vector(self, slots: int, real_inputs: bool = False) -> VectorEnv[Any, Any, Any]:
         """Make it with some slots; one of this package natively.
 
+        Where the slots of a native environment would share a world, how many there are
+        would be a part of the task. Then each slot has a single environment of its own.
+
         Args:
             slots: how many.
             real_inputs: whether its actions may be a Box.
@@ -129,9 +133,8 @@ class Environment:
 
         self.check_id()
         self._check_arguments()
-        native = gym.registry[self.name].vector_entry_point is not None
         with bad_arguments():
-            if self.bins is None and native:
+            if self.bins is None and has_independent_slots(self.name):
                 env: VectorEnv[Any, Any, Any] = gym.make_vec(
                     self.name, num_envs=slots, **self.arguments
                 )

@@ -141,10 +141,10 @@ def _attributes(text: str) -> dict[str, str]:
 
 
 def _example(env_id: str, seed: int) -> dict[str, Any]:
-    env: Any = Environment(env_id).vector(1)
+    env: Any = Environment(env_id).single()
     observation, _ = env.reset(seed=seed)
     return {
-        "example": observation[0].tolist(),
+        "example": observation.tolist(),
         "parameters": parameters(type(env.unwrapped.system)),
     }
 

@@ -15,6 +15,7 @@ it.
 | GridSearch2D-v0 | 435 | 5 times the 87 states of the default map |
 | Navigation-v0 | 150 | Table 4.1 |
 | Pendulum-v0 | 300 | Table 5.2 |
+| SwarmAggregation-v0 | 100 | twice what an agent needs through the world |
 | TwoState-v0 | 2 | every episode ends after two steps |
 | TravellingSalesman-v0 | 100,000 | the most cities that an instance may have |
 
@@ -93,6 +94,11 @@ ENVIRONMENTS = {
         "acl_gym.envs.graph.travelling_salesman:TravellingSalesmanEnv",
         "acl_gym.envs.graph.travelling_salesman:TravellingSalesmanVectorEnv",
         100_000,
+    ),
+    "acl_gym/SwarmAggregation-v0": Entry(
+        "acl_gym.envs.swarm_aggregation:SwarmAggregationEnv",
+        "acl_gym.envs.swarm_aggregation:SwarmAggregationVectorEnv",
+        100,
     ),
 }
 

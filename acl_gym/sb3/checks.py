@@ -9,7 +9,7 @@ from gymnasium import spaces
 from gymnasium.vector import AsyncVectorEnv, AutoresetMode, SyncVectorEnv, VectorEnv
 
 from acl_gym.envs import received
-from acl_gym.envs.control.environments import ControlVectorEnv
+from acl_gym.envs.autoreset import ChoosesAutoreset
 from acl_gym.utils import validation
 
 _SUPPORTED_MODES = (AutoresetMode.DISABLED, AutoresetMode.SAME_STEP)
@@ -31,7 +31,7 @@ def settle_mode(env: VectorEnv[Any, Any, Any]) -> AutoresetMode:
     if mode in _SUPPORTED_MODES:
         return mode
     # Not below wrappers, which may have read the mode already.
-    if isinstance(env, ControlVectorEnv):
+    if isinstance(env, ChoosesAutoreset):
         env.set_autoreset_mode(AutoresetMode.DISABLED)
         return AutoresetMode.DISABLED
     raise ValueError(
@@ -46,7 +46,7 @@ def _with_autoreset_disabled(env: VectorEnv[Any, Any, Any]) -> str:
     base = env.unwrapped
     mode, count = '"Disabled"', env.num_envs
     env_id = "id" if base.spec is None else f'"{base.spec.id}"'
-    if isinstance(base, ControlVectorEnv):
+    if isinstance(base, ChoosesAutoreset):
         return f"gym.make_vec({env_id}, num_envs={count}, autoreset_mode={mode})"
     if isinstance(base, (SyncVectorEnv, AsyncVectorEnv)) and base.spec is None:
         return f"{type(base).__name__}(env_fns, autoreset_mode={mode})"

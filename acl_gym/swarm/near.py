@@ -1,21 +1,22 @@
-"""Which agents are near each other, found with SciPy's k-d tree."""
+"""Which agents are near each other: within a radius, or nearest."""
 
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 from scipy.spatial import cKDTree
 
+from acl_gym.swarm.cells import MOST_AXES, SLACK, sort_into_cells
 from acl_gym.utils import validation
 from acl_gym.utils.compiling import njit
 from acl_gym.utils.typing import FloatArray, IntArray
 
-_SLIGHTLY = 1.0 + 1e-9
-"""More than by what the tree's distances and ours differ."""
+_PAIRS_AT_ONCE = 10_000_000
+"""Pairs of agents that are looked at before the room for links is checked."""
 
-_MANY = 10_000
-"""Agents from which on pairs are counted before they are listed."""
+_NOTHING: IntArray = np.empty(0, np.int64)
 
 
 def within_radius(
@@ -35,12 +36,26 @@ def within_radius(
     Raises:
         ValueError: no memory is large enough for them.
     """
-    receiver, sender = _candidates(x, sigma)
-    if include_self:
-        themselves = np.arange(len(x))
-        receiver = np.concatenate([receiver, themselves])
-        sender = np.concatenate([sender, themselves])
-    return _transposed(*_heard_by(x, sigma, receiver, sender))
+    n = len(x)
+    useful = sigma[(sigma > 0.0) & np.isfinite(sigma)]
+    side = float(np.median(useful)) if useful.size else math.inf
+    cells = sort_into_cells(np.ascontiguousarray(x[:, :MOST_AXES]), side)
+    offsets = np.zeros(n + 1, np.int64)
+    n_links, at_once = 0, max(1, _PAIRS_AT_ONCE // n)
+    for begin in range(0, n, at_once):
+        n_links += _within(
+            *(x, sigma, include_self, cells),
+            *(begin, min(begin + at_once, n), offsets, _NOTHING),
+        )
+        # Now and then, because counting what has no room would take long.
+        validation.check_memory(
+            f"{n_links:,} links", 24 * n_links, "use a smaller radius or fewer agents"
+        )
+    np.cumsum(offsets, out=offsets)
+    sender = np.empty(n_links, np.int64)
+    _within(x, sigma, include_self, cells, 0, n, offsets, sender)
+    # Transposed twice, the senders of each receiver are sorted.
+    return _transposed(*_transposed(sender, offsets))
 
 
 def nearest(x: FloatArray, k: int, include_self: bool) -> tuple[IntArray, IntArray]:
@@ -74,67 +89,77 @@ def nearest(x: FloatArray, k: int, include_self: bool) -> tuple[IntArray, IntArr
     return found.reshape(-1), np.arange(n + 1) * found.shape[1]
 
 
-def _candidates(x: FloatArray, sigma: FloatArray) -> tuple[IntArray, IntArray]:
-    """All receivers and senders, in any order, where one may hear another, and more."""
-    tree = cKDTree(x)
-    # Beyond all agents; a radius may be infinite.
-    farthest = 2.0 * float(np.linalg.norm(np.ptp(x, axis=0)))
-    radius = np.minimum(sigma, farthest) * _SLIGHTLY
-    largest = float(radius.max())
-    if largest <= 2.0 * radius.min():
-        _check_room(tree, tree, largest)
-        pairs = tree.query_pairs(largest, output_type="ndarray")
-        return pairs.reshape(-1), pairs[:, ::-1].reshape(-1)
-    # One large radius must not make all others look as far. So agents search in groups
-    # whose radii differ by a factor of two at most.
-    _, group = np.frexp(radius)
-    parts = []
-    for size in np.unique(group[radius > 0.0]):
-        agents = np.flatnonzero((group == size) & (radius > 0.0))
-        searching, reach = cKDTree(x[agents]), float(radius[agents].max())
-        _check_room(searching, tree, reach)
-        near = searching.sparse_distance_matrix(tree, reach, output_type="ndarray")
-        parts.append((agents[near["i"]], near["j"].astype(np.int64)))
-    receiver = np.concatenate([each for each, _ in parts])
-    sender = np.concatenate([each for _, each in parts])
-    others = receiver != sender
-    return receiver[others], sender[others]
+@njit(error_model="numpy")
+def _within(
+    x: FloatArray,
+    sigma: FloatArray,
+    include_self: bool,
+    cells: tuple[Any, ...],
+    begin: int,
+    end: int,
+    offsets: IntArray,
+    sender: IntArray,
+) -> int:
+    """Count the links of receiver i in `offsets[i + 1]`, or fill in the senders.
+
+    Args:
+        x: see `within_radius`.
+        sigma: see there.
+        include_self: see there.
+        cells: the fields of `Cells`, of the first three coordinates.
+        begin: the first of the receivers, in the order of the cells.
+        end: the one after the last.
+        offsets: receives the numbers of links; else where those of each receiver begin.
+        sender: of no length, to count; else receives the senders, in any order.
+
+    Returns:
+        How many links they are.
+    """
+    shape, first, agent, cell, place, width = cells
+    n, dim = x.shape
+    planes, rows, columns = shape
+    counting = sender.size == 0
+    found = np.empty(0 if counting else n + 1, np.int64)
+    total = 0
+    for at in range(begin, end):
+        i = agent[at]
+        radius = sigma[i]
+        rest, column = divmod(cell[at], columns)
+        plane, row = divmod(rest, rows)
+        to_planes = _reach(radius, width[0], planes)
+        to_rows = _reach(radius, width[1], rows)
+        to_columns = _reach(radius, width[2], columns)
+        from_column = max(column - to_columns, 0)
+        to_column = min(column + to_columns + 1, columns)
+        x0, x1, x2 = place[0, at], place[1, at], place[2, at]
+        count = 0
+        for p in range(max(plane - to_planes, 0), min(plane + to_planes + 1, planes)):
+            for q in range(max(row - to_rows, 0), min(row + to_rows + 1, rows)):
+                line = (p * rows + q) * columns
+                for j in range(first[line + from_column], first[line + to_column]):
+                    d0, d1, d2 = x0 - place[0, j], x1 - place[1, j], x2 - place[2, j]
+                    square = d0 * d0 + d1 * d1 + d2 * d2
+                    for k in range(MOST_AXES, dim):
+                        d = x[i, k] - x[agent[j], k]
+                        square += d * d
+                    if not counting:
+                        # Overwritten by the next one if it is too far: no branch.
+                        found[np.uint64(count)] = agent[j]
+                    count += (np.sqrt(square) < radius) & (include_self | (j != at))
+        total += count
+        if counting:
+            offsets[i + 1] = count
+        else:
+            for link in range(count):
+                sender[offsets[i] + link] = found[link]
+    return total
 
 
-def _check_room(searching: cKDTree, tree: cKDTree, radius: float) -> None:
-    if searching.n * tree.n >= _MANY**2:
-        n_links = int(searching.count_neighbors(tree, radius))
-        validation.check_memory(
-            f"{n_links:,} links", 64 * n_links, "use a smaller radius or fewer agents"
-        )
-
-
-@njit
-def _heard_by(
-    x: FloatArray, sigma: FloatArray, receiver: IntArray, sender: IntArray
-) -> tuple[IntArray, IntArray]:
-    """The receivers of each sender that are within their radius of it, in any order."""
-    n, n_links = len(x), 0
-    begin = np.zeros(n + 1, np.int64)
-    near = np.empty((2, receiver.size), np.int64)
-    for link in range(receiver.size):
-        i, j = receiver[link], sender[link]
-        square = 0.0
-        for axis in range(x.shape[1]):
-            square += (x[i, axis] - x[j, axis]) ** 2
-        if math.sqrt(square) < sigma[i]:
-            near[0, n_links], near[1, n_links] = i, j
-            n_links += 1
-            begin[j + 1] += 1
-    for j in range(n):
-        begin[j + 1] += begin[j]
-    free = begin.copy()
-    receivers = np.empty(n_links, np.int64)
-    for link in range(n_links):
-        j = near[1, link]
-        receivers[free[j]] = near[0, link]
-        free[j] += 1
-    return receivers, begin
+@njit(error_model="numpy")
+def _reach(radius: float, width: float, count: int) -> int:
+    """How many cells along an axis a radius reaches to either side."""
+    cells = np.ceil(radius * SLACK / width)
+    return int(cells) if cells < count else count
 
 
 @njit

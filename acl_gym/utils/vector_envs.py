@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import gymnasium as gym
-from gymnasium.envs.registration import EnvSpec
+from gymnasium.envs.registration import EnvSpec, load_env_creator
 from gymnasium.vector import VectorEnv
 
 _MANY = 100
@@ -38,6 +38,22 @@ def require_vector_env(env: Any) -> None:
     else:
         kind, remedy = type(env).__name__, f"use {_line(None, None, _MANY)}"
     raise TypeError(f"env must be a gymnasium.vector.VectorEnv, got {kind}; {remedy}.")
+
+
+def has_independent_slots(env_id: str) -> bool:
+    """Whether an id has a native vector environment whose slots are copies of a task.
+
+    Where slots share a world, what they meet depends on how many there are. Who needs
+    some slots for learning and others for an evaluation takes single environments then.
+
+    Args:
+        env_id: of a registered environment.
+    """
+    entry_point: Any = gym.spec(env_id).vector_entry_point
+    if isinstance(entry_point, str):
+        entry_point = load_env_creator(entry_point)
+    shared = getattr(entry_point, "slots_share_a_world", False)
+    return entry_point is not None and not shared
 
 
 def _line(spec: EnvSpec | None, maker: str | None, count: int) -> str:

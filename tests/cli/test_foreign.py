@@ -15,6 +15,7 @@ from gymnasium.wrappers import DiscretizeAction
 from PIL import Image
 
 from acl_gym import ACL, ReturningACL, WaitingVectorEnv, evaluate_policy_cost
+from acl_gym.cli.environments import Environment
 from tests.cli.runner import PENDULUM, SMALL, figures, invoke, refused
 
 FEW = ["--ants", "10", "--trials", "2", "--max-steps", "20"]
@@ -202,3 +203,13 @@ def test_any_environment_is_compared(tmp_path: Path) -> None:
 
 def test_our_own_environments_report_costs() -> None:
     assert "policy cost" in invoke("train", PENDULUM, *FEW).stdout
+
+
+def test_slots_of_a_shared_world_are_worlds_of_their_own() -> None:
+    """So that their number is no part of the task."""
+    env = Environment("acl_gym/SwarmAggregation-v0", {"nearest": 0}).vector(3)
+    assert isinstance(env, WaitingVectorEnv)
+    assert env.reset(seed=0)[0].shape == (3, 4)
+    assert (
+        "policy return" in invoke("train", "acl_gym/SwarmAggregation-v0", *FEW).stdout
+    )

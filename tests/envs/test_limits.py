@@ -22,6 +22,7 @@ LIMITS = {
     "acl_gym/DoubleBridge-v0": 100,
 }
 TOUR = "acl_gym/TravellingSalesman-v0"  # see tests/envs/graph
+SWARM = "acl_gym/SwarmAggregation-v0"  # whose slots share an episode, see tests/envs
 ROW = "acl_gym/GridSearch1D-v0"
 WEST = 0  # never reaches the goal, in the east
 
@@ -29,8 +30,9 @@ ids = pytest.mark.parametrize("env_id", LIMITS)
 
 
 def test_every_id_has_a_limit() -> None:
-    assert {*LIMITS, TOUR} == set(ENVIRONMENTS)
+    assert {*LIMITS, TOUR, SWARM} == set(ENVIRONMENTS)
     assert gym.spec(TOUR).max_episode_steps == 100_000
+    assert gym.spec(SWARM).max_episode_steps == 100
 
 
 @ids

@@ -29,7 +29,7 @@ from acl_gym import (
 )
 from acl_gym.evaluation import actions_in, record_trajectory, with_slots_for
 from acl_gym.sb3.callback import PolicyCostCallback
-from acl_gym.utils.vector_envs import require_vector_env
+from acl_gym.utils.vector_envs import has_independent_slots, require_vector_env
 
 LINE = "acl_gym/GridSearch1D-v0"
 
@@ -181,3 +181,10 @@ def test_whatever_takes_a_vector_environment_says_so(
 ) -> None:
     with pytest.raises(TypeError, match=r"VectorEnv, got .*acl_gym\.WaitingVectorEnv"):
         take(wrong())
+
+
+def test_slots_of_a_swarm_are_not_independent() -> None:
+    assert has_independent_slots("acl_gym/Pendulum-v0")
+    assert has_independent_slots("CartPole-v1")
+    assert not has_independent_slots("acl_gym/SwarmAggregation-v0")
+    assert not has_independent_slots("MountainCar-v0")  # has no native one

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import inspect
 from difflib import get_close_matches
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeVar
 
 import gymnasium as gym
 import numpy as np
 from gymnasium import spaces
-from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
 from acl_gym.envs.control.system import ControlSystem
@@ -18,8 +17,10 @@ from acl_gym.utils.boxes import input_bounds
 from acl_gym.utils.compiling import njit
 from acl_gym.utils.typing import BoolArray, FloatArray, IntArray
 
+System = TypeVar("System")
 
-def made_system(kind: type[ControlSystem], parameters: dict[str, Any]) -> ControlSystem:
+
+def made_system(kind: type[System], parameters: dict[str, Any]) -> System:
     """A system with these parameters.
 
     Raises:
@@ -235,17 +236,6 @@ def final_infos(
         "final_info": infos,
         "_final_info": finished.copy(),
     }
-
-
-def checked_autoreset_mode(mode: str | AutoresetMode) -> AutoresetMode:
-    """Return the mode of that name."""
-    try:
-        return AutoresetMode(mode)
-    except ValueError:
-        choices = ", ".join(repr(choice.value) for choice in AutoresetMode)
-        raise ValueError(
-            f"autoreset_mode must be one of {choices}, got {validation.shown(mode)}."
-        ) from None
 
 
 def checked_render_mode(mode: str | None, metadata: dict[str, Any]) -> str | None:

@@ -18,9 +18,9 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import ArrayLike, NDArray
 
+from acl_gym.envs.autoreset import ChoosesAutoreset
 from acl_gym.envs.control.bookkeeping import (
     checked_actions,
-    checked_autoreset_mode,
     checked_inputs,
     checked_options,
     checked_render_mode,
@@ -47,7 +47,7 @@ Observation = NDArray[Any]
 StepResult = tuple[Observation, FloatArray, BoolArray, BoolArray, dict[str, Any]]
 
 
-class ControlVectorEnv(VectorEnv[Observation, Any, NDArray[Any]]):
+class ControlVectorEnv(ChoosesAutoreset, VectorEnv[Observation, Any, NDArray[Any]]):
     """Native vector environment over a control system: one kernel call per step.
 
     Args:
@@ -349,20 +349,6 @@ class ControlVectorEnv(VectorEnv[Observation, Any, NDArray[Any]]):
     def show_table(self, table: FloatArray | None) -> None:
         """Draw a table over the frames from now on; see `ControlEnv.show_table`."""
         self._renderer.show_table(table)
-
-    def set_autoreset_mode(self, mode: str | AutoresetMode) -> None:
-        """Change what happens to a slot that finishes from now on.
-
-        Wrappers around the environment keep the mode that they found.
-
-        Args:
-            mode: see `autoreset_mode` of the constructor.
-
-        Raises:
-            ValueError: there is no such mode.
-        """
-        self.autoreset_mode = checked_autoreset_mode(mode)
-        self.metadata = {**self.metadata, "autoreset_mode": self.autoreset_mode}
 
     def with_slots(self, num_envs: int) -> Self:
         """Make a new environment that differs only in the number of slots.

@@ -1,4 +1,4 @@
-"""Frames of a control system with pygame, drawn off screen and shown in a window."""
+"""Frames of a system with pygame, drawn off screen and shown in a window."""
 
 from __future__ import annotations
 
@@ -11,11 +11,10 @@ import numpy as np
 from gymnasium.error import DependencyNotInstalled
 from numpy.typing import NDArray
 
-from acl_gym.envs.control.system import ControlSystem
 from acl_gym.utils.typing import FloatArray
 
 Frame = NDArray[np.uint8]
-System = TypeVar("System", bound=ControlSystem)
+System = TypeVar("System")
 
 SIZE = 480  # pixels, of a square frame
 _OVERSAMPLING = 2  # drawn larger and scaled down: smooth edges
@@ -34,13 +33,13 @@ class Painter(ABC, Generic[System]):
         self.system = system
 
     @abstractmethod
-    def draw(self, pygame: Any, canvas: Any, state: FloatArray, action: Any) -> None:
+    def draw(self, pygame: Any, canvas: Any, state: Any, action: Any) -> None:
         """Draw a state.
 
         Args:
             pygame: the module.
             canvas: a square pygame surface to fill.
-            state: `(state_size,)`.
+            state: `(state_size,)`, or what else the environment draws.
             action: the one that led to it, or its inputs where they are real; None at
                 the start of an episode.
         """
@@ -82,7 +81,7 @@ class Renderer:
     """
 
     def __init__(
-        self, system: ControlSystem, painter: str | None, frames_per_second: int
+        self, system: Any, painter: str | None, frames_per_second: int
     ) -> None:
         self._system, self._location = system, painter
         self._frames_per_second = frames_per_second
@@ -115,7 +114,7 @@ class Renderer:
             ) from error
         return pygame
 
-    def set_system(self, system: ControlSystem) -> None:
+    def set_system(self, system: Any) -> None:
         """Draw another system of the same kind from now on, and the same table."""
         self._system = system
         self.__dict__.pop("_painter", None)
@@ -126,11 +125,11 @@ class Renderer:
             self._painter.check_table(table)
         self._table = table
 
-    def frame(self, state: FloatArray, action: Any) -> Frame:
+    def frame(self, state: Any, action: Any) -> Frame:
         """Return the picture of a state, `(height, width, 3)`.
 
         Args:
-            state: `(state_size,)`.
+            state: `(state_size,)`, or what else the environment draws.
             action: the one that led to it, or its inputs where they are real; None at
                 the start of an episode.
 
@@ -140,11 +139,11 @@ class Renderer:
         pixels = self._pygame.surfarray.array3d(self._surface(state, action))
         return np.ascontiguousarray(pixels.transpose(1, 0, 2))
 
-    def show(self, state: FloatArray, action: Any) -> None:
+    def show(self, state: Any, action: Any) -> None:
         """Show the picture of a state in a window, no faster than real time.
 
         Args:
-            state: `(state_size,)`.
+            state: `(state_size,)`, or what else the environment draws.
             action: the one that led to it, or its inputs where they are real; None at
                 the start of an episode.
 
@@ -168,7 +167,7 @@ class Renderer:
             self._pygame.display.quit()
             self._window = None
 
-    def _surface(self, state: FloatArray, action: Any) -> Any:
+    def _surface(self, state: Any, action: Any) -> Any:
         large = self._pygame.Surface((_OVERSAMPLING * SIZE, _OVERSAMPLING * SIZE))
         self._painter.draw(self._pygame, large, state, action)
         if self._table is not None:

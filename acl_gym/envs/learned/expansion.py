@@ -14,8 +14,8 @@ from typing import Self
 
 import numpy as np
 
-from acl_gym.envs.control.fast_math import exponential, sine
 from acl_gym.utils.compiling import njit
+from acl_gym.utils.fast_math import exponential, sine
 from acl_gym.utils.typing import FloatArray, IntArray
 
 LANES = 4

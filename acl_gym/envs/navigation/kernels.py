@@ -6,9 +6,9 @@ from typing import Any
 
 from numba import prange
 
-from acl_gym.envs.control.fast_math import exponential
 from acl_gym.envs.control.system import BLOCK
 from acl_gym.utils.compiling import njit
+from acl_gym.utils.fast_math import exponential
 from acl_gym.utils.threads import shared_among_threads
 from acl_gym.utils.typing import BoolArray, FloatArray, IntArray
 

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numba import prange
 
-from acl_gym.envs.control.fast_math import sine
 from acl_gym.envs.control.system import BLOCK
 from acl_gym.utils.compiling import njit
+from acl_gym.utils.fast_math import sine
 from acl_gym.utils.threads import shared_among_threads
 from acl_gym.utils.typing import BoolArray, FloatArray, IntArray
 

@@ -349,6 +349,12 @@ def _env_fns_by_spec(env: Any) -> list[Any]:
             f"{validation.shown(env)}; pass acl_gym.WorkersVectorEnv([make_env] * 20, "
             "workers=2), in wrappers or not, and no workers."
         )
+    if getattr(env, "slots_share_a_world", False):
+        raise ValueError(
+            "env must have slots that do not meet, so that workers can have some each, "
+            f"got {type(env).__name__}, all agents of which are in one world; run it in "
+            "one process."
+        )
     spec = copy.deepcopy(spec)
     kwargs, spec.kwargs = spec.kwargs, {}
     for name in ("num_envs", "vectorization_mode", "autoreset_mode"):

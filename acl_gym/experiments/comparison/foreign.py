@@ -25,6 +25,7 @@ from acl_gym.partitions.automatic import automatic_partition
 from acl_gym.partitions.discrete import FINITE_SPACES
 from acl_gym.utils.serialization import to_settings
 from acl_gym.utils.typing import FloatArray
+from acl_gym.utils.vector_envs import has_independent_slots
 
 EPISODES = 100
 """Episodes of an evaluation, the same in each."""
@@ -86,7 +87,7 @@ class ForeignTask(Task):
     def make_env(self, slots: int) -> VectorEnv[Any, Any, Any]:
         """The environment, natively where it can be."""
         name = self.env_id.rpartition(":")[2]
-        if gym.spec(self.env_id).vector_entry_point is not None:
+        if has_independent_slots(self.env_id):
             return gym.make_vec(self.env_id, num_envs=slots, **self.env)
         return WaitingVectorEnv.make(name, slots, **self.env)
 

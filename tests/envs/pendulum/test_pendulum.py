@@ -7,9 +7,9 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 from scipy.stats import chisquare
 
-from acl_gym.envs.control.fast_math import sine
 from acl_gym.envs.pendulum import Pendulum, kernels
 from acl_gym.envs.pendulum.kernels import TWO_PI
+from acl_gym.utils.fast_math import sine
 from tests.envs.pendulum import reference_pendulum as reference
 
 Move = tuple[Pendulum, reference.FloatArray, np.ndarray]

@@ -17,7 +17,10 @@ from gymnasium.wrappers import vector as vector_wrappers
 from acl_gym.envs import ENVIRONMENTS
 
 EVERY_ID = pytest.mark.parametrize("env_id", ENVIRONMENTS)
-BOX_IDS = ("acl_gym/Pendulum-v0", "acl_gym/Navigation-v0")  # others are Discrete
+BOX_IDS = (  # others are Discrete
+    *("acl_gym/Pendulum-v0", "acl_gym/Navigation-v0"),
+    "acl_gym/SwarmAggregation-v0",
+)
 # Where an action that the mask does not allow is an error, none can be repeated.
 STRICT, REPEATING = "acl_gym/TravellingSalesman-v0", ("MaxAndSkip", "StickyAction")
 LIMIT = 8

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numba import njit
 
-from acl_gym.envs.control.fast_math import _power_of_two, exponential
+from acl_gym.utils.fast_math import _power_of_two, exponential
 
 
 @njit

@@ -1,0 +1,102 @@
+"""The kernel that looks at the neighbours of every agent."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from acl_gym.swarm.cells import MOST_AXES
+from acl_gym.utils.compiling import njit
+from acl_gym.utils.typing import FloatArray, IntArray
+
+_ROW, _COLUMN = MOST_AXES - 2, MOST_AXES - 1
+"""The axes of a plane in a grid of cells."""
+
+
+@njit
+def look_around(
+    cells: tuple[Any, ...],
+    sensing_radius: float,
+    collision_distance: float,
+    heard: IntArray,
+    towards: FloatArray,
+    collisions: IntArray,
+    nearest: FloatArray,
+) -> None:
+    """Find the neighbours of agents in a plane, ring after ring of cells around each.
+
+    Args:
+        cells: the fields of `Cells`.
+        sensing_radius: agents hear the others that are closer; infinity lets `heard` and
+            `towards` as they are, because they follow without a look at each pair.
+        collision_distance: agents that are closer than this collide.
+        heard: `(n,)`, receives how many others each one hears.
+        towards: `(n, 2)`, receives the sum of their positions relative to it.
+        collisions: `(n,)`, receives how many others it collides with.
+        nearest: `(n, 2 k)`, receives the positions of the k nearest that it hears,
+            relative to it and the nearest one first, and 0 where it hears fewer.
+    """
+    shape, first, agent, cell, place, width = cells
+    n, count = agent.size, nearest.shape[1] // 2
+    rows, columns = shape[_ROW], shape[_COLUMN]
+    narrowest = min(width[_ROW], width[_COLUMN])
+    limited = sensing_radius < np.inf
+    reach, contact = sensing_radius**2, collision_distance**2
+    x, y = place[_ROW], place[_COLUMN]
+    squares, who = np.empty(count + 1), np.empty(count + 1, np.int64)
+    for at in range(n):
+        here, there = x[at], y[at]
+        row, column = divmod(cell[at], columns)
+        n_heard = n_hit = found = ring = 0
+        east = north = 0.0
+        while True:
+            for r in range(max(row - ring, 0), min(row + ring, rows - 1) + 1):
+                # Whole rows at the ends of the ring, else one cell on either side.
+                whole = abs(r - row) == ring
+                step = 1 if whole else 2 * ring
+                for c in range(column - ring, column + ring + 1, step):
+                    if c < 0 or c >= columns:
+                        continue
+                    here_cell = r * columns + c
+                    for j in range(first[here_cell], first[here_cell + 1]):
+                        dx, dy = x[j] - here, y[j] - there
+                        square = dx * dx + dy * dy
+                        if j == at or not (square < reach or square < contact):
+                            continue
+                        n_hit += square < contact
+                        if not square < reach:
+                            continue
+                        if limited:
+                            n_heard += 1
+                            east += dx
+                            north += dy
+                        if count == 0 or (
+                            found == count and not square < squares[count - 1]
+                        ):
+                            continue
+                        # The place after the last is for the one that drops out.
+                        k = min(found, count)
+                        while k > 0 and square < squares[k - 1]:
+                            squares[k], who[k] = squares[k - 1], who[k - 1]
+                            k -= 1
+                        squares[k], who[k] = square, j
+                        found = min(found + 1, count)
+            # All within this distance have been seen; one cell may be infinitely wide.
+            seen = ring * narrowest if ring > 0 else 0.0
+            needed = collision_distance
+            if limited:
+                needed = max(needed, sensing_radius)
+            elif count > 0:
+                farthest = np.sqrt(squares[count - 1]) if found == count else np.inf
+                needed = max(needed, farthest)
+            if seen >= needed or ring >= max(rows, columns):
+                break
+            ring += 1
+        i = agent[at]
+        collisions[i] = n_hit
+        if limited:
+            heard[i], towards[i, 0], towards[i, 1] = n_heard, east, north
+        for k in range(count):
+            nearest[i, 2 * k] = x[who[k]] - here if k < found else 0.0
+            nearest[i, 2 * k + 1] = y[who[k]] - there if k < found else 0.0

@@ -1,0 +1,176 @@
+"""The swarm as a `ParallelEnv` of PettingZoo, `pip install "acl-gym[pettingzoo]"`."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from gymnasium import spaces
+from gymnasium.error import ResetNeeded
+from pettingzoo import ParallelEnv
+
+from acl_gym.envs.swarm_aggregation.vector import SwarmAggregationVectorEnv
+from acl_gym.utils import validation
+from acl_gym.utils.typing import FloatArray
+
+Each = dict[str, Any]
+"""A value for each agent by its name."""
+
+
+def parallel_env(num_agents: int = 10, **keywords: Any) -> SwarmAggregationParallelEnv:
+    """Make the environment, as in the modules of PettingZoo; see the class."""
+    return SwarmAggregationParallelEnv(num_agents, **keywords)
+
+
+class SwarmAggregationParallelEnv(
+    ParallelEnv[str, FloatArray, Any]  # type: ignore[misc]
+):
+    """A view of `SwarmAggregationVectorEnv`, in which agents have names.
+
+    What agents observe and do, and what it costs, is described in `SwarmAggregationEnv`.
+    All agents leave together, when the episode is truncated.
+
+    Args:
+        num_agents: how many agents take actions, >= 1.
+        max_cycles: the episode is truncated after this many steps, >= 1.
+        render_mode: "human", "rgb_array" or None.
+        parameters: those of `SwarmAggregation`.
+
+    Attributes:
+        possible_agents: the names "agent_0", "agent_1" and so on.
+        agents: those that are in the world, all or none.
+
+    Example:
+        >>> from acl_gym.envs.swarm_aggregation.parallel import parallel_env
+        >>> env = parallel_env(num_agents=3)
+        >>> observations, infos = env.reset(seed=0)
+        >>> actions = {agent: env.action_space(agent).sample() for agent in env.agents}
+        >>> _, rewards, *_ = env.step(actions)
+        >>> sorted(rewards)
+        ['agent_0', 'agent_1', 'agent_2']
+    """
+
+    metadata: dict[str, Any] = {  # noqa: RUF012
+        "name": "swarm_aggregation_v0",
+        "render_modes": ["human", "rgb_array"],
+        "render_fps": SwarmAggregationVectorEnv.metadata["render_fps"],
+        "is_parallelizable": True,
+    }
+
+    def __init__(
+        self,
+        num_agents: int = 10,
+        *,
+        max_cycles: int = 100,
+        render_mode: str | None = None,
+        **parameters: Any,
+    ) -> None:
+        self._env = SwarmAggregationVectorEnv(
+            validation.integer("num_agents", num_agents, at_least=1),
+            max_episode_steps=validation.integer("max_cycles", max_cycles, at_least=1),
+            autoreset_mode="Disabled",
+            render_mode=render_mode,
+            **parameters,
+        )
+        self.render_mode = render_mode
+        self.possible_agents = [f"agent_{i}" for i in range(self._env.num_envs)]
+        self.agents: list[str] = []
+        # Each agent has its own, because spaces hold random numbers.
+        names, system = self.possible_agents, self._env.system
+        self.observation_spaces = {
+            agent: copy.copy(system.observation_space) for agent in names
+        }
+        self.action_spaces = {agent: copy.copy(system.action_space) for agent in names}
+
+    def observation_space(self, agent: str) -> spaces.Box:
+        """What an agent observes; always the same object."""
+        return self.observation_spaces[agent]
+
+    def action_space(self, agent: str) -> spaces.Discrete | spaces.Box:
+        """What an agent can do; always the same object."""
+        return self.action_spaces[agent]
+
+    def reset(
+        self, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[dict[str, FloatArray], dict[str, dict[str, Any]]]:
+        """Start an episode of all agents.
+
+        Args:
+            seed: seeds the generator of initial states; None continues its stream.
+            options: `{"state": array}`, see `SwarmAggregationVectorEnv.reset`. Other
+                keys are ignored, as PettingZoo has it.
+
+        Returns:
+            Observations and empty infos of all agents.
+        """
+        kept = {key: value for key, value in (options or {}).items() if key == "state"}
+        observations, _ = self._env.reset(seed=seed, options=kept)
+        self.agents = self.possible_agents[:]
+        return self._of_each(observations), {agent: {} for agent in self.agents}
+
+    def step(
+        self, actions: Mapping[str, Any]
+    ) -> tuple[
+        dict[str, FloatArray],
+        dict[str, float],
+        dict[str, bool],
+        dict[str, bool],
+        dict[str, dict[str, Any]],
+    ]:
+        """Move all agents for one time step.
+
+        Args:
+            actions: one for each of `agents`.
+
+        Returns:
+            Observations, rewards, terminations, truncations and infos of all agents.
+
+        Raises:
+            ResetNeeded: the episode has ended, or has not begun.
+            ValueError: there is not one action for each agent, or one is not valid.
+            TypeError: an action is of the wrong kind.
+        """
+        if not self.agents:
+            raise ResetNeeded("no agents are in the world; call reset() first.")
+        if set(actions) != set(self.agents):
+            raise ValueError(
+                f"actions must hold one for each of {len(self.agents)} agents, "
+                f"{self.agents[0]} to {self.agents[-1]}, got "
+                f"{validation.shown(sorted(map(str, actions)))}."
+            )
+        rows = np.array([actions[agent] for agent in self.agents])
+        observations, rewards, terminated, truncated, infos = self._env.step(rows)
+        told = [
+            {"distance": distance, "collisions": collisions}
+            for distance, collisions in zip(
+                infos["distance"].tolist(), infos["collisions"].tolist(), strict=True
+            )
+        ]
+        results = (
+            self._of_each(observations),
+            self._of_each(rewards.tolist()),
+            self._of_each(terminated.tolist()),
+            self._of_each(truncated.tolist()),
+            self._of_each(told),
+        )
+        if truncated.all():
+            self.agents = []
+        return results
+
+    def state(self) -> FloatArray:
+        """The states of all agents of the world, `(n, state_size)`."""
+        return self._env.states
+
+    def render(self) -> Any:
+        """A frame `(480, 480, 3)` for "rgb_array"; shows it for "human"."""
+        frames = self._env.render()
+        return None if frames is None else frames[0]
+
+    def close(self) -> None:
+        """Close the window if there is one."""
+        self._env.close()
+
+    def _of_each(self, values: Any) -> Each:
+        return dict(zip(self.agents, values, strict=True))

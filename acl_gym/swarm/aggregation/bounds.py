@@ -1,0 +1,112 @@
+"""What is known exactly of aggregating swarms in which everyone hears everyone.
+
+After Gazi and Passino, "Stability analysis of swarms" (2003) and "A class of attractions
+and repulsions for stable swarm aggregations" (2004). At an equilibrium of the bounded
+repulsion, (6.5) summed over all agents gives a M (x_i - centre) = b sum_j y exp(-r^2 / c),
+and r exp(-r^2 / c) <= sqrt(c / 2) e^(-1/2), r^2 exp(-r^2 / c) <= c / e. With the unbounded
+repulsion the sum of squares obeys a linear differential equation, at all times.
+
+Common arguments, numbers or arrays that broadcast:
+    n_agents: M, >= 1.
+    attraction: a, > 0.
+    repulsion: b, >= 0.
+    spread: c, > 0.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from acl_gym.utils import validation
+from acl_gym.utils.typing import FloatArray
+
+
+def size_bound(
+    n_agents: ArrayLike, attraction: ArrayLike, repulsion: ArrayLike, spread: ArrayLike
+) -> FloatArray:
+    """No agent rests farther from the centre: (b / a) sqrt(c / 2) e^(-1/2) (M - 1) / M.
+
+    For the bounded repulsion. See `acl_gym.swarm.aggregation.bounds` for the arguments.
+    """
+    m, a, b = _checked(n_agents, attraction, repulsion)
+    c = _positive("spread", spread)
+    return np.asarray(b / a * np.sqrt(0.5 * c) * math.exp(-0.5) * (m - 1.0) / m)
+
+
+def rms_bound(
+    n_agents: ArrayLike, attraction: ArrayLike, repulsion: ArrayLike, spread: ArrayLike
+) -> FloatArray:
+    """No swarm rests at a larger root mean square distance from its centre.
+
+    sqrt((M - 1) b c / (2 a e M)), for the bounded repulsion. See
+    `acl_gym.swarm.aggregation.bounds` for the arguments.
+    """
+    m, a, b = _checked(n_agents, attraction, repulsion)
+    c = _positive("spread", spread)
+    return np.sqrt((m - 1.0) * b * c / (2.0 * a * math.e * m))
+
+
+def resting_sum_of_squares(
+    n_agents: ArrayLike, attraction: ArrayLike, repulsion: ArrayLike
+) -> FloatArray:
+    """S_inf = b (M - 1) / (2 a), which the sum of squares tends to.
+
+    For the unbounded repulsion, and S = sum_i |x_i - centre|^2. See
+    `acl_gym.swarm.aggregation.bounds` for the arguments.
+    """
+    m, a, b = _checked(n_agents, attraction, repulsion)
+    return np.asarray(b * (m - 1.0) / (2.0 * a))
+
+
+def sum_of_squares(
+    time: ArrayLike,
+    initial: ArrayLike,
+    n_agents: ArrayLike,
+    attraction: ArrayLike,
+    repulsion: ArrayLike,
+) -> FloatArray:
+    """S(t) = S_inf + (S(0) - S_inf) e^(-2 a M t), for the unbounded repulsion.
+
+    From dS/dt = 2 sum_i (x_i - centre)' u_i, in which each pair of agents contributes
+    2 y' g(y) = 2 (b - a r^2), and the r^2 of all pairs add up to M S. It holds for any
+    positions, as long as no two agents are in one place.
+
+    Args:
+        time: t, s, >= 0.
+        initial: S(0), the sum of |x_i - centre|^2, >= 0.
+        n_agents: see `acl_gym.swarm.aggregation.bounds`.
+        attraction: see there.
+        repulsion: see there.
+    """
+    m, a, _ = _checked(n_agents, attraction, repulsion)
+    end = resting_sum_of_squares(n_agents, attraction, repulsion)
+    t = _at_least("time", time, 0.0)
+    start = _at_least("initial", initial, 0.0)
+    return np.asarray(end + (start - end) * np.exp(-2.0 * a * m * t))
+
+
+def _checked(
+    n_agents: ArrayLike, attraction: ArrayLike, repulsion: ArrayLike
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    return (
+        _at_least("n_agents", n_agents, 1.0),
+        _positive("attraction", attraction),
+        _at_least("repulsion", repulsion, 0.0),
+    )
+
+
+def _positive(name: str, values: ArrayLike) -> FloatArray:
+    array = validation.real_array(name, values)
+    if (array <= 0).any():
+        raise ValueError(f"{name} must be > 0, got {array.min():g}.")
+    return array
+
+
+def _at_least(name: str, values: ArrayLike, least: float) -> FloatArray:
+    array = validation.real_array(name, values)
+    if (array < least).any():
+        raise ValueError(f"{name} must be >= {least:g}, got {array.min():g}.")
+    return array

@@ -1,0 +1,80 @@
+"""The swarm in continuous time, (6.4): what small time steps tend to."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from acl_gym.swarm.aggregation.forces import forces_over_links
+from acl_gym.swarm.aggregation.interaction import Interaction
+from acl_gym.swarm.aggregation.profiles import Profile
+from acl_gym.swarm.links import Links
+from acl_gym.swarm.rows import checked_positions
+from acl_gym.utils import validation
+from acl_gym.utils.typing import FloatArray
+
+
+def flow(
+    positions: ArrayLike,
+    interaction: Interaction,
+    times: ArrayLike,
+    profile: Profile | None = None,
+    *,
+    links: Links | None = None,
+    tolerance: float = 1e-10,
+) -> FloatArray:
+    """Solve dx_i/dt = sum_j g(x_i - x_j) - grad sigma(x_i) of kinematic particles.
+
+    With the explicit Runge-Kutta method of order 8 (DOP853) of SciPy. What is known of
+    swarms in theory concerns these solutions; `run` moves agents in finite steps.
+
+    Args:
+        positions: at time 0, `(n, dim)`.
+        interaction: g.
+        times: when to return the positions, s, >= 0, in ascending order.
+        profile: sigma; None: there is none.
+        links: who hears whom, all the time; None: everyone.
+        tolerance: of the solution, relative and absolute, > 0.
+
+    Returns:
+        The positions at these times, `(len(times), n, dim)`.
+
+    Raises:
+        ValueError: an argument is out of range, or no solution is found: two agents are
+            in one place or too close for `UnboundedRepulsion`.
+    """
+    from scipy.integrate import solve_ivp  # slow to import
+
+    x = checked_positions(positions)
+    at = validation.real_array("times", times, ndim=1)
+    if at[0] < 0 or (np.diff(at) < 0).any():
+        raise ValueError(
+            f"times must be >= 0 and in ascending order, got {validation.shown(times)}."
+        )
+    tolerance = validation.number("tolerance", tolerance, above=0)
+    everyone = Links.everyone(len(x)) if links is None else links
+
+    def rate(_: float, flat: FloatArray) -> FloatArray:
+        here = flat.reshape(x.shape)
+        u = forces_over_links(here, here, everyone, interaction)
+        if profile is not None:
+            u -= profile.gradient(here)
+        return u.reshape(-1)
+
+    if at[-1] == 0.0:
+        return np.array(np.broadcast_to(x, (at.size, *x.shape)))
+    solved = solve_ivp(
+        rate,
+        (0.0, float(at[-1])),
+        x.reshape(-1),
+        method="DOP853",
+        t_eval=at,
+        rtol=max(tolerance, 1e-13),
+        atol=tolerance,
+    )
+    if not solved.success:
+        raise ValueError(
+            "positions must have a solution up to the last of the times, got none: "
+            f"{solved.message.rstrip('.')}; move agents apart."
+        )
+    return np.asarray(solved.y.T.reshape(at.size, *x.shape))

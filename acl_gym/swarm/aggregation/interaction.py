@@ -1,0 +1,227 @@
+"""How two agents act on each other: attraction and repulsion, (6.5)."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import ClassVar, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.special import xlogy
+
+from acl_gym.swarm.aggregation.kernels import BOUNDED, UNBOUNDED
+from acl_gym.swarm.rows import per_agent
+from acl_gym.utils import validation
+from acl_gym.utils.typing import FloatArray
+
+Parameter = float | FloatArray
+"""One number for all agents, or an array with one for each."""
+
+
+class Coefficients(NamedTuple):
+    """An interaction as kernels take it.
+
+    Attributes:
+        kind: `BOUNDED` or `UNBOUNDED`.
+        attraction: a of each agent, `(n,)`.
+        repulsion: b, `(n,)`.
+        rate: 1 / c, `(n,)`; 0 where the repulsion has no c.
+    """
+
+    kind: int
+    attraction: FloatArray
+    repulsion: FloatArray
+    rate: FloatArray
+
+
+class Interaction(ABC):
+    """A function g(y) = -y [g_a(|y|) - g_r(|y|)] of the class (6.5), y = x_i - x_j.
+
+    It is what agent j adds to the input u_i of agent i. g_a attracts, g_r repels. The
+    attraction of both kinds is a constant, g_a = a, so that it pulls like a spring.
+
+    Parameters are numbers, or arrays with one value for each agent: then the swarm is
+    heterogeneous (Definition 6.8), and agent i moves by the i-th values.
+    """
+
+    kind: ClassVar[int]
+
+    attraction: Parameter
+    repulsion: Parameter
+
+    @abstractmethod
+    def net_attraction(self, distance: ArrayLike) -> FloatArray:
+        """g_a - g_r at a distance, > 0 where agents attract each other.
+
+        Args:
+            distance: r = |y|, >= 0; `(..., n)` where the parameters are arrays.
+        """
+
+    @abstractmethod
+    def potential(self, distance: ArrayLike) -> FloatArray:
+        """V(r), of which g is the descent: g(y) = -grad V(|y|).
+
+        Args:
+            distance: r = |y|, >= 0.
+        """
+
+    @property
+    @abstractmethod
+    def rest_distance(self) -> FloatArray:
+        """delta, the distance at which two or three agents rest: g_a = g_r.
+
+        0 where the attraction prevails at any distance, infinity where there is none.
+        """
+
+    @property
+    @abstractmethod
+    def _rate(self) -> Parameter:
+        """1 / c."""
+
+    def __call__(self, y: ArrayLike) -> FloatArray:
+        """g(y) of (6.5).
+
+        Args:
+            y: x_i - x_j, `(..., dim)`; `(..., n, dim)` where the parameters are arrays.
+
+        Returns:
+            An array of the shape of `y`; 0 where y is 0, since two agents in one place
+            have no direction to part in.
+        """
+        y = np.asarray(y, dtype=np.float64)
+        distance = np.sqrt(np.square(y).sum(axis=-1))
+        strength = np.where(distance > 0, self.net_attraction(distance), 0.0)
+        return np.asarray(-y * strength[..., None])
+
+    def coefficients(self, n: int) -> Coefficients:
+        """The parameters of n agents, for kernels.
+
+        Args:
+            n: the number of agents, >= 1.
+
+        Raises:
+            ValueError: a parameter has values for another number of agents.
+        """
+        columns = []
+        for name, value in (
+            ("attraction", self.attraction),
+            ("repulsion", self.repulsion),
+            ("spread", self._rate),
+        ):
+            array = np.asarray(value, dtype=np.float64)
+            if array.shape not in ((), (n,)):
+                raise ValueError(
+                    f"{name} must be a number or have one value for each of the {n} "
+                    f"agents, got {array.size} values."
+                )
+            columns.append(np.array(np.broadcast_to(array, n)))
+        return Coefficients(self.kind, *columns)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class BoundedRepulsion(Interaction):
+    """g(y) = -y [a - b exp(-|y|^2 / c)], the bounded repulsion of Gazi and Passino.
+
+    The defaults are those of Gazi and Passino (2003): agents rest 0.774 apart.
+
+    Attributes:
+        attraction: a, 1/s for kinematic particles, >= 0.
+        repulsion: b, in the unit of a, >= 0. Agents keep a distance where b > a.
+        spread: c, the square of a length, > 0: at the distance sqrt(c) the repulsion is
+            b / e.
+
+    Raises:
+        ValueError: a parameter is out of range.
+    """
+
+    kind = BOUNDED
+
+    attraction: Parameter = 1.0
+    repulsion: Parameter = 20.0
+    spread: Parameter = 0.2
+
+    def __post_init__(self) -> None:
+        _set(self, "attraction")
+        _set(self, "repulsion")
+        _set(self, "spread", or_zero=False)
+
+    def net_attraction(self, distance: ArrayLike) -> FloatArray:
+        """a - b exp(-r^2 / c); see `Interaction.net_attraction`."""
+        square = np.square(np.asarray(distance, dtype=np.float64))
+        decay = np.exp(-square / self.spread)
+        return np.asarray(self.attraction - self.repulsion * decay)
+
+    def potential(self, distance: ArrayLike) -> FloatArray:
+        """a r^2 / 2 + (b c / 2) exp(-r^2 / c); see `Interaction.potential`."""
+        square = np.square(np.asarray(distance, dtype=np.float64))
+        height = 0.5 * self.repulsion * self.spread
+        pull = 0.5 * self.attraction * square
+        return np.asarray(pull + height * np.exp(-square / self.spread))
+
+    @property
+    def rest_distance(self) -> FloatArray:
+        """sqrt(c ln(b / a)); see `Interaction.rest_distance`."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            ratio = np.asarray(self.repulsion) / np.asarray(self.attraction)
+            square = self.spread * np.log(np.maximum(ratio, 1.0))
+        # Without either, nothing moves, at any distance.
+        return np.sqrt(np.where(np.isnan(square), 0.0, square))
+
+    @property
+    def _rate(self) -> Parameter:
+        return 1.0 / self.spread
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class UnboundedRepulsion(Interaction):
+    """g(y) = -y [a - b / |y|^2]: a repulsion that no two agents can overcome.
+
+    Attributes:
+        attraction: a, 1/s for kinematic particles, >= 0.
+        repulsion: b, in the unit of a times the square of a length, >= 0.
+
+    Raises:
+        ValueError: a parameter is out of range.
+    """
+
+    kind = UNBOUNDED
+
+    attraction: Parameter = 1.0
+    repulsion: Parameter = 0.6
+
+    def __post_init__(self) -> None:
+        _set(self, "attraction")
+        _set(self, "repulsion")
+
+    def net_attraction(self, distance: ArrayLike) -> FloatArray:
+        """a - b / r^2, -infinity where r = 0; see `Interaction.net_attraction`."""
+        square = np.square(np.asarray(distance, dtype=np.float64))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            # Without repulsion there is none in one place either, where b / r^2 is 0 / 0.
+            repulsion = np.where(self.repulsion == 0.0, 0.0, self.repulsion / square)
+        return np.asarray(self.attraction - repulsion)
+
+    def potential(self, distance: ArrayLike) -> FloatArray:
+        """a r^2 / 2 - b ln(r); see `Interaction.potential`."""
+        r = np.asarray(distance, dtype=np.float64)
+        pull = 0.5 * self.attraction * np.square(r)
+        return np.asarray(pull - xlogy(self.repulsion, r))
+
+    @property
+    def rest_distance(self) -> FloatArray:
+        """sqrt(b / a); see `Interaction.rest_distance`."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            square = np.asarray(self.repulsion) / np.asarray(self.attraction)
+        return np.sqrt(np.where(np.isnan(square), 0.0, square))
+
+    @property
+    def _rate(self) -> Parameter:
+        return 0.0
+
+
+def _set(interaction: Interaction, name: str, *, or_zero: bool = True) -> None:
+    """Check a parameter and keep it as an array that cannot be changed."""
+    end = {"at_least": 0.0} if or_zero else {"above": 0.0}
+    array = per_agent(name, getattr(interaction, name), None, infinite=False, **end)
+    object.__setattr__(interaction, name, validation.read_only(array))

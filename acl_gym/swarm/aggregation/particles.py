@@ -1,0 +1,193 @@
+"""How bodies move: kinematic particles, (6.4), and point masses."""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+
+import numpy as np
+
+from acl_gym.swarm.aggregation.interaction import Parameter
+from acl_gym.swarm.rows import per_agent
+from acl_gym.utils import validation
+from acl_gym.utils.compiling import njit
+from acl_gym.utils.typing import FloatArray
+
+
+class Particles(ABC):
+    """The state transition g of the particles, Definition 6.5.
+
+    Attributes:
+        variables: how many state variables there are for each coordinate: the position,
+            and perhaps the velocity.
+    """
+
+    variables: int
+
+    @abstractmethod
+    def advance(self, x: FloatArray, u: FloatArray, time_step: float) -> FloatArray:
+        """The states after a step in which the inputs are held constant.
+
+        Args:
+            x: states, `(n, variables * dim)`: the position, then the velocity.
+            u: inputs, `(n, dim)`.
+            time_step: s, > 0.
+
+        Returns:
+            A new array of the shape of `x`.
+        """
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Kinematic(Particles):
+    """Particles that move at the velocity that they are given, dx/dt = u, (6.4).
+
+    Since the input is held constant over a step, x + u * time_step is exact.
+
+    Attributes:
+        max_speed: a velocity of a larger norm is shortened to it, > 0, one for all
+            agents or one for each; infinity by default.
+
+    Raises:
+        ValueError: it is out of range.
+    """
+
+    variables = 1
+
+    max_speed: Parameter = math.inf
+
+    def __post_init__(self) -> None:
+        _set(self, "max_speed", infinite=True)
+
+    def advance(self, x: FloatArray, u: FloatArray, time_step: float) -> FloatArray:
+        """See `Particles.advance`."""
+        return np.asarray(x + time_step * shortened(u, self.max_speed))
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class PointMass(Particles):
+    """Particles with inertia: m dv/dt = u - D v, dx/dt = v, u being a force.
+
+    A step is the exact solution for a constant force, so that large steps are stable.
+
+    Attributes:
+        mass: m, kg, > 0, one for all agents or one for each.
+        damping: D, kg/s, >= 0, likewise.
+        max_force: a force of a larger norm is shortened to it, > 0, likewise; infinity
+            by default.
+
+    Raises:
+        ValueError: an attribute is out of range.
+    """
+
+    variables = 2
+
+    mass: Parameter = 1.0
+    damping: Parameter = 1.0
+    max_force: Parameter = math.inf
+
+    def __post_init__(self) -> None:
+        _set(self, "mass")
+        _set(self, "damping", or_zero=True)
+        _set(self, "max_force", infinite=True)
+
+    def advance(self, x: FloatArray, u: FloatArray, time_step: float) -> FloatArray:
+        """See `Particles.advance`."""
+        n, dim = u.shape
+        force = shortened(u, self.max_force)
+        moved = np.empty((n, 2 * dim))
+        mass, damping = (
+            np.array(np.broadcast_to(each, n)) for each in (self.mass, self.damping)
+        )
+        move_masses(np.ascontiguousarray(x), force, mass, damping, time_step, moved)
+        return moved
+
+
+def shortened(vectors: FloatArray, longest: Parameter) -> FloatArray:
+    """Return vectors `(n, dim)`, those that are longer than allowed shortened.
+
+    Args:
+        vectors: finite.
+        longest: the largest norm, > 0, one for all or one for each.
+    """
+    limit = np.asarray(longest)
+    if limit.ndim == 0 and limit == math.inf:
+        return vectors
+    short = np.empty(vectors.shape)
+    _shorten(vectors, limit.reshape(-1), short)
+    return short
+
+
+@njit
+def _shorten(vectors: FloatArray, limits: FloatArray, short: FloatArray) -> None:
+    """Write vectors of at most the norm `limits[i]`, or `limits[0]`, into `short`."""
+    n, dim = vectors.shape
+    for i in range(n):
+        limit = limits[i] if limits.size > 1 else limits[0]
+        largest = 0.0
+        for k in range(dim):
+            largest = max(largest, abs(vectors[i, k]))
+        scale, square = 1.0, 0.0
+        if largest > 0.0:
+            # Divided by the largest coordinate, none has a square that overflows.
+            for k in range(dim):
+                square += (vectors[i, k] / largest) ** 2
+            norm = np.sqrt(square)
+            if norm > limit / largest:
+                scale = limit / largest / norm
+        for k in range(dim):
+            short[i, k] = vectors[i, k] * scale
+
+
+@njit
+def move_masses(
+    x: FloatArray,
+    force: FloatArray,
+    mass: FloatArray,
+    damping: FloatArray,
+    time_step: float,
+    moved: FloatArray,
+) -> None:
+    """The exact step of `PointMass`, from `x` to `moved`, both `(n, 2 dim)`."""
+    n, dim = force.shape
+    for i in range(n):
+        lag = damping[i] * time_step / mass[i]
+        decay = np.exp(-lag)
+        if lag < 1e-2:
+            # Taylor series: the formulas below would subtract nearly equal numbers.
+            of_speed = 1.0 - lag / 2.0 * (
+                1.0
+                - lag / 3.0 * (1.0 - lag / 4.0 * (1.0 - lag / 5.0 * (1.0 - lag / 6.0)))
+            )
+            of_force = 0.5 * (
+                1.0
+                - lag
+                / 3.0
+                * (
+                    1.0
+                    - lag
+                    / 4.0
+                    * (1.0 - lag / 5.0 * (1.0 - lag / 6.0 * (1.0 - lag / 7.0)))
+                )
+            )
+        else:
+            of_speed = -np.expm1(-lag) / lag
+            of_force = (1.0 - of_speed) / lag
+        push = time_step / mass[i]
+        for k in range(dim):
+            speed = x[i, dim + k]
+            moved[i, k] = x[i, k] + time_step * (
+                of_speed * speed + of_force * push * force[i, k]
+            )
+            moved[i, dim + k] = decay * speed + of_speed * push * force[i, k]
+
+
+def _set(
+    particles: Particles, name: str, *, or_zero: bool = False, infinite: bool = False
+) -> None:
+    """Check a parameter > 0 and keep it as an array that cannot be changed."""
+    end = {"at_least": 0.0} if or_zero else {"above": 0.0}
+    given = getattr(particles, name)
+    array = per_agent(name, given, None, infinite=infinite, **end)
+    object.__setattr__(particles, name, validation.read_only(array))

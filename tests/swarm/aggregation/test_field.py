@@ -1,0 +1,278 @@
+"""Profiles, obstacles and bodies, held against their equations."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+from scipy.integrate import solve_ivp
+
+from acl_gym.swarm.aggregation import (
+    Field,
+    Gaussians,
+    Kinematic,
+    Obstacles,
+    Plane,
+    PointMass,
+    Profile,
+    Quadratic,
+)
+
+RNG = np.random.default_rng
+POINTS = RNG(5).normal(0.0, 2.0, (60, 2))
+VALLEYS = Gaussians(
+    [[0.0, 0.0], [2.0, 1.0], [-1.0, 2.0]], [1.0, -0.5, 2.0], [0.5, 1, 2]
+)
+ROCKS = Obstacles([[0.0, 0.0], [3.0, 0.0]], [1.0, 0.5], strength=3.0, reach=0.7)
+PROFILES = pytest.mark.parametrize(
+    "profile", [Plane([1.0, -2.0]), Quadratic([1.0, 2.0], 0.7), VALLEYS, ROCKS]
+)
+
+
+@PROFILES
+def test_gradients_are_those_of_the_values(profile: Any) -> None:
+    step = 1e-6
+    for axis in range(2):
+        ahead, behind = POINTS.copy(), POINTS.copy()
+        ahead[:, axis] += step
+        behind[:, axis] -= step
+        slope = (profile.value(ahead) - profile.value(behind)) / (2 * step)
+        np.testing.assert_allclose(
+            profile.gradient(POINTS)[:, axis], slope, rtol=1e-6, atol=1e-8
+        )
+
+
+def test_values_of_profiles() -> None:
+    assert Plane([1.0, -2.0]).value(np.array([3.0, 4.0])) == -5.0
+    assert Quadratic([1.0, 1.0], 2.0).value(np.array([4.0, 5.0])) == 25.0
+    bowl = Gaussians([[1.0, 1.0]], 3.0, 2.0)
+    assert bowl.value(np.array([1.0, 1.0])) == -3.0 == bowl.least
+    # A = 2 d and l = 2 s^2 in (A / 2) exp(-|x - c|^2 / l).
+    np.testing.assert_allclose(
+        bowl.value(POINTS),
+        -3.0 * np.exp(-np.square(POINTS - 1.0).sum(axis=1) / 8.0),
+        rtol=1e-14,
+    )
+    assert VALLEYS.least == -3.0
+    assert (VALLEYS.value(POINTS) >= VALLEYS.least).all()
+    # One number is enough where all are alike, and any shape of positions is taken.
+    each = Gaussians([[0, 0], [1, 1]], [2, 2], [3, 3])
+    both = Gaussians([[0, 0], [1, 1]], 2, 3)
+    grid = POINTS.reshape(3, 20, 2)
+    np.testing.assert_array_equal(both.value(grid), each.value(grid))
+    assert both.gradient(grid).shape == (3, 20, 2)
+
+
+def test_an_obstacle_repels_within_its_reach_and_stops_what_enters() -> None:
+    x = np.array([[1.7, 0.0], [1.5, 0.0], [0.0, -0.5], [0.0, 0.0], [3.0, 0.2]])
+    force = -ROCKS.gradient(x)
+    # k (reach - rho) outwards, rho being the distance from the edge.
+    np.testing.assert_allclose(
+        force,
+        [
+            [0.0, 0.0],
+            [3.0 * 0.2, 0.0],
+            [0.0, -3.0 * 1.2],
+            [0.0, 0.0],
+            [0.0, 3.0 * 1.0],
+        ],
+        atol=1e-14,
+    )
+    assert ROCKS.inside(x).tolist() == [False, False, True, True, True]
+    assert ROCKS.stop(x).tolist() == [False, False, True, True, True]
+    np.testing.assert_allclose(
+        x, [[1.7, 0.0], [1.5, 0.0], [0.0, -1.0], [1.0, 0.0], [3.0, 0.5]], atol=1e-15
+    )
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: Plane([[1.0]]), "slope must be an array of 1 axes"),
+        (lambda: Quadratic([math.nan, 0.0]), "centre must be an array of 1 axes"),
+        (lambda: Quadratic([0.0], math.inf), "curvature must lie in"),
+        (lambda: Gaussians([0.0, 0.0]), "centres must be an array of 2 axes"),
+        (lambda: Gaussians([[0, 0]], [1, 2]), "depths must be a number or have one"),
+        (lambda: Gaussians([[0, 0]], 1, 0), "widths must be > 0, got 0"),
+        (lambda: Obstacles([[0, 0]], -1), "radii must be > 0, got -1"),
+        (lambda: Obstacles([[0, 0]], 1, reach=-1), "reach must lie in"),
+        (
+            lambda: VALLEYS.value(np.zeros((3, 3))),
+            "must have 2 coordinates each, as the",
+        ),
+        (lambda: ROCKS.gradient(np.zeros((3, 3))), "must have 2 coordinates each, as"),
+        (lambda: Kinematic(max_speed=0), "max_speed must lie in"),
+        (lambda: PointMass(mass=0), "mass must lie in"),
+        (lambda: PointMass(damping=math.inf), "damping must lie in"),
+    ],
+)
+def test_what_makes_no_field_is_refused(make: Any, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        make()
+
+
+# --- bodies ---------------------------------------------------------------------------
+
+
+@given(
+    arrays(np.float64, (7, 2), elements=st.floats(-1e200, 1e200)),
+    st.floats(1e-3, 1e3),
+)
+def test_velocities_are_shortened_and_keep_their_direction(
+    u: np.ndarray, longest: float
+) -> None:
+    moved = Kinematic(max_speed=longest).advance(np.zeros((7, 2)), u, 1.0)
+    for row, wanted in zip(moved, u, strict=True):
+        length = math.hypot(*wanted)
+        share = min(1.0, longest / length) if length > 0 else 1.0
+        np.testing.assert_allclose(row, wanted * share, rtol=1e-13, atol=1e-290)
+
+
+def test_a_limit_for_each_agent() -> None:
+    u = np.full((3, 2), 3.0)
+    moved = Kinematic(max_speed=[1.0, 5.0, math.inf]).advance(np.zeros((3, 2)), u, 2.0)
+    side = math.sqrt(0.5)
+    np.testing.assert_allclose(moved, 2 * np.array([[side, side], [3, 3], [3, 3]]))
+
+
+@given(
+    st.floats(0.1, 5.0),
+    st.one_of(st.just(0.0), st.floats(-6.0, 3.0).map(lambda e: 10.0**e)),
+    st.floats(0.01, 2.0),
+)
+def test_a_step_of_a_point_mass_is_the_solution(
+    mass: float, damping: float, time_step: float
+) -> None:
+    body = PointMass(mass=mass, damping=damping)
+    x0, u = np.array([[1.0, -2.0, 0.5, 3.0]]), np.array([[2.0, -1.0]])
+    if damping * time_step / mass < 40:
+
+        def rate(_: float, x: np.ndarray) -> np.ndarray:
+            return np.concatenate([x[2:], (u[0] - damping * x[2:]) / mass])
+
+        solved = solve_ivp(
+            rate, (0, time_step), x0[0], method="Radau", rtol=1e-9, atol=1e-11
+        )
+        wanted = solved.y[:, -1]
+    else:  # at the final speed almost at once
+        speed = u[0] / damping
+        lag = (x0[0, 2:] - speed) * mass / damping
+        wanted = np.concatenate([x0[0, :2] + speed * time_step + lag, speed])
+    moved = body.advance(x0, u, time_step)[0]
+    np.testing.assert_allclose(moved, wanted, rtol=1e-6, atol=1e-8)
+    # Two halves are as good as a whole.
+    halves = body.advance(body.advance(x0, u, time_step / 2), u, time_step / 2)[0]
+    np.testing.assert_allclose(halves, moved, rtol=1e-11, atol=1e-12)
+
+
+def test_bodies_differ() -> None:
+    x = np.zeros((2, 2))
+    u = np.ones((2, 1))
+    both = PointMass(mass=[1.0, 4.0], damping=[0.5, 0.0]).advance(x, u, 0.3)
+    for i, (mass, damping) in enumerate([(1.0, 0.5), (4.0, 0.0)]):
+        one = PointMass(mass=mass, damping=damping).advance(x[:1], u[:1], 0.3)
+        np.testing.assert_array_equal(both[i], one[0])
+
+
+# --- the field ------------------------------------------------------------------------
+
+
+def test_what_agents_observe_is_theirs_to_keep() -> None:
+    field = Field([[0.0, 0.0], [1.0, 2.0]], PointMass(), profile=Quadratic([1.0, 1.0]))
+    field.reset(RNG(0))
+    assert field.n == 2
+    seen = field.observe()
+    assert set(seen) == {"position", "slope", "velocity"}
+    np.testing.assert_array_equal(seen["slope"], [[-1.0, -1.0], [0.0, 1.0]])
+    kept = {name: array.copy() for name, array in seen.items()}
+    field.step(np.ones((2, 2)), RNG(0))
+    for name, array in seen.items():
+        np.testing.assert_array_equal(array, kept[name])
+    assert field.time == field.time_step
+    assert field.velocities is not None
+    assert (field.velocities > 0).all()
+
+
+def test_nobody_enters_an_obstacle() -> None:
+    wall = Obstacles([[0.0, 0.0]], 1.0, strength=0.0)
+    for body in (Kinematic(), PointMass()):
+        field = Field([[-2.0, 0.0], [-2.0, 3.0]], body, obstacles=wall, time_step=0.05)
+        field.reset(RNG(0))
+        for _ in range(200):
+            field.step(np.full((2, 2), [1.0, 0.0]), RNG(0))
+        np.testing.assert_allclose(field.positions[0], [-1.0, 0.0], atol=1e-15)
+        assert field.positions[1, 0] > 5.0
+        if field.velocities is not None:
+            assert field.velocities[0].tolist() == [0.0, 0.0]
+
+
+def test_starts_are_drawn_beside_obstacles_and_from_the_seed() -> None:
+    rock = Obstacles([[0.0, 0.0]], 2.0)
+    field = Field(300, obstacles=rock, bounds=(-2.5, 2.5))
+    field.reset(RNG(3))
+    first = field.positions.copy()
+    assert not rock.inside(first).any()
+    assert first.min() >= -2.5
+    assert first.max() <= 2.5
+    field.reset(RNG(3))
+    np.testing.assert_array_equal(field.positions, first)
+    space = Field(5, dim=3)
+    space.reset(RNG(0))
+    assert space.x.shape == (5, 3)
+
+
+@pytest.mark.parametrize(
+    ("make", "error", "message"),
+    [
+        (lambda: Field(0), ValueError, "start must be at least 1, got 0"),
+        (lambda: Field(2.5), TypeError, "start must be an integer"),
+        (lambda: Field(3, time_step=0.0), ValueError, "time_step must lie in"),
+        (lambda: Field(3, bounds=(1, 0)), ValueError, "lowest and the highest"),
+        (lambda: Field(3, profile=Kinematic()), TypeError, "a subclass of Profile"),
+        (lambda: Field(3, Quadratic([0, 0])), TypeError, "a subclass of Particles"),
+        (lambda: Field(3, profile=Plane([1.0])), ValueError, "must have 1 coordinates"),
+        (lambda: Field([[math.inf, 0.0]]), ValueError, "positions must be numbers of"),
+    ],
+)
+def test_what_makes_no_field(make: Any, error: type[Exception], message: str) -> None:
+    with pytest.raises(error, match=message):
+        make()
+
+
+def test_no_room_beside_the_obstacles() -> None:
+    field = Field(3, obstacles=Obstacles([[0.0, 0.0]], 10.0))
+    with pytest.raises(ValueError, match="bounds must leave room beside the obstacles"):
+        field.reset(RNG(0))
+
+
+@pytest.mark.parametrize(
+    ("u", "message"),
+    [
+        (np.zeros((3, 2)), r"u must have shape \(2, 2\)"),
+        (np.full((2, 2), np.nan), "inputs must be finite, got .* for agent 0"),
+        ([[0.0, 0.0], [np.inf, 0.0]], "inputs must be finite, got .* for agent 1"),
+    ],
+)
+def test_bad_inputs(u: Any, message: str) -> None:
+    field = Field(2)
+    field.reset(RNG(0))
+    with pytest.raises(ValueError, match=message):
+        field.step(u, RNG(0))
+
+
+def test_a_profile_of_ones_own() -> None:
+    class Cliff(Profile):
+        def value(self, positions: np.ndarray) -> np.ndarray:
+            return np.maximum(positions[..., 0], 0.0)
+
+        def gradient(self, positions: np.ndarray) -> np.ndarray:
+            return np.stack([positions[:, 0] > 0, np.zeros(len(positions))], axis=1)
+
+    field = Field([[1.0, 0.0], [-1.0, 0.0]], profile=Cliff())
+    field.reset(RNG(0))
+    np.testing.assert_array_equal(field.observe()["slope"], [[1.0, 0.0], [0.0, 0.0]])

@@ -87,7 +87,7 @@ def episode_steps(env: Any, given: int | None) -> int:
 
 def usual_model_steps(n_variables: int) -> int:
     """The most steps of all ants in a round, if nothing is said."""
-    return min(MODEL_STEPS * 4 ** max(n_variables - 2, 0), MOST_MODEL_STEPS)
+    return int(min(MODEL_STEPS * 4 ** max(n_variables - 2, 0), MOST_MODEL_STEPS))
 
 
 def grid_of_inputs(env: Any, inputs: Any) -> FloatArray | None:

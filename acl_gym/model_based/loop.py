@@ -11,6 +11,7 @@ from tqdm import tqdm
 from acl_gym.envs.learned import Transitions
 from acl_gym.model_based.learning_run import LearningRun
 from acl_gym.model_based.result import PlantLearning
+from acl_gym.utils import validation
 from acl_gym.utils.typing import Row
 
 
@@ -105,6 +106,8 @@ def learn_from_plant(
         TypeError: the environment, the agent or an argument is of the wrong kind.
         ValueError: an argument is out of range, or the folder holds another run.
     """
+    asynchronous = validation.boolean("asynchronous", asynchronous)
+    progress_bar = validation.boolean("progress_bar", progress_bar)
     run = LearningRun(
         env,
         agent,

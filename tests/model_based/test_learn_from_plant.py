@@ -196,6 +196,8 @@ def test_rounds() -> None:
         ({"callback": 3}, TypeError, "callback must be a function"),
         ({"model": {"colour": 1}}, TypeError, "colour"),
         ({"model": [1]}, TypeError, "model must be a dict"),
+        ({"asynchronous": "no"}, TypeError, "asynchronous must be True or False"),
+        ({"progress_bar": 1}, TypeError, "progress_bar must be True or False"),
         ({"interactions": 3}, ValueError, "interactions must be 5 or more"),
     ],
 )

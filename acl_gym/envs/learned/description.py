@@ -129,7 +129,7 @@ def described(
         axes,
         pairs,
         None if values is None else _rows("values", values, n_inputs),
-        bool(numbered),
+        validation.boolean("numbered", numbered),
         sampling_time,
     )
 

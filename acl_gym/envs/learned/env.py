@@ -74,7 +74,7 @@ class LearnedVectorEnv(ControlVectorEnv):
             1, >= 0.
         dynamics: what was learned already, in place of learning it.
         begin: dynamics learned from fewer steps, from which the search begins.
-        seed: of the draws.
+        seed: of the draws; None takes another one each time.
         autoreset_mode: see `ControlVectorEnv`.
         render_mode: see there.
 
@@ -85,7 +85,8 @@ class LearnedVectorEnv(ControlVectorEnv):
         learned_goal: the `LearnedGoal`; None where `goal` was given or there is none.
 
     Raises:
-        TypeError: `transitions` or `regressor` are of the wrong kind.
+        TypeError: `transitions`, `regressor`, `seed`, `uncertain` or `per_action` are of
+            the wrong kind.
         ValueError: there are too few steps, no rewards and no cost, or an argument does
             not fit the data.
 
@@ -118,7 +119,7 @@ class LearnedVectorEnv(ControlVectorEnv):
         pessimism: float = 0.0,
         dynamics: LearnedDynamics | None = None,
         begin: LearnedDynamics | None = None,
-        seed: int = 0,
+        seed: int | None = 0,
         autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
         render_mode: str | None = None,
     ) -> None:
@@ -129,6 +130,9 @@ class LearnedVectorEnv(ControlVectorEnv):
                 "them."
             )
         steps = validation.integer("max_episode_steps", max_episode_steps, at_least=1)
+        seed = validation.seed(seed)
+        uncertain = validation.boolean("uncertain", uncertain)
+        per_action = validation.boolean("per_action", per_action)
         self.transitions = transitions
         known = transitions.description
         actions = _inputs(inputs, transitions)
@@ -172,7 +176,7 @@ class LearnedVectorEnv(ControlVectorEnv):
             evaluation_states=evaluation_states,
             evaluation_steps=steps,
             pessimism=pessimism,
-            uncertain=bool(uncertain),
+            uncertain=uncertain,
         )
 
     @property

@@ -97,7 +97,7 @@ class Plant(ControlSystem):
             discrete_time = model.discrete_time
             state_names = state_names or model.state_names
             input_names = input_names or model.input_names
-        self.discrete_time = bool(discrete_time)
+        self.discrete_time = validation.boolean("discrete_time", discrete_time)
         samples = self._draw(np.random.default_rng(0), sample_count())
         self._equations = Equations(
             dynamics, samples, self.inputs, self.discrete_time, self.parameters

@@ -301,6 +301,10 @@ def test_doubts_are_warned_of() -> None:
         ),
         ({"goal": [1.0, 2.0, 3.0]}, ValueError, "goal must be a state of 1 variables"),
         ({"regressor": "neural"}, ValueError, "regressor must be one of"),
+        ({"seed": "a"}, TypeError, "seed must be an integer, got 'a'"),
+        ({"seed": -1}, ValueError, "seed must be at least 0"),
+        ({"uncertain": "yes"}, TypeError, "uncertain must be True or False, got 'yes'"),
+        ({"per_action": 1}, TypeError, "per_action must be True or False, got 1"),
     ],
 )
 def test_bad_arguments_get_one_clear_error(

@@ -280,14 +280,16 @@ class ControlVectorEnv(VectorEnv[Observation, Any, NDArray[Any]]):
         rewards = np.zeros(n_slots)
         terminated = np.zeros(n_slots, np.bool_)
         truncated = np.zeros(n_slots, np.bool_)
-        n_finished = 0
+        n_finished, failed = 0, None
         slots = self._all_slots if walking is None else walking
         uniforms = draw_uniforms(system, self, slots.size)
         if walking is None:
-            system.advance(state, actions, uniforms, rewards, terminated)
+            failed = system.advance(state, actions, uniforms, rewards, terminated)
+            if failed is not None:
+                terminated |= failed
             n_finished = count_step(self._limit, self._steps, terminated, truncated)
         elif slots.size:
-            n_finished = self._step_some(
+            n_finished, failed = self._step_some(
                 self._limit,
                 slots,
                 self._finished,
@@ -310,6 +312,9 @@ class ControlVectorEnv(VectorEnv[Observation, Any, NDArray[Any]]):
             n_left = finish(
                 terminated, truncated, self._finished, walking, ended, success
             )
+            if failed is not None:
+                success &= ~failed
+                self._charge(failed, rewards)
             self._walking = walking[:n_left]
             last = {"is_success": success, "_is_success": ended}
             if (
@@ -323,6 +328,16 @@ class ControlVectorEnv(VectorEnv[Observation, Any, NDArray[Any]]):
         if last:
             infos = {**last, **infos}
         return self._observe(), rewards, terminated, truncated, infos
+
+    def _charge(self, failed: BoolArray, rewards: FloatArray) -> None:
+        """Let slots pay that have failed in the step that was just counted.
+
+        Here they do not.
+
+        Args:
+            failed: which, `(num_envs,)`.
+            rewards: of the step, `(num_envs,)`, changed in place.
+        """
 
     def render(self) -> tuple[Frame, ...] | None:
         """A frame `(480, 480, 3)` of each slot.

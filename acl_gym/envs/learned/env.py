@@ -17,7 +17,7 @@ from acl_gym.envs.learned.quality import DataWarning
 from acl_gym.envs.learned.system import LearnedSystem
 from acl_gym.envs.learned.transitions import Transitions
 from acl_gym.utils import validation
-from acl_gym.utils.typing import FloatArray, IntArray
+from acl_gym.utils.typing import BoolArray, FloatArray, IntArray
 
 MOST_INPUTS = 50
 """Different inputs in a recording that may become actions of their own."""
@@ -72,6 +72,10 @@ class LearnedVectorEnv(ControlVectorEnv):
             from all that fit the data, so that a policy is learned that works for all.
         pessimism: what a step costs more where the model is not sure, for a `spread` of
             1, >= 0.
+        most_spread: where the `spread` of a step is more than this, > 0, the episode
+            ends in failure: the step costs as much as the dearest step does, for itself
+            and for each step that was left. So no policy gains by leaving the data. None
+            lets ants go anywhere.
         dynamics: what was learned already, in place of learning it.
         begin: dynamics learned from fewer steps, from which the search begins.
         seed: of the draws; None takes another one each time.
@@ -117,6 +121,7 @@ class LearnedVectorEnv(ControlVectorEnv):
         n_draws: int = 10,
         uncertain: bool = False,
         pessimism: float = 0.0,
+        most_spread: float | None = None,
         dynamics: LearnedDynamics | None = None,
         begin: LearnedDynamics | None = None,
         seed: int | None = 0,
@@ -176,6 +181,7 @@ class LearnedVectorEnv(ControlVectorEnv):
             evaluation_states=evaluation_states,
             evaluation_steps=steps,
             pessimism=pessimism,
+            most_spread=most_spread,
             uncertain=uncertain,
         )
 
@@ -207,6 +213,12 @@ class LearnedVectorEnv(ControlVectorEnv):
             actions: `(n,)`, or one for all.
         """
         return self.dynamics.distance(*self._pairs(states, actions))
+
+    def _charge(self, failed: BoolArray, rewards: FloatArray) -> None:
+        """Let slots that leave the data pay for the steps that were left."""
+        limit = self._limit or self.system.evaluation_steps
+        left = np.maximum(limit - self._steps[failed], 0) + 1  # with the step just made
+        rewards[failed] = -self.system.dearest_step * left
 
     def _pairs(self, states: Any, actions: Any) -> tuple[FloatArray, FloatArray]:
         """States and inputs, variables first."""

@@ -272,7 +272,7 @@ class Plant(ControlSystem):
         uniforms: FloatArray | None,
         rewards: FloatArray,
         reached: BoolArray,
-    ) -> None:
+    ) -> BoolArray | None:
         """One sampling time; see `ControlSystem.advance`.
 
         Raises:
@@ -303,6 +303,7 @@ class Plant(ControlSystem):
             )
         kernels.settle(states, self.low, self.high, self._period)
         self._cost.judge(states, actions, self._goal, rewards, reached, given)
+        return None
 
     def evaluation_states(self) -> FloatArray:
         """The states given, or 100 initial ones drawn once, `(n, state_size)`."""

@@ -34,6 +34,7 @@ from acl_gym.envs.learned import Transitions
 from acl_gym.envs.learned.description import described_by
 from acl_gym.evaluation import policy_measures
 from acl_gym.model_based import PlantLearning, learn_from_plant
+from acl_gym.model_based.arguments import task_of
 from acl_gym.model_based.journal import AGENT, BEST
 from acl_gym.model_based.learning_run import default_agent
 from acl_gym.utils import files
@@ -240,6 +241,12 @@ def _data(
             raise BadArgumentError(
                 f"{file} must have a sampling time of {known:g} s, as the environment "
                 f"has, got {time:g} s."
+            )
+        if found.rewards is None and "cost" not in task_of(plant, {}):
+            remedy = "record rewards too" if kind is None else "add --reward COLUMN"
+            raise BadArgumentError(
+                f"{file} must hold rewards, from which the cost is learned, since the "
+                f"environment does not tell its own; {remedy}."
             )
         if inputs is not None:
             facts["values"] = inputs

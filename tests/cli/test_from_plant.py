@@ -17,7 +17,7 @@ import pandas as pd
 import pytest
 
 from acl_gym import Transitions
-from tests.cli.runner import PENDULUM, figures, invoke, refused
+from tests.cli.runner import MODULE, PENDULUM, figures, invoke, refused
 
 FEW = ["train", PENDULUM, "--interactions", "40", "--restart-after", "10"]
 
@@ -164,6 +164,49 @@ def test_continuous_actions_of_another_package() -> None:
     assert again["mean_return"] == found["best"]["policy_return"]
 
 
+@pytest.fixture
+def corridor() -> list[str]:
+    """Rows of a corridor of another package, and a command that learns from them.
+
+    A row for each moment: what the step gave that begins there, and whether it was the
+    last of its episode. The last row of a run holds the state that it led to.
+    """
+    Path("my_corridor.py").write_text(MODULE)
+    rows: list[dict[str, Any]] = []
+    rng = np.random.default_rng(0)
+    for run in range(8):
+        x, over = float(rng.uniform(1.0, 1.8)), False
+        while not over:
+            u = int(rng.random() < 0.7)
+            after = float(np.clip(x + (0.1 if u else -0.1), 0.0, 2.0))
+            over = after >= 1.95
+            rows.append({"run": run, "x": x, "u": u, "r": -1.0, "end": int(over)})
+            x = after
+        rows.append({"run": run, "x": x, "u": 0, "r": 0.0, "end": 0})
+    pd.DataFrame(rows).to_csv("rows.csv", index=False)
+    command = "train my_corridor:Corridor-v0 --from-data rows.csv"
+    return [*command.split(), "--state", "x", "--input", "u", "--run", "run"]
+
+
+def test_rewards_and_ends_of_a_table_tell_cost_and_goal(corridor: list[str]) -> None:
+    found = figures(*corridor, "--reward", "r", "--terminated", "end")
+    assert found["model"]["learned_cost_error"] < 0.1
+    assert found["model"]["learned_goal_recall"] == 1.0
+    # To the right always, from 0 to 1.8: 11 steps in the mean. At random 60 and more.
+    assert found["best"]["policy_return"] > -13
+    blind = figures(*corridor, "--reward", "r", "--out", "blind.npz")
+    assert blind["model"]["learned_goal_recall"] is None
+    # Without a goal all steps are alike, whatever is done.
+    assert blind["rows"][0]["model_cost"] == pytest.approx(80, rel=0.02)
+
+
+def test_a_table_without_rewards_does_not_tell_a_cost(corridor: list[str]) -> None:
+    said = refused(2, *corridor)
+    assert "rows.csv must hold rewards" in said
+    assert "add --reward COLUMN" in said
+    assert "must have a column 'gain'" in refused(2, *corridor, "--reward", "gain")
+
+
 DATA = ["train", PENDULUM, "--from-data"]
 
 
@@ -180,6 +223,10 @@ DATA = ["train", PENDULUM, "--from-data"]
         ([*DATA, "no.npz"], "no.npz"),
         ([*DATA, "no.csv", "--state", "a,b"], "needs --input"),
         ([*DATA, "no.csv", "--state", "a,", "--input", "u"], "--state must be names"),
+        ([*DATA, "no.npz", "--reward", "r"], "--reward names columns of --from-data"),
+        ([*FEW, "--terminated", "e"], "--terminated names columns of --from-data"),
+        ([*DATA, "no.csv", "--state", "a", "--input", "u", "--terminated", "e"],
+         "--terminated needs --run"),
         ([*DATA, "no.csv", "--state", "a", "--input", "u"], "there is no file no.csv"),
         (["train", "Pendulum-v1", "--interactions", "9"], "add --discretize 5"),
         (["train", "Taxi-v4", "--interactions", "9"], "Box of one axis"),

@@ -118,7 +118,9 @@ class Plant(ControlSystem):
         self._evaluation_states = (
             self._default_evaluation_states()
             if evaluation_states is None
-            else self.checked_states(evaluation_states)
+            else self._with_nominal(
+                self._checked_rows(evaluation_states, "evaluation_states")
+            )
         )
 
     @property
@@ -193,18 +195,34 @@ class Plant(ControlSystem):
     def _sample(self, rng: np.random.Generator, count: int) -> FloatArray:
         """Initial states, with parameters only where `initial` holds them."""
         if callable(self._initial):
-            rows = self._checked_rows(self._initial(rng, count))
-            if len(rows) != count:
-                raise ValueError(
-                    f"initial must return {count} states, one a row, got {len(rows)}."
-                )
-            return np.ascontiguousarray(rows.T)
+            return np.ascontiguousarray(self._initial_of_function(rng, count).T)
         if self._initial is not None and not isinstance(self._initial, spaces.Box):
             rows = self._initial[rng.integers(len(self._initial), size=count)]
             return np.ascontiguousarray(rows.T)
         return sampling.sample_outside(
             lambda n: self._draw_initial(rng, n), self._goal.reached, count
         )
+
+    def _initial_of_function(self, rng: np.random.Generator, count: int) -> FloatArray:
+        """What the user's function `initial` returns, checked, `(count, ...)`.
+
+        Raises:
+            ValueError: it raises, or does not return so many states.
+        """
+        expected = f"initial(rng, n) must return n states, one a row, shape (n, {self.low.size})"
+        try:
+            given = self._initial(rng, count)
+        except Exception as error:  # whatever the user's code raises
+            raise ValueError(
+                f"{expected}, but it raised {error!r} for n = {count}."
+            ) from error
+        try:
+            rows = self._checked_rows(given)
+        except (ValueError, TypeError) as error:
+            raise ValueError(f"{expected}: for n = {count}, {error}") from error
+        if len(rows) != count:
+            raise ValueError(f"{expected}, got {len(rows)} rows for n = {count}.")
+        return rows
 
     def checked_states(self, states: Any) -> FloatArray:
         """Return states `(n, state_size)`, circular variables brought into X.
@@ -224,10 +242,15 @@ class Plant(ControlSystem):
         own = np.tile(self.parameters.nominal_drawn, (len(rows), 1))
         return np.concatenate([rows, own], axis=1)
 
-    def _checked_rows(self, states: Any) -> FloatArray:
-        """The states, checked, with parameters only where these are given."""
+    def _checked_rows(self, states: Any, name: str = "states") -> FloatArray:
+        """The states, checked, with parameters only where these are given.
+
+        Args:
+            states: `(n, ...)`.
+            name: what messages call them.
+        """
         size, more = self.low.size, self.parameters.count
-        array = validation.real_array("states", states, finite=False)
+        array = validation.real_array(name, states, finite=False)
         if array.ndim == 1 and size == 1:
             array = array[:, None]
         if array.ndim != 2 or array.shape[1] not in (size, size + more):
@@ -236,13 +259,13 @@ class Plant(ControlSystem):
                 names = ", ".join(self.parameters.uncertain)
                 wider = f", or {size + more} with the uncertain parameters {names}"
             raise ValueError(
-                f"states must be rows of {size} variables, shape (n, {size}){wider}, got "
+                f"{name} must be rows of {size} variables, shape (n, {size}){wider}, got "
                 f"{array.shape}."
             )
         if not np.isfinite(array).all():
             row = int(np.flatnonzero(~np.isfinite(array).all(axis=1))[0])
             raise ValueError(
-                f"states must be finite, got {array[row].tolist()} in row {row}."
+                f"{name} must be finite, got {array[row].tolist()} in row {row}."
             )
         array, own = array[:, :size], array[:, size:]
         if own.size:
@@ -251,7 +274,7 @@ class Plant(ControlSystem):
         if outside.any():
             row, axis = np.argwhere(outside)[0]
             raise ValueError(
-                f"states must lie within low and high, variable {axis} in "
+                f"{name} must lie within low and high, variable {axis} in "
                 f"[{self.low[axis]:g}, {self.high[axis]:g}], got {array[row, axis]:g} in "
                 f"row {row}."
             )
@@ -336,7 +359,8 @@ class Plant(ControlSystem):
     def _checked_initial(self, initial: Any) -> Any:
         size = self.low.size
         if isinstance(initial, spaces.Box):
-            self.checked_states(np.stack([initial.low, initial.high]).reshape(2, -1))
+            ends = np.stack([initial.low, initial.high]).reshape(2, -1)
+            self._checked_rows(ends, "initial")
             initial = spaces.Box(
                 initial.low.astype(float), initial.high.astype(float), dtype=np.float64
             )
@@ -344,7 +368,7 @@ class Plant(ControlSystem):
             rows = validation.real_array("initial", initial)
             whole = (size + self.parameters.count,) if size > 1 else (size,)
             one = rows.shape in ((size,), whole)
-            return self._checked_rows(rows[None] if one else rows)
+            return self._checked_rows(rows[None] if one else rows, "initial")
         self._initial = initial
         if callable(initial) and not isinstance(initial, spaces.Box):
             self.sample_states(np.random.default_rng(0), 3)

@@ -315,6 +315,24 @@ def test_bad_arguments_get_one_clear_error(
         LearnedVectorEnv(data, **{"cost": "time", **arguments})
 
 
+@pytest.mark.parametrize(
+    ("initial", "words"),
+    [
+        (lambda rng, n: 1 / 0, r"but it raised ZeroDivisionError"),
+        (lambda rng, n: np.full((n, 1), 99.0), "states must lie within low and high"),
+        (lambda rng, n: "anywhere", "must be an array of real numbers"),
+    ],
+)
+def test_a_function_of_initial_states_is_named(initial: Any, words: str) -> None:
+    data = Transitions(**line())
+    expected = rf"initial\(rng, n\) must return n states.*{words}"
+    with pytest.raises(ValueError, match=expected) as caught:
+        LearnedVectorEnv(data, cost="time", initial=initial)
+    assert caught.value.__cause__ is not None
+    with pytest.raises(ValueError, match="initial must lie within low and high"):
+        LearnedVectorEnv(data, cost="time", initial=[[99.0]])
+
+
 def test_what_is_no_recording_is_refused() -> None:
     with pytest.raises(TypeError, match=r"transitions must be acl_gym\.Transitions"):
         LearnedVectorEnv(np.zeros((5, 3)), cost="time")  # type: ignore[arg-type]

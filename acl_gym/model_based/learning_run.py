@@ -171,11 +171,25 @@ class LearningRun:
                 f"{validation.shown(callback)}."
             )
         progress(self._made_before)
-        if asynchronous:
-            self._side_by_side(callback, progress)
-        else:
-            self._in_turn(callback, progress)
+        try:
+            if asynchronous:
+                self._side_by_side(callback, progress)
+            else:
+                self._in_turn(callback, progress)
+        except Exception as error:
+            self._tell_what_is_kept(error)
+            raise
         return self._result()
+
+    def _tell_what_is_kept(self, error: Exception) -> None:
+        """Add to an error, of the plant perhaps, that no interaction is lost."""
+        made = self._interactions
+        if self._journal is not None and made:
+            kept = "The interaction" if made == 1 else f"All {made:,} interactions"
+            error.add_note(
+                f"{kept} made so far {'is' if made == 1 else 'are'} kept in "
+                f"{self._journal.folder}; run the same again, and it goes on from there."
+            )
 
     def _in_turn(self, callback: Callback, progress: Callable[[int], Any]) -> None:
         """Plant and colony take turns."""

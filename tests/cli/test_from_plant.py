@@ -86,6 +86,27 @@ def test_the_same_command_goes_on_and_makes_nothing_twice() -> None:
     assert "give another name with --out FILE.npz" in said
 
 
+def test_an_error_of_the_plant_names_the_folder_of_what_was_recorded() -> None:
+    """And the same command goes on where it was, once the plant is mended."""
+    blown = MODULE.replace(
+        "def step(self, action):",
+        "def step(self, action):\n"
+        "        import pathlib\n"
+        "        self.made = getattr(self, 'made', 0) + 1\n"
+        "        if self.made > 30 and not pathlib.Path('mended').exists():\n"
+        "            raise ConnectionError('no answer from the rig')",
+    ).replace("Corridor-v0", "Blown-v0")
+    Path("my_blown.py").write_text(blown)
+    command = ["train", "my_blown:Blown-v0", "--interactions", "40", "--quiet"]
+    said = refused(2, *command, "--out", "rig.npz")
+    assert "no answer from the rig. All 30 interactions made so far are kept" in said
+    assert "kept in rig-plant; run the same again, and it goes on from there." in said
+    Path("mended").touch()
+    found = figures(*command, "--out", "rig.npz")
+    assert found["recorded_steps"] == 40
+    assert len(Path("rig-plant/transitions.csv").read_text().splitlines()) == 41
+
+
 @pytest.mark.slow
 def test_a_killed_run_goes_on() -> None:
     """SIGKILL after the first round: the second run makes what was left."""

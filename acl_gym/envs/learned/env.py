@@ -13,7 +13,7 @@ from acl_gym.envs.learned.description import rows_of_inputs
 from acl_gym.envs.learned.dynamics import LearnedDynamics
 from acl_gym.envs.learned.features import periods_of, variable_ends
 from acl_gym.envs.learned.outcomes import LearnedCost, LearnedGoal, can_be_learned
-from acl_gym.envs.learned.quality import DataWarning
+from acl_gym.envs.learned.quality import DataWarning, goal_doubts
 from acl_gym.envs.learned.system import LearnedSystem
 from acl_gym.envs.learned.transitions import Transitions
 from acl_gym.utils import validation
@@ -96,7 +96,7 @@ class LearnedVectorEnv(ControlVectorEnv):
 
     Warns:
         DataWarning: something speaks against learning from this data, see
-            `Transitions.doubts`.
+            `Transitions.doubts`, or the goal is far from what was recorded.
     """
 
     system_type = LearnedSystem
@@ -293,8 +293,14 @@ def _bounds(
                     f"tolerance must be a number or {bottom.size} of them, got "
                     f"{validation.shown(tolerance)}."
                 )
-        bottom = np.where(circle, bottom, np.minimum(bottom, centre - half))
-        top = np.where(circle, top, np.maximum(top, centre + half))
+        ends = np.stack([centre - half, centre + half])
+        columns = np.array(known.shown_angles.columns)[~circle]
+        recorded = np.stack([least, most])[:, ~circle]
+        names = [known.state_names[column] for column in columns]
+        for doubt in goal_doubts(recorded, ends[:, ~circle], names):
+            warnings.warn(DataWarning(doubt), stacklevel=3)
+        bottom = np.where(circle, bottom, np.minimum(bottom, ends[0]))
+        top = np.where(circle, top, np.maximum(top, ends[1]))
     return _given("low", low, bottom), _given("high", high, top)
 
 

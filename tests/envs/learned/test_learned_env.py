@@ -239,7 +239,8 @@ def test_variables_stay_within_what_was_recorded() -> None:
     for _ in range(30):
         seen, *_ = env.step(np.full(3, 2))
     assert (seen == space.high).all()
-    wide = LearnedVectorEnv(data, cost="time", low=[-9], high=[None], goal=[5.0])
+    with pytest.warns(DataWarning, match=r"the goal begins at x\[0\]"):
+        wide = LearnedVectorEnv(data, cost="time", low=[-9], high=[None], goal=[5.0])
     assert wide.single_observation_space.low[0] == -9  # type: ignore[attr-defined]
     assert wide.single_observation_space.high[0] > 5  # type: ignore[attr-defined]
 
@@ -282,6 +283,31 @@ def test_doubts_are_warned_of() -> None:
     still = Transitions(**{**line(), "inputs": np.zeros((40, 1))})
     with pytest.warns(DataWarning, match="is always 0"):
         LearnedVectorEnv(still, cost="time", inputs=[-1.0, 1.0])
+
+
+def test_a_goal_far_from_the_data_is_warned_of() -> None:
+    """How far, in units of what was recorded; and not where the goal is near."""
+    data = Transitions(**line(), state_names=["position, m"])
+    both = np.concatenate([data.states, data.next_states])
+    least, most = both.min(), both.max()
+    known: dict[str, Any] = {"cost": "time", "dynamics": LearnedDynamics(data)}
+    for goal in (most + 2.1 * (most - least), least - 2.1 * (most - least)):
+        with pytest.warns(DataWarning) as caught:
+            env = LearnedVectorEnv(
+                data, goal=[goal], tolerance=0.1 * (most - least), **known
+            )
+        (said,) = (str(each.message) for each in caught)
+        assert "position, m" in said
+        assert "2 times the recorded range" in said
+        assert f"({least:.4g} to {most:.4g})" in said
+        assert "record on the way to the goal" in said
+        space: Any = env.single_observation_space
+        assert space.low[0] <= goal <= space.high[0]
+    # No warning, which would be an error here.
+    LearnedVectorEnv(data, goal=[most + 0.4 * (most - least)], **known)
+    # All of a circle is near, whatever was recorded of it.
+    half = pendulum(120)[np.cos(pendulum(120).states[:, 0]) > 0.5]
+    LearnedVectorEnv(half, dynamics=model().dynamics, **TASK)
 
 
 @pytest.mark.parametrize(

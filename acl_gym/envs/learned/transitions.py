@@ -395,6 +395,8 @@ class Transitions:
 
         Raises:
             ImportError: an id is given, and minari is not installed.
+            FileNotFoundError: there is no data set of that id on this machine.
+            ValueError: it is damaged, or holds no episode.
             TypeError: observations or actions are not arrays of one axis or numbers.
         """
         return cls(**{**reading.arrays_of_minari(dataset), **described})

@@ -121,6 +121,9 @@ def described(
         )
     if sampling_time is not None:
         sampling_time = validation.number("sampling_time", sampling_time, above=0)
+    if values is not None:
+        rows = rows_of_inputs(values, n_inputs, "values")
+        values = tuple(map(tuple, rows.tolist()))
     return Description(
         names,
         of_inputs,
@@ -128,7 +131,7 @@ def described(
         tuple(top.tolist()),
         axes,
         pairs,
-        None if values is None else _rows("values", values, n_inputs),
+        values,
         validation.boolean("numbered", numbered),
         sampling_time,
     )
@@ -220,33 +223,22 @@ def _end(name: str, values: Any, unknown: float, size: int) -> FloatArray:
     return array
 
 
-def _rows(name: str, values: Any, n_inputs: int) -> tuple[tuple[float, ...], ...]:
-    array = validation.real_array(name, values)
-    if array.ndim == 1 and n_inputs == 1:
-        array = array[:, None]
-    if array.ndim != 2 or array.shape[1] != n_inputs:
-        raise ValueError(
-            f"{name} must hold a row of {n_inputs} inputs for each action, got shape "
-            f"{array.shape}."
-        )
-    return tuple(map(tuple, array.tolist()))
-
-
-def rows_of_inputs(inputs: Any, n_inputs: int) -> FloatArray:
+def rows_of_inputs(inputs: Any, n_inputs: int, name: str = "inputs") -> FloatArray:
     """Return what each action sets, `(n_actions, n_inputs)`.
 
     Args:
         inputs: these rows, or a number for each action.
         n_inputs: numbers in a row.
+        name: what messages call them.
 
     Raises:
         ValueError: they are none.
     """
-    array = validation.real_array("inputs", inputs)
+    array = validation.real_array(name, inputs)
     array = array[:, None] if array.ndim == 1 else array
     if array.ndim != 2 or array.shape[1] != n_inputs:
         raise ValueError(
-            f"inputs must hold a row of {n_inputs} numbers for each action, got shape "
+            f"{name} must hold a row of {n_inputs} numbers for each action, got shape "
             f"{array.shape}."
         )
     return array

@@ -112,10 +112,11 @@ def _environment(
         same = len(set(bins) | set(found.bins)) == 1
     else:
         same = bins in (None, found.bins)
-    if not same:
+    if bins is not None and (found.end_to_end or not same):
+        known = () if found.end_to_end else found.bins or ()
         raise BadArgumentError(
-            f"--discretize must be {','.join(map(str, found.bins or ())) or 'left out'}, "
-            f"as in {file}, got {','.join(map(str, bins or ()))}."
+            f"--discretize must be {','.join(map(str, known)) or 'left out'}, as in "
+            f"{file}, got {','.join(map(str, bins))}."
         )
     for name, value in arguments.items():
         if found.arguments.get(name, value) != value or name not in found.arguments:

@@ -9,8 +9,9 @@ import typer
 
 from acl_gym.cli.agents import AGENTS, parameters
 from acl_gym.cli.common import DebugOption, JsonOption, check_name
-from acl_gym.cli.environments import Environment, parse_bins
+from acl_gym.cli.environments import Environment
 from acl_gym.cli.errors import BadArgumentError, bad_arguments, report
+from acl_gym.cli.numbering import parse_bins
 from acl_gym.cli.plant_options import PlantOptions
 from acl_gym.cli.resuming import resumed_plan
 from acl_gym.cli.targets import checked_file, free_name, name_after
@@ -82,7 +83,8 @@ def train(
             help="For continuous actions: the number of values of each dimension, one "
             "for all or one for each. They lie in the middle of equal parts of the range "
             "(gymnasium.wrappers.DiscretizeAction). acl-gym evaluate --interpolate then "
-            "sets inputs between them.",
+            "sets inputs between them.  [default: with --interactions or --from-data "
+            "five from end to end]",
             show_default=False,
         ),
     ] = None,

@@ -11,6 +11,7 @@ from gymnasium.vector import VectorEnv
 
 from acl_gym.envs.control.lookup import system_of
 from acl_gym.envs.learned.description import rows_of_inputs
+from acl_gym.envs.wrappers.action_grid import grid_over
 from acl_gym.utils import validation
 from acl_gym.utils.boxes import declared_bounds
 from acl_gym.utils.typing import FloatArray
@@ -112,9 +113,8 @@ def grid_of_inputs(env: Any, inputs: Any) -> FloatArray | None:
                 "inputs must be given where the Box of actions has no finite bounds, got "
                 f"{validation.shown(space)}."
             )
-        lines = [np.linspace(*ends, VALUES) for ends in zip(low, high, strict=True)]
-        grid = np.meshgrid(*lines, indexing="ij")
-        return np.stack(grid, axis=-1).reshape(-1, len(lines))
+        _, values = grid_over(space, VALUES)
+        return values.astype(np.float64)
     array = rows_of_inputs(inputs, space.shape[0])
     if ((array < space.low) | (array > space.high)).any():
         raise ValueError(

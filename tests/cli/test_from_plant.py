@@ -17,6 +17,7 @@ import pandas as pd
 import pytest
 
 from acl_gym import Transitions
+from acl_gym.cli.environments import Environment
 from tests.cli.runner import MODULE, PENDULUM, figures, invoke, refused
 
 FEW = ["train", PENDULUM, "--interactions", "40", "--restart-after", "10"]
@@ -185,6 +186,47 @@ def test_continuous_actions_of_another_package() -> None:
     assert again["mean_return"] == found["best"]["policy_return"]
 
 
+def test_continuous_actions_take_values_from_end_to_end() -> None:
+    """As `learn_from_plant` does; and the file is all that its evaluation needs."""
+    found = figures(
+        *("train", "Pendulum-v1", "--interactions", "20", "--max-steps", "20"),
+        *("--out", "p.npz"),
+    )
+    assert (found["discretize"], found["end_to_end"]) == ([5], True)
+    inputs = np.loadtxt("p-plant/transitions.csv", delimiter=",", skiprows=1)[:, 4]
+    assert set(inputs) <= {-2.0, -1.0, 0.0, 1.0, 2.0}
+    assert {-2.0, 2.0} <= set(inputs)  # the middles of five parts end at 1.6
+    again = figures("evaluate", "p-best.npz")
+    assert again["mean_return"] == found["best"]["policy_return"]
+    assert (again["discretize"], again["end_to_end"]) == ([5], True)
+    between = figures("evaluate", "p-best.npz", "--interpolate", "--episodes", "3")
+    assert between["interpolated"]
+    more = figures("train", "--resume", "p.npz", "--trials", "1")
+    assert (more["discretize"], more["end_to_end"]) == ([5], True)
+    assert "must be left out" in refused(
+        2, "train", "--resume", "p.npz", "--discretize", "5"
+    )
+
+
+def test_real_inputs_of_this_package_stay_native() -> None:
+    found = figures(*FEW, "--env-arg", "continuous=true", "--out", "c.npz")
+    assert (found["discretize"], found["end_to_end"]) == ([5], True)
+    again = figures("evaluate", "c-best.npz")
+    assert again["policy_cost"] == found["best"]["policy_cost"]
+    assert again["episodes"] == 100  # from its evaluation states
+    environment = Environment(PENDULUM, {"continuous": True}, (5,), end_to_end=True)
+    single, several = environment.single(), environment.vector(3)
+    assert single.action_space == several.single_action_space
+    states = np.tile([1.0, 2.0], (3, 1))
+    several.reset(options={"state": states})
+    seen = several.step(np.array([4, 4, 4]))[0]
+    single.reset(options={"state": states[0]})
+    np.testing.assert_array_equal(single.step(4)[0], seen[0])
+    real = environment.with_real_inputs().single()
+    real.reset(options={"state": states[0]})
+    np.testing.assert_array_equal(real.step(np.array([0.8]))[0], seen[0])
+
+
 @pytest.fixture
 def corridor() -> list[str]:
     """Rows of a corridor of another package, and a command that learns from them.
@@ -249,7 +291,6 @@ DATA = ["train", PENDULUM, "--from-data"]
         ([*DATA, "no.csv", "--state", "a", "--input", "u", "--terminated", "e"],
          "--terminated needs --run"),
         ([*DATA, "no.csv", "--state", "a", "--input", "u"], "there is no file no.csv"),
-        (["train", "Pendulum-v1", "--interactions", "9"], "add --discretize 5"),
         (["train", "Taxi-v4", "--interactions", "9"], "Box of one axis"),
     ],
 )  # fmt: skip

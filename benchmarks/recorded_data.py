@@ -30,6 +30,7 @@ import itertools
 import json
 import sys
 import time
+import warnings
 from typing import Any
 
 import gymnasium as gym
@@ -37,6 +38,7 @@ import numpy as np
 
 from acl_gym import LearnedVectorEnv, ReturningACL, Transitions, evaluate_policy_cost
 from acl_gym.callbacks import PolicyEvaluation
+from acl_gym.envs.learned import DataWarning
 
 KINDS = ("anywhere", "rest", "lower")
 EVALUATED = gym.make_vec("acl_gym/Pendulum-v0", num_envs=1)
@@ -148,6 +150,9 @@ def main() -> None:
     )
     parser.add_argument("--json", action="store_true", help="print JSON")
     options = parser.parse_args()
+    warnings.simplefilter(
+        "ignore", DataWarning
+    )  # that there are few steps is the point
     rows = []
     task = EVALUATED.unwrapped.system.task  # type: ignore[attr-defined]
     for kind, steps in itertools.product(options.kinds, options.transitions):

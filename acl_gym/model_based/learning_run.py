@@ -25,7 +25,7 @@ from acl_gym.envs.learned.regression import LEAST_STEPS
 from acl_gym.model_based.arguments import (
     check_plant,
     episode_steps,
-    grid_of_inputs,
+    inputs_of_actions,
     round_ends,
     task_of,
     usual_model_steps,
@@ -113,7 +113,7 @@ class LearningRun:
             )
         self._arguments = dict(model or {})
         self._steps = episode_steps(env, max_episode_steps)
-        values = grid_of_inputs(env, inputs)
+        values = inputs_of_actions(env, inputs)
         self._journal: Journal | None = None
         self._before: Transitions | None = None
         if folder is not None:

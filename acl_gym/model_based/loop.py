@@ -70,8 +70,11 @@ def learn_from_plant(
         hold: for how many steps a random action is held, >= 1.
         restart_after: steps after which the plant is reset; None: where its episodes
             end. Where a reset is cheap and puts the plant anywhere, short runs tell more.
-        inputs: for continuous actions what each action of the policy sets,
-            `(n_actions, n_inputs)`; None takes five values from end to end of each input.
+        inputs: what each action of the policy sets, `(n_actions,)` or
+            `(n_actions, n_inputs)`. Of continuous actions None takes five values from end
+            to end of each input. Where the environment numbers its actions and does not
+            tell what they set, and you know it, say so: a model then learns from one
+            action what another does.
         goal: see `LearnedVectorEnv`. None takes that of an environment of this package,
             and of others what is learned from terminations.
         tolerance: see there.

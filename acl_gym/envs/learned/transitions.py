@@ -320,6 +320,7 @@ class Transitions:
         policy: Policy = None,
         *,
         hold: int = 1,
+        inputs: Any = None,
         seed: int | None = None,
     ) -> Self:
         """Run an environment and keep what it did.
@@ -335,10 +336,14 @@ class Transitions:
                 them from the action space.
             hold: for how many steps a random action is kept, >= 1. An input that changes
                 in each step hardly moves a sluggish plant.
+            inputs: what each numbered action sets, `(n_actions,)` or
+                `(n_actions, n_inputs)`, where you know it and the environment does not
+                tell. These values are then recorded: a model learns from one action what
+                another does, which from mere numbers it cannot.
             seed: of the environment and of random actions.
         """
         steps = validation.integer("steps", steps, at_least=1)
-        recorder = Recorder(env, policy, hold=hold, seed=seed)
+        recorder = Recorder(env, policy, hold=hold, inputs=inputs, seed=seed)
         while recorder.steps < steps:
             recorder.step()
         facts: dict[str, Any] = {**recorder.arrays(), **recorder.facts}

@@ -16,7 +16,8 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 
 from acl_gym.colony.episodes import Episodes
 from acl_gym.envs import received
-from acl_gym.envs.control.environments import ControlVectorEnv, is_native
+from acl_gym.envs.control.environments import ControlVectorEnv
+from acl_gym.envs.control.native import is_native
 from acl_gym.envs.wrappers.partial_reset import reset_slots
 from acl_gym.envs.wrappers.waiting import WaitingSlots
 from acl_gym.evaluation.rows import fixed, require_array, set_row

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import copy
 import math
-from typing import Any, ClassVar, Self, TypeGuard
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from gymnasium.error import ResetNeeded
@@ -31,6 +31,7 @@ from acl_gym.envs.control.bookkeeping import (
     finish,
     made_system,
     n_actions_of,
+    of_this_package,
     real_input_bounds,
     states_of_slots,
     warn_of_no_render_mode,
@@ -465,7 +466,7 @@ class ControlVectorEnv(VectorEnv[Observation, Any, NDArray[Any]]):
                 f"give float64 states of a fixed size for {count} slots, got "
                 f"{validation.shown(states)}."
             )
-        if not type(self._system).__module__.startswith(_PACKAGE):
+        if not of_this_package(type(self._system)):
             # Kernels of this package address by them.
             self._system.checked_states(states.T)
 
@@ -521,27 +522,3 @@ def _least_bytes_a_slot(space: Any) -> int:
     of_variables = numbers * (3 * space.dtype.itemsize + 2 + 8)
     # Action, its space (two numbers), steps, index and reward; three flags.
     return int(of_variables + 6 * 8 + 3)
-
-
-_PACKAGE = "acl_gym."
-_OF_A_STEP = {
-    name: getattr(ControlVectorEnv, name)
-    for name in ("step", "_step", "_observe", "_infos")
-}
-
-
-def is_native(env: Any) -> TypeGuard[ControlVectorEnv]:
-    """Whether what `env` returns is sure to fit: it and its system are of this package.
-
-    Of a subclass of a user's own, and of methods that were replaced, nothing is sure.
-    """
-    kind = type(env)
-    if not (isinstance(env, ControlVectorEnv) and kind.__module__.startswith(_PACKAGE)):
-        return False
-    system = env.system
-    return (
-        type(system).__module__.startswith(_PACKAGE)
-        and all(getattr(kind, name) is own for name, own in _OF_A_STEP.items())
-        and vars(env).keys().isdisjoint(_OF_A_STEP)
-        and vars(system).keys().isdisjoint(("advance", "observe", "action_mask"))
-    )

@@ -10,12 +10,12 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from acl_gym.envs.control import sampling
 from acl_gym.envs.control.parameters import MOST_SUBSTEPS
 from acl_gym.envs.control.signals import Signals
 from acl_gym.envs.control.system import ControlSystem, SlotError
 from acl_gym.envs.plant import kernels, targets
 from acl_gym.envs.plant.dynamics import Equations, sample_count
+from acl_gym.envs.plant.initial import InitialStates
 from acl_gym.envs.plant.models import Model, is_model
 from acl_gym.envs.plant.uncertain import PlantParameters
 from acl_gym.utils import validation
@@ -114,7 +114,13 @@ class Plant(ControlSystem):
             ),
             tuple(map(tuple, self.inputs.tolist())),
         )
-        self._initial = self._checked_initial(initial)
+        self._initial = InitialStates(
+            initial,
+            (size, size + self.parameters.count) if size > 1 else (size,),
+            self._checked_rows,
+            self._draw,
+            self._goal.reached,
+        )
         self._evaluation_states = (
             self._default_evaluation_states()
             if evaluation_states is None
@@ -187,42 +193,10 @@ class Plant(ControlSystem):
 
         Uncertain parameters are drawn with them, unless `initial` holds these too.
         """
-        states = self._sample(rng, count)
+        states = self._initial.draw(rng, count)
         if len(states) > self.low.size or not self.parameters.count:
             return states
         return np.concatenate([states, self.parameters.draw(rng, count)])
-
-    def _sample(self, rng: np.random.Generator, count: int) -> FloatArray:
-        """Initial states, with parameters only where `initial` holds them."""
-        if callable(self._initial):
-            return np.ascontiguousarray(self._initial_of_function(rng, count).T)
-        if self._initial is not None and not isinstance(self._initial, spaces.Box):
-            rows = self._initial[rng.integers(len(self._initial), size=count)]
-            return np.ascontiguousarray(rows.T)
-        return sampling.sample_outside(
-            lambda n: self._draw_initial(rng, n), self._goal.reached, count
-        )
-
-    def _initial_of_function(self, rng: np.random.Generator, count: int) -> FloatArray:
-        """What the user's function `initial` returns, checked, `(count, ...)`.
-
-        Raises:
-            ValueError: it raises, or does not return so many states.
-        """
-        expected = f"initial(rng, n) must return n states, one a row, shape (n, {self.low.size})"
-        try:
-            given = self._initial(rng, count)
-        except Exception as error:  # whatever the user's code raises
-            raise ValueError(
-                f"{expected}, but it raised {error!r} for n = {count}."
-            ) from error
-        try:
-            rows = self._checked_rows(given)
-        except (ValueError, TypeError) as error:
-            raise ValueError(f"{expected}: for n = {count}, {error}") from error
-        if len(rows) != count:
-            raise ValueError(f"{expected}, got {len(rows)} rows for n = {count}.")
-        return rows
 
     def checked_states(self, states: Any) -> FloatArray:
         """Return states `(n, state_size)`, circular variables brought into X.
@@ -350,41 +324,11 @@ class Plant(ControlSystem):
         span = (self.high - self.low)[:, None]
         return self.low[:, None] + span * rng.random((self.low.size, count))
 
-    def _draw_initial(self, rng: np.random.Generator, count: int) -> FloatArray:
-        if not isinstance(self._initial, spaces.Box):
-            return self._draw(rng, count)
-        low, high = self._initial.low[:, None], self._initial.high[:, None]
-        return low + (high - low) * rng.random((self.low.size, count))
-
-    def _checked_initial(self, initial: Any) -> Any:
-        size = self.low.size
-        if isinstance(initial, spaces.Box):
-            ends = np.stack([initial.low, initial.high]).reshape(2, -1)
-            self._checked_rows(ends, "initial")
-            initial = spaces.Box(
-                initial.low.astype(float), initial.high.astype(float), dtype=np.float64
-            )
-        elif initial is not None and not callable(initial):
-            rows = validation.real_array("initial", initial)
-            whole = (size + self.parameters.count,) if size > 1 else (size,)
-            one = rows.shape in ((size,), whole)
-            return self._checked_rows(rows[None] if one else rows, "initial")
-        self._initial = initial
-        if callable(initial) and not isinstance(initial, spaces.Box):
-            self.sample_states(np.random.default_rng(0), 3)
-            return initial
-        drawn = self._draw_initial(np.random.default_rng(0), 1000)
-        if self._goal.reached(drawn).mean() > 0.99:
-            raise ValueError(
-                "the goal must leave 1% or more of the initial states outside it; "
-                "narrow the goal or the tolerance, or give other initial states."
-            )
-        return initial
-
     def _default_evaluation_states(self) -> FloatArray:
-        if isinstance(self._initial, np.ndarray) and len(self._initial) <= _EVALUATED:
-            return self._with_nominal(self._initial)
-        drawn = self._sample(np.random.default_rng(0), _EVALUATED)
+        few = self._initial.rows
+        if few is not None and len(few) <= _EVALUATED:
+            return self._with_nominal(few)
+        drawn = self._initial.draw(np.random.default_rng(0), _EVALUATED)
         return self._with_nominal(np.ascontiguousarray(drawn.T))
 
 

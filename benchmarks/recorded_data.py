@@ -13,16 +13,24 @@ states how uncertain it is along the way that it predicts: the largest spread of
 The program then tries the policy and compares: the cost that the model promised, what it
 was, from how many states the goal was reached, and the spread where it was and was not.
 
+With few steps, `--remedies` compares what can be done about a model that is not sure:
+nothing, pessimism, or an end of the episode where the spread is too large. All remedies
+learn from the same recordings, in the same model.
+
     python benchmarks/recorded_data.py --seeds 5
     python benchmarks/recorded_data.py --kinds anywhere --transitions 300 --json
+    python benchmarks/recorded_data.py --kinds anywhere lower --transitions 12 20 \\
+        --model-steps 12000 --remedies none pessimism=10 most_spread=0.3
 """
 
 from __future__ import annotations
 
 import argparse
+import itertools
 import json
 import sys
 import time
+import warnings
 from typing import Any
 
 import gymnasium as gym
@@ -30,6 +38,7 @@ import numpy as np
 
 from acl_gym import LearnedVectorEnv, ReturningACL, Transitions, evaluate_policy_cost
 from acl_gym.callbacks import PolicyEvaluation
+from acl_gym.envs.learned import DataWarning
 
 KINDS = ("anywhere", "rest", "lower")
 EVALUATED = gym.make_vec("acl_gym/Pendulum-v0", num_envs=1)
@@ -69,19 +78,21 @@ def spread_on_the_way(policy: Any, model: LearnedVectorEnv, states: Any) -> Any:
     return largest
 
 
-def trial(kind: str, steps: int, seed: int, pessimism: float) -> dict[str, Any]:
+def remedy(text: str) -> dict[str, float]:
+    """Arguments of `LearnedVectorEnv`, of "none" or "name=value"."""
+    name, _, value = text.partition("=")
+    return {} if text == "none" else {name: float(value)}
+
+
+def trial(
+    model: LearnedVectorEnv, kind: str, how: str, seed: int, model_steps: int
+) -> dict[str, Any]:
+    """Let a colony learn in a model, and try its policy on the pendulum."""
     system = EVALUATED.unwrapped.system  # type: ignore[attr-defined]
     began = time.perf_counter()
-    model = LearnedVectorEnv(
-        recorded(kind, steps, seed),
-        50,
-        initial="anywhere",
-        pessimism=pessimism,
-        **system.task,
-    )
     best = PolicyEvaluation(model, every=5)
     ReturningACL(model, walks_back=10, seed=seed).learn(
-        total_timesteps=60_000, callback=best
+        total_timesteps=model_steps, callback=best
     )
     seconds = time.perf_counter() - began
     states = system.evaluation_states()
@@ -92,6 +103,7 @@ def trial(kind: str, steps: int, seed: int, pessimism: float) -> dict[str, Any]:
     well = found.success & (found.costs < 1.25 * np.maximum(promised.costs, 10.0))
     return {
         "kind": kind,
+        "remedy": how,
         "seed": seed,
         "interactions": len(model.transitions),
         "seconds": seconds,
@@ -122,37 +134,72 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--kinds", nargs="+", choices=KINDS, default=list(KINDS))
-    parser.add_argument("--transitions", type=int, default=300, help="recorded steps")
+    parser.add_argument(
+        "--transitions", type=int, nargs="+", default=[300], help="recorded steps"
+    )
     parser.add_argument("--seeds", type=int, default=5, help="runs of each kind")
     parser.add_argument(
-        "--pessimism", type=float, default=0.0, help="see LearnedVectorEnv"
+        "--remedies",
+        nargs="+",
+        default=["none"],
+        metavar="none|NAME=VALUE",
+        help="arguments of LearnedVectorEnv: pessimism=10, most_spread=0.3",
+    )
+    parser.add_argument(
+        "--model-steps", type=int, default=60_000, help="of all ants in a model"
     )
     parser.add_argument("--json", action="store_true", help="print JSON")
     options = parser.parse_args()
+    warnings.simplefilter(
+        "ignore", DataWarning
+    )  # that there are few steps is the point
     rows = []
-    for kind in options.kinds:
+    task = EVALUATED.unwrapped.system.task  # type: ignore[attr-defined]
+    for kind, steps in itertools.product(options.kinds, options.transitions):
         for seed in range(options.seeds):
-            rows.append(trial(kind, options.transitions, seed, options.pessimism))
-            row = rows[-1]
-            print(
-                f"{kind} {seed}: promised {row['model_cost']:.1f}, found "
-                f"{row['policy_cost']:.1f}, success {row['success_rate']:.0%}",
-                file=sys.stderr,
-            )
+            data, dynamics = recorded(kind, steps, seed), None
+            for how in options.remedies:
+                model = LearnedVectorEnv(
+                    data,
+                    50,
+                    initial="anywhere",
+                    dynamics=dynamics,
+                    **remedy(how),
+                    **task,
+                )
+                dynamics = model.dynamics
+                rows.append(trial(model, kind, how, seed, options.model_steps))
+                row = rows[-1]
+                print(
+                    f"{kind} {steps} {how} {seed}: promised {row['model_cost']:.1f}, "
+                    f"found {row['policy_cost']:.1f}, success "
+                    f"{row['success_rate']:.0%}",
+                    file=sys.stderr,
+                )
     if options.json:
         print(json.dumps({"rows": rows}, indent=1))
         return
-    print("kind       promised  found  success  as promised  spread there, elsewhere")
-    for kind in options.kinds:
-        own = [row for row in rows if row["kind"] == kind]
+    print(
+        "kind      steps remedy           promised  found  success  all reach it  "
+        "as promised  spread there, elsewhere"
+    )
+    groups = itertools.product(options.kinds, options.transitions, options.remedies)
+    for kind, steps, how in groups:
+        own = [
+            row
+            for row in rows
+            if (row["kind"], row["interactions"], row["remedy"]) == (kind, steps, how)
+        ]
+        all_reach = sum(row["success_rate"] == 1.0 for row in own)
 
         def middle(name: str, own: list[dict[str, Any]] = own) -> float:
             values = [row[name] for row in own if row[name] is not None]
             return float(np.median(values)) if values else float("nan")
 
         print(
-            f"{kind:10} {middle('model_cost'):8.1f} {middle('policy_cost'):6.1f} "
-            f"{middle('success_rate'):8.0%} {middle('as_promised'):12.0%}  "
+            f"{kind:8} {steps:6} {how:15} {middle('model_cost'):10.1f} "
+            f"{middle('policy_cost'):6.1f} {middle('success_rate'):8.0%} "
+            f"{all_reach:7} of {len(own):2} {middle('as_promised'):12.0%}  "
             f"{middle('spread_where_as_promised'):.3f}, "
             f"{middle('spread_elsewhere'):.3f}"
         )

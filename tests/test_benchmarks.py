@@ -43,6 +43,24 @@ def test_asynchronous() -> None:
     assert walking["synchronous"] < walking["asynchronous"] == 1.0
 
 
+def test_numbered_actions() -> None:
+    rows = output_of("numbered_actions.py", "--steps", "20", "--seeds", "2")["rows"]
+    assert len(rows) == 3
+    many = rows[-1]
+    assert many["plant"] == "Pendulum-v1, 9 torques"
+    assert many["values"] < 0.5 * many["flags"]
+    assert many["values_are_better"] == 2
+
+
+def test_recorded_data() -> None:
+    arguments = ["--kinds", "anywhere", "--transitions", "12", "--seeds", "1"]
+    arguments += ["--model-steps", "1000", "--remedies", "none", "pessimism=10"]
+    plain, careful = output_of("recorded_data.py", *arguments)["rows"]
+    assert plain["interactions"] == careful["interactions"] == 12
+    assert (plain["remedy"], careful["remedy"]) == ("none", "pessimism=10")
+    assert careful["model_cost"] > plain["model_cost"]
+
+
 def test_double_bridge() -> None:
     found = output_of("double_bridge.py", "--colonies", "1000")
     for row in found["equal"]:

@@ -184,10 +184,7 @@ class ACL(PheromoneAgent, ColonyAgent):
             seed=seed,
             n_actions=n_actions,
         )
-        if not isinstance(tabu, bool):
-            raise TypeError(
-                f"tabu must be True or False, got {validation.shown(tabu)}."
-            )
+        tabu = validation.boolean("tabu", tabu)
         if tabu and self.partition.cells_per_state > 1:
             raise ValueError(
                 "tabu needs a partition with one cell per state, such as Crisp or "

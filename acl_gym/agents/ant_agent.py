@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from acl_gym.agents.base import TabularAgent, time_limit
 from acl_gym.agents.pheromone_agent import PheromoneAgent
 from acl_gym.agents.saving import with_prefix
-from acl_gym.colony.ant_rule import AntRule, check_flag
+from acl_gym.colony.ant_rule import AntRule
 from acl_gym.colony.candidates import NONE, candidate_lists, inverse_distances
 from acl_gym.colony.deposits import Deposit, Rank, as_deposit, deposit_from_settings
 from acl_gym.colony.greedy import greedy_actions
@@ -111,9 +111,9 @@ class AntAgent(PheromoneAgent):
         if local_search is not None:
             validation.one_of("local_search", local_search, METHODS)
         if symmetric is not None:
-            check_flag("symmetric", symmetric)
-        check_flag("tabu", tabu)
-        check_flag("walk", walk)
+            symmetric = validation.boolean("symmetric", symmetric)
+        tabu = validation.boolean("tabu", tabu)
+        walk = validation.boolean("walk", walk)
         self.tau0, self.deposit = tau0, as_deposit(deposit)
         if isinstance(self.deposit, Rank):
             raise ValueError(

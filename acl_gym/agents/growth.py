@@ -76,11 +76,7 @@ class Growth:
 
     @on.setter
     def on(self, value: bool) -> None:
-        if not isinstance(value, bool):
-            raise TypeError(
-                f"grows must be True or False, got {validation.shown(value)}."
-            )
-        self._on = value
+        self._on = validation.boolean("grows", value)
 
     def wider(
         self,

@@ -54,11 +54,7 @@ class Training:
             trials = validation.integer("trials", trials, at_least=1)
         if log_interval is not None:
             log_interval = validation.integer("log_interval", log_interval, at_least=1)
-        if not isinstance(progress_bar, bool):
-            raise TypeError(
-                "progress_bar must be True or False, got "
-                f"{validation.shown(progress_bar)}."
-            )
+        progress_bar = validation.boolean("progress_bar", progress_bar)
         if total_timesteps is None and trials is None:
             trials = DEFAULT_TRIALS
         if agent.busy:

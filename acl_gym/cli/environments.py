@@ -17,14 +17,12 @@ from gymnasium import spaces
 from gymnasium.envs.registration import load_env_creator
 
 from acl_gym.cli.errors import BadArgumentError, bad_arguments
+from acl_gym.cli.numbering import counts_of, discretized, gridded
 from acl_gym.envs import ENVIRONMENTS
 from acl_gym.utils.vector_envs import has_independent_slots
 
 if TYPE_CHECKING:
     from gymnasium.vector import VectorEnv
-
-MOST_ACTIONS = 10_000
-"""More actions than any table is good for; `--discretize` may not make as many."""
 
 _OWN_KEYWORDS = (
     "disable_env_checker",
@@ -51,11 +49,14 @@ class Environment:
         arguments: keywords of the environment, plain values.
         bins: into how many actions each dimension of a Box is divided, one number for
             all or one for each; None leaves the actions as they are.
+        end_to_end: whether these reach from one end of the range to the other, as in an
+            `ActionGrid`. Otherwise they are the middles of equal parts.
     """
 
     env_id: str
     arguments: dict[str, Any] = field(default_factory=dict)
     bins: tuple[int, ...] | None = None
+    end_to_end: bool = False
 
     @property
     def name(self) -> str:
@@ -113,7 +114,31 @@ class Environment:
                 f"--interpolate is for agents that were trained with --discretize, but "
                 f"{self.name} was not; leave it out, or train with --discretize 5."
             )
-        return replace(self, bins=None)
+        return self._plain()
+
+    def has_real_inputs(self) -> bool:
+        """Whether its own actions are a Box."""
+        space = self._plain().vector(1, real_inputs=True).single_action_space
+        return isinstance(space, spaces.Box)
+
+    def from_end_to_end(self, values: int) -> Environment:
+        """The same with so many values of each real input, both ends included."""
+        return replace(self, bins=(values,), end_to_end=True)
+
+    def _plain(self) -> Environment:
+        """The same with its own actions."""
+        return replace(self, bins=None, end_to_end=False)
+
+    @property
+    def facts(self) -> dict[str, Any]:
+        """What a file says of it, JSON types; see `from_metadata`."""
+        bins = None if self.bins is None else list(self.bins)
+        found = {
+            "env_id": self.env_id,
+            "env_args": self.arguments,
+            "discretize": bins,
+        }
+        return {**found, "end_to_end": True} if self.end_to_end else found
 
     def vector(self, slots: int, real_inputs: bool = False) -> VectorEnv[Any, Any, Any]:
         """Make it with some slots; one of this package natively.
@@ -129,15 +154,18 @@ class Environment:
             BadArgumentError: it cannot be made with these arguments, or its actions are
                 not those of `bins`.
         """
+        from acl_gym.envs.wrappers.action_grid import ActionGrid
         from acl_gym.envs.wrappers.waiting import WaitingVectorEnv
 
         self.check_id()
         self._check_arguments()
+        env: VectorEnv[Any, Any, Any]
         with bad_arguments():
-            if self.bins is None and has_independent_slots(self.name):
-                env: VectorEnv[Any, Any, Any] = gym.make_vec(
-                    self.name, num_envs=slots, **self.arguments
-                )
+            if self.end_to_end and self.bins is not None:
+                plain = self._plain().vector(slots, real_inputs=True)
+                env = ActionGrid(plain, counts_of(self.bins))
+            elif self.bins is None and has_independent_slots(self.name):
+                env = gym.make_vec(self.name, num_envs=slots, **self.arguments)
             else:
                 env = WaitingVectorEnv([self.single] * slots)
             if not (real_inputs and isinstance(env.single_action_space, spaces.Box)):
@@ -150,7 +178,11 @@ class Environment:
         if render_mode is not None:
             keywords["render_mode"] = render_mode
         env = gym.make(self.name, **keywords)
-        return env if self.bins is None else _discretized(self.name, env, self.bins)
+        if self.bins is None:
+            return env
+        if self.end_to_end:
+            return gridded(env, self.bins)
+        return discretized(self.name, env, self.bins)
 
     def _check_arguments(self) -> None:
         for name in self.arguments:
@@ -211,50 +243,6 @@ class Environment:
             )
 
 
-def parse_bins(text: str | None) -> tuple[int, ...] | None:
-    """Parse `--discretize`: 5, or 5,3.
-
-    Raises:
-        BadArgumentError: it is neither a number >= 2 nor a list of those.
-    """
-    if text is None:
-        return None
-    parts = [part.strip() for part in text.split(",")]
-    if not all(part.isdecimal() and 2 <= int(part) <= MOST_ACTIONS for part in parts):
-        raise BadArgumentError(
-            "--discretize must be a number of values >= 2 such as 5, or one for each "
-            f"dimension such as 5,3, got {text!r}."
-        )
-    return tuple(map(int, parts))
-
-
-def _discretized(
-    name: str, env: gym.Env[Any, Any], bins: tuple[int, ...]
-) -> gym.Env[Any, Any]:
-    from gymnasium.wrappers import DiscretizeAction
-
-    space = env.action_space
-    if not isinstance(space, spaces.Box):
-        raise BadArgumentError(
-            f"--discretize is for continuous actions, but {name} has {space}; leave it "
-            "out."
-        )
-    count = math.prod(space.shape)
-    if len(bins) not in (1, count):
-        raise BadArgumentError(
-            f"--discretize must have one number, or one for each of the {count} "
-            f"dimensions of {space}, got {','.join(map(str, bins))}."
-        )
-    each = bins * count if len(bins) == 1 else bins
-    if math.prod(each) > MOST_ACTIONS:
-        raise BadArgumentError(
-            f"--discretize must make at most {MOST_ACTIONS:,} actions, got "
-            f"{math.prod(each):,} of {count} dimensions; take fewer values, or one "
-            "number for each dimension such as 5,3."
-        )
-    return DiscretizeAction(env, bins=each)
-
-
 def default_steps(env: VectorEnv[Any, Any, Any]) -> int:
     """T: the limit of the environment, or 300 if it has none."""
     from acl_gym.agents.base import DEFAULT_MAX_STEPS, time_limit
@@ -284,6 +272,7 @@ def from_metadata(file: str, metadata: dict[str, Any]) -> Environment | None:
         return None
     arguments = metadata.get("env_args", {})
     bins = metadata.get("discretize")
+    end_to_end = metadata.get("end_to_end", False)
     sound = (
         isinstance(env_id, str)
         and isinstance(arguments, dict)
@@ -292,13 +281,16 @@ def from_metadata(file: str, metadata: dict[str, Any]) -> Environment | None:
             bins is None
             or (isinstance(bins, list) and all(type(each) is int for each in bins))
         )
+        and type(end_to_end) is bool
     )
     if not sound:
         raise BadArgumentError(
             f"the metadata of {file} must hold env_id, env_args and discretize as "
             f"acl-gym train writes them, got {repr(metadata)[:200]}."
         )
-    return Environment(env_id, arguments, None if bins is None else tuple(bins))
+    return Environment(
+        env_id, arguments, None if bins is None else tuple(bins), end_to_end
+    )
 
 
 def check_named_by_file(file: str, found: Environment, option: str) -> None:

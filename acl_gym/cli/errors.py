@@ -148,6 +148,14 @@ def _explain(name: str, error: Exception) -> int:
 
 
 def in_words(error: BaseException) -> str:
+    """The message of an error and its notes, in one line."""
+    words, notes = _message(error), getattr(error, "__notes__", [])
+    if notes and not words.endswith((".", "!", "?")):
+        words += "."
+    return " ".join([words, *notes])
+
+
+def _message(error: BaseException) -> str:
     """The message of an error; with the name of its class where that says more."""
     message = str(error)
     if isinstance(error, MemoryError):

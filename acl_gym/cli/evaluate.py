@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -159,7 +160,7 @@ def evaluate(
         showing.play(policy, walked, shown, settings["max_steps"], seed, video)
     settings = {"file": file, **settings}
     if interpolate:
-        settings["discretize"] = list(environment.bins or ())
+        settings |= environment.facts
         settings["interpolated"] = True
     if video is not None:
         settings["video"] = str(video)
@@ -184,7 +185,7 @@ def _chosen(
     discretize: str | None,
 ) -> tuple[Environment, dict[str, Any]]:
     """The environment, and how it was evaluated as far as that holds for it."""
-    from acl_gym.cli.environments import parse_bins
+    from acl_gym.cli.numbering import parse_bins
 
     found = from_metadata(file, metadata)
     how = _recorded(file, metadata) if found is not None else {}
@@ -199,8 +200,11 @@ def _chosen(
     if typed is not None:
         typed.import_module()
     check_named_by_file(file, Environment(found.env_id, kept, found.bins), "--env-id")
-    bins = parse_bins(discretize) or found.bins
-    return Environment(found.env_id, {**kept, **arguments}, bins), how
+    chosen = replace(found, arguments={**kept, **arguments})
+    bins = parse_bins(discretize)
+    if bins is not None:
+        chosen = replace(chosen, bins=bins, end_to_end=False)
+    return chosen, how
 
 
 def _recorded(file: str, metadata: dict[str, Any]) -> dict[str, Any]:
@@ -277,9 +281,7 @@ def evaluate_agent(
         cost=getattr(agent, "cost", None),  # as in training
     )
     return result, {
-        "env_id": environment.env_id,
-        "env_args": environment.arguments,
-        "discretize": None if environment.bins is None else list(environment.bins),
+        **environment.facts,
         "episodes": count,
         "max_steps": max_steps,
         "seed": seed,

@@ -34,6 +34,7 @@ from acl_gym.envs.learned import Transitions
 from acl_gym.envs.learned.description import described_by
 from acl_gym.evaluation import policy_measures
 from acl_gym.model_based import PlantLearning, learn_from_plant
+from acl_gym.model_based.arguments import VALUES, task_of
 from acl_gym.model_based.journal import AGENT, BEST
 from acl_gym.model_based.learning_run import default_agent
 from acl_gym.utils import files
@@ -79,6 +80,8 @@ def run(
             f"--agent {kind} looks for one solution through cells, and cannot learn in a "
             "model of measurements; take returning, acl or q-learning."
         )
+    if environment.bins is None and environment.has_real_inputs():
+        environment = environment.from_end_to_end(VALUES)
     numbered = environment.vector(1)  # fails now for actions that cannot be numbered
     steps = max_steps or default_steps(numbered)
     best_file = checked_file(target.with_name(f"{target.stem}-best.npz"))
@@ -204,7 +207,7 @@ def _plant(environment: Environment) -> tuple[Any, FloatArray | None]:
             return environment.single(), None
         numbered: Any = environment.single()
         values = [numbered.action(n) for n in range(int(numbered.action_space.n))]
-        plain = Environment(environment.env_id, environment.arguments).single()
+        plain = environment.with_real_inputs().single()
     return plain, np.asarray(values, np.float64).reshape(len(values), -1)
 
 
@@ -240,6 +243,12 @@ def _data(
             raise BadArgumentError(
                 f"{file} must have a sampling time of {known:g} s, as the environment "
                 f"has, got {time:g} s."
+            )
+        if found.rewards is None and "cost" not in task_of(plant, {}):
+            remedy = "record rewards too" if kind is None else "add --reward COLUMN"
+            raise BadArgumentError(
+                f"{file} must hold rewards, from which the cost is learned, since the "
+                f"environment does not tell its own; {remedy}."
             )
         if inputs is not None:
             facts["values"] = inputs
@@ -287,9 +296,9 @@ def _evaluated(
     agent: Any, environment: Environment, steps: int
 ) -> tuple[Any, dict[str, Any]]:
     """What a policy costs in the environment, and what the file says about that."""
-    cost, how = evaluate_agent(agent, agent, environment, None, None, steps, 0)
+    cost, _ = evaluate_agent(agent, agent, environment, None, None, steps, 0)
     return cost, {
-        **{name: how[name] for name in ("env_id", "env_args", "discretize")},
+        **environment.facts,
         "ants": FEW_ANTS,
         "evaluation": {
             "episodes": None if environment.is_own else FOREIGN_EPISODES,

@@ -148,9 +148,7 @@ def begin(
     every = evaluate_every or (EVALUATE_EVERY if own else FOREIGN_EVALUATE_EVERY)
     evaluation = _evaluation(environment, env, every, steps)
     learner.metadata = {
-        "env_id": environment.env_id,
-        "env_args": environment.arguments,
-        "discretize": None if environment.bins is None else list(environment.bins),
+        **environment.facts,
         "ants": ants,
         "evaluation": {
             "episodes": None if evaluation.env is env else evaluation.env.num_envs,
@@ -201,9 +199,7 @@ def go_on(
         left = _count(known.get("planned_trials"), 0) - learner.trials
         trials = left if left > 0 else TRIALS
     learner.metadata = {
-        "env_id": environment.env_id,
-        "env_args": environment.arguments,
-        "discretize": None if environment.bins is None else list(environment.bins),
+        **environment.facts,
         **known,
         "ants": ants,
         "evaluation": {

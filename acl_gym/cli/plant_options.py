@@ -22,6 +22,8 @@ class PlantOptions(NamedTuple):
         input: the same.
         time: a column.
         run: a column whose value changes from one run to the next.
+        reward: a column of what the step gave that begins in a row.
+        terminated: a column that says whether an episode ended with that step.
     """
 
     interactions: int | None
@@ -31,6 +33,8 @@ class PlantOptions(NamedTuple):
     input: str | None
     time: str | None
     run: str | None
+    reward: str | None
+    terminated: str | None
 
     @property
     def wanted(self) -> bool:
@@ -44,7 +48,8 @@ class PlantOptions(NamedTuple):
             "state": _names("--state", self.state),
             "input": _names("--input", self.input),
         }
-        for name, column in (("time", self.time), ("run", self.run)):
+        for name in ("time", "run", "reward", "terminated"):
+            column = getattr(self, name)
             if column is not None:
                 named[name] = column
         return named
@@ -91,6 +96,8 @@ class PlantOptions(NamedTuple):
             "--input": self.input,
             "--time": self.time,
             "--run": self.run,
+            "--reward": self.reward,
+            "--terminated": self.terminated,
         }
         typed = [option for option, names in columns.items() if names is not None]
         if self.kind_of_table is None:
@@ -107,6 +114,12 @@ class PlantOptions(NamedTuple):
                     f"--from-data {self.from_data} needs {option} with the names of "
                     "columns, such as --state theta,omega --input u."
                 )
+        if self.terminated is not None and self.run is None:
+            raise BadArgumentError(
+                "--terminated needs --run with the column that changes from one run to "
+                "the next: without it the row after an end may be its last state or the "
+                "first of the next run."
+            )
 
 
 def _names(option: str, text: str | None) -> list[str]:

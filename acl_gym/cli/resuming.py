@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from acl_gym.cli.agents import load_agent, name_of, parameters
 from acl_gym.cli.environments import (
     Environment,
     check_named_by_file,
@@ -12,8 +13,64 @@ from acl_gym.cli.environments import (
 )
 from acl_gym.cli.errors import BadArgumentError, report
 
+if TYPE_CHECKING:
+    from acl_gym.cli.learning import Plan
 
-def without_deposit(param: list[str], known: str) -> list[str]:
+
+def resumed_plan(
+    file: Path,
+    typed: Environment | None,
+    arguments: dict[str, Any],
+    bins: tuple[int, ...] | None,
+    *,
+    agent: str | None,
+    param: list[str],
+    unchanged: dict[str, int | None],
+    ants: int | None,
+    evaluate_every: int | None,
+    trials: int | None,
+) -> Plan:
+    """An agent of a file that goes on learning.
+
+    Args:
+        file: the file.
+        typed: the environment that the user named; None where that was left out.
+        arguments: of the environment, as typed.
+        bins: of `--discretize`, as typed.
+        agent: of `--agent`, as typed.
+        param: of `--param`, as typed.
+        unchanged: options that cannot be changed, with the values typed.
+        ants: see `learning.go_on`.
+        evaluate_every: see there.
+        trials: see there.
+
+    Raises:
+        BadArgumentError: there is no such file, or an option does not suit it.
+    """
+    from acl_gym.cli import learning
+    from acl_gym.cli.settings import parse_parameters
+
+    learner = load_agent(str(file))
+    environment = _environment(file, learner, typed, arguments, bins)
+    known = name_of(learner)
+    if agent not in (None, known):
+        raise BadArgumentError(
+            f"--agent must be {known}, as in {file}, got {agent!r}; leave it out."
+        )
+    if agent is None and "deposit" not in parameters(known):
+        param = _without_deposit(param, known)
+    changes = parse_parameters("--param", param, parameters(known))
+    now = {"--seed": learner.seed, "--max-steps": learner.max_steps}
+    for option, value in unchanged.items():
+        if value not in (None, now[option]):
+            raise BadArgumentError(
+                f"{option} must be {now[option]}, as in {file}, got {value}; leave it "
+                "out."
+            )
+    return learning.go_on(environment, learner, changes, ants, evaluate_every, trials)
+
+
+def _without_deposit(param: list[str], known: str) -> list[str]:
     """Leave out a deposit, with a word, where an agent goes on that needs none.
 
     It says how ants turn costs into pheromone, and lets them learn from rewards of any
@@ -29,7 +86,7 @@ def without_deposit(param: list[str], known: str) -> list[str]:
     return kept
 
 
-def resumed_environment(
+def _environment(
     file: Path,
     learner: Any,
     typed: Environment | None,
@@ -55,10 +112,11 @@ def resumed_environment(
         same = len(set(bins) | set(found.bins)) == 1
     else:
         same = bins in (None, found.bins)
-    if not same:
+    if bins is not None and (found.end_to_end or not same):
+        known = () if found.end_to_end else found.bins or ()
         raise BadArgumentError(
-            f"--discretize must be {','.join(map(str, found.bins or ())) or 'left out'}, "
-            f"as in {file}, got {','.join(map(str, bins or ()))}."
+            f"--discretize must be {','.join(map(str, known)) or 'left out'}, as in "
+            f"{file}, got {','.join(map(str, bins))}."
         )
     for name, value in arguments.items():
         if found.arguments.get(name, value) != value or name not in found.arguments:

@@ -7,12 +7,13 @@ from typing import Annotated, Literal
 
 import typer
 
-from acl_gym.cli.agents import AGENTS, load_agent, name_of, parameters
+from acl_gym.cli.agents import AGENTS, parameters
 from acl_gym.cli.common import DebugOption, JsonOption, check_name
-from acl_gym.cli.environments import Environment, parse_bins
+from acl_gym.cli.environments import Environment
 from acl_gym.cli.errors import BadArgumentError, bad_arguments, report
+from acl_gym.cli.numbering import parse_bins
 from acl_gym.cli.plant_options import PlantOptions
-from acl_gym.cli.resuming import resumed_environment, without_deposit
+from acl_gym.cli.resuming import resumed_plan
 from acl_gym.cli.targets import checked_file, free_name, name_after
 
 
@@ -82,7 +83,8 @@ def train(
             help="For continuous actions: the number of values of each dimension, one "
             "for all or one for each. They lie in the middle of equal parts of the range "
             "(gymnasium.wrappers.DiscretizeAction). acl-gym evaluate --interpolate then "
-            "sets inputs between them.",
+            "sets inputs between them.  [default: with --interactions or --from-data "
+            "five from end to end]",
             show_default=False,
         ),
     ] = None,
@@ -239,6 +241,24 @@ def train(
             show_default=False,
         ),
     ] = None,
+    reward: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME",
+            help="Column of what the step gave that begins in a row. The cost is learned "
+            "from it where the environment does not tell its own.",
+            show_default=False,
+        ),
+    ] = None,
+    terminated: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME",
+            help="Column of 0 and 1: whether an episode ended with that step. The goal is "
+            "learned from it where the environment does not tell its own; needs --run.",
+            show_default=False,
+        ),
+    ] = None,
     log: Annotated[
         Path | None,
         typer.Option(
@@ -271,7 +291,17 @@ def train(
     typed = None if env_id is None else Environment(env_id, arguments, bins)
     if typed is not None:
         typed.check_id()
-    few = PlantOptions(interactions, restart_after, from_data, state, input_, time, run)
+    few = PlantOptions(
+        interactions,
+        restart_after,
+        from_data,
+        state,
+        input_,
+        time,
+        run,
+        reward,
+        terminated,
+    )
     if few.wanted:
         few.refuse_options(
             {
@@ -340,30 +370,20 @@ def train(
                 "--cells and --partition cannot be changed with --resume: the file "
                 "holds a table over its cells; leave them out."
             )
-        learner = load_agent(str(resume))
-        environment = resumed_environment(resume, learner, typed, arguments, bins)
-        known = name_of(learner)
-        if agent not in (None, known):
-            raise BadArgumentError(
-                f"--agent must be {known}, as in {resume}, got {agent!r}; leave it out."
-            )
-        wanted = list(param or ())
-        if agent is None and "deposit" not in parameters(known):
-            wanted = without_deposit(wanted, known)
-        changes = parse_parameters("--param", wanted, parameters(known))
-        for option, value, now in (
-            ("--seed", seed, learner.seed),
-            ("--max-steps", max_steps, learner.max_steps),
-        ):
-            if value not in (None, now):
-                raise BadArgumentError(
-                    f"{option} must be {now}, as in {resume}, got {value}; leave it out."
-                )
-        target = checked_file(
-            name_after(resume, environment.name) if out is None else out
+        plan = resumed_plan(
+            resume,
+            typed,
+            arguments,
+            bins,
+            agent=agent,
+            param=list(param or ()),
+            unchanged={"--seed": seed, "--max-steps": max_steps},
+            ants=ants,
+            evaluate_every=evaluate_every,
+            trials=trials,
         )
-        plan = learning.go_on(
-            environment, learner, changes, ants, evaluate_every, trials
+        target = checked_file(
+            name_after(resume, plan.environment.name) if out is None else out
         )
     best = (
         checked_file(target.with_name(f"{target.stem}-best.npz")) if keep_best else None

@@ -37,6 +37,8 @@ Examples:
   acl-gym train acl_gym/Pendulum-v0 --interactions 200 --restart-after 10
   acl-gym train acl_gym/Pendulum-v0 --from-data recorded.npz
   acl-gym train acl_gym/Pendulum-v0 --from-data log.csv --state a,b --input u
+  acl-gym train Pendulum-v1 --from-data log.csv --state cos,sin,omega \\
+      --input u --reward r
   acl-gym train --resume Pendulum-v0.npz --trials 50            50 more trials
   acl-gym train acl_gym/Pendulum-v0 --agent acl --ants 2000 --seed 3
   acl-gym train acl_gym/GridSearch2D-v0 --param epsilon=0.2

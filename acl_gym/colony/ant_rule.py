@@ -275,13 +275,3 @@ class AntRule(UpdateRule):
         """Take over what `memory` gave."""
         self._best = BestSolution.of_arrays("best_", memory)
         self._restored.append(self._best)
-
-
-def check_flag(name: str, value: Any) -> None:
-    """Refuse a flag that is not True or False.
-
-    Raises:
-        TypeError: it is something else.
-    """
-    if not isinstance(value, bool):
-        raise TypeError(f"{name} must be True or False, got {validation.shown(value)}.")

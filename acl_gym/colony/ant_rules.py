@@ -24,7 +24,7 @@ from acl_gym.colony.ant_kernels import (
     limit,
     mix_in,
 )
-from acl_gym.colony.ant_rule import UPDATE_SETS, AntRule, check_flag
+from acl_gym.colony.ant_rule import UPDATE_SETS, AntRule
 from acl_gym.colony.best_solution import BestSolution
 from acl_gym.colony.pheromone import Pheromone
 from acl_gym.colony.tours import build_tours_in_turn
@@ -58,7 +58,7 @@ class AntSystemUpdate(AntRule):
         validation.one_of("update_set", self.update_set, UPDATE_SETS)
         self.elitists = validation.number("elitists", self.elitists, at_least=0)
         self.ranks = validation.integer("ranks", self.ranks, at_least=0)
-        check_flag("symmetric", self.symmetric)
+        self.symmetric = validation.boolean("symmetric", self.symmetric)
         others = {}
         if self.elitists:
             others["elitists"] = f"elitists={self.elitists:g}"
@@ -128,7 +128,7 @@ class AntColonySystemUpdate(AntRule):
     def __post_init__(self) -> None:
         self.q0 = validation.number("q0", self.q0, at_least=0, at_most=1)
         validation.one_of("update_set", self.update_set, UPDATE_SETS[1:])
-        check_flag("symmetric", self.symmetric)
+        self.symmetric = validation.boolean("symmetric", self.symmetric)
 
     @property
     def exploitation(self) -> float:
@@ -241,7 +241,7 @@ class MaxMinUpdate(AntRule):
             "smoothing", self.smoothing, at_least=0, at_most=1
         )
         self.patience = validation.integer("patience", self.patience, at_least=0)
-        check_flag("symmetric", self.symmetric)
+        self.symmetric = validation.boolean("symmetric", self.symmetric)
         self.forget()
 
     @property

@@ -17,7 +17,7 @@ from acl_gym.envs.control.environments import ControlVectorEnv
 from acl_gym.envs.plant import Plant
 from acl_gym.partitions import Grid
 from acl_gym.plotting import palettes, plot_policy, style
-from acl_gym.plotting.subject import Subject, subject_of
+from acl_gym.plotting.subject import Subject, subject_of, with_unit
 from acl_gym.policies import TablePolicy
 from acl_gym.utils.text import digits
 from acl_gym.utils.typing import FloatArray
@@ -259,9 +259,3 @@ def _steps_shown(responses: Sequence[Responses]) -> int:
     last = max(int(response.steps_to_goal()[0]) for response in responses)
     whole = len(responses[0].actions)
     return max(2, min(whole, int(1.3 * last) + 5))
-
-
-def with_unit(name: str) -> str:
-    """The unit of a name in brackets: "speed (m/s)"."""
-    word, *rest = name.split(", ")
-    return f"{word} ({rest[0]})" if rest else word

@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.figure import Figure
 
-from acl_gym.design.pictures import levels_shown, mark_goal, most_divided, with_unit
+from acl_gym.design.pictures import levels_shown, mark_goal, most_divided
 from acl_gym.design.recordings import spread_over
 from acl_gym.envs.learned.env import LearnedVectorEnv
 from acl_gym.plotting import palettes, style
+from acl_gym.plotting.subject import with_unit
 from acl_gym.policies import TablePolicy
 
 

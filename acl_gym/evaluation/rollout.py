@@ -16,7 +16,8 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 
 from acl_gym.colony.episodes import Episodes
 from acl_gym.envs import received
-from acl_gym.envs.control.environments import ControlVectorEnv, is_native
+from acl_gym.envs.control.environments import ControlVectorEnv
+from acl_gym.envs.control.native import is_native
 from acl_gym.envs.wrappers.partial_reset import reset_slots
 from acl_gym.envs.wrappers.waiting import WaitingSlots
 from acl_gym.evaluation.rows import fixed, require_array, set_row
@@ -96,6 +97,7 @@ class Rollout:
         self._ants = self._all
         self._shown_of: IntArray | None = None  # what `_shown_ants` shows
         self._reported_success: BoolArray | None = None
+        self._success_is_told = True  # else an end in a terminal state is one
         self._stepping = False
         # The environment, in trials in which what it returns need not be checked.
         self._native: ControlVectorEnv | None = None
@@ -146,6 +148,10 @@ class Rollout:
         self._native = self.env if is_native(self.env) else None
         seed, n = validation.seed(seed), self.num_envs
         options: dict[str, Any] = {}
+        base = self.env.unwrapped
+        self._success_is_told = not (
+            isinstance(base, ControlVectorEnv) and not base.system.may_fail
+        )
         if self._asks_to_wait:
             options |= {"finished": "wait", "max_steps": self.max_steps}
         if states is not None:
@@ -159,7 +165,8 @@ class Rollout:
         self.cost = np.zeros(n)
         self.length = np.zeros(n, dtype=np.int64)
         self.terminated = np.zeros(n, dtype=np.bool_)
-        self._reported_success = None
+        # In an environment of this package nobody has succeeded who has not said so.
+        self._reported_success = np.zeros(n, np.bool_) if self._asks_to_wait else None
         # Those that kernels change.
         self._totals = self.cost, self.length, self.terminated
         self.steps = 0
@@ -280,7 +287,7 @@ class Rollout:
         )
         if bad >= 0:
             raise received.not_finite(reward, bad)
-        if not self._asks_to_wait:
+        if self._success_is_told:
             self._note_success(infos, ants)
         if self._mode is AutoresetMode.DISABLED and not self._waits:
             # Idle slots that finish another episode are reset with the others.
@@ -376,7 +383,7 @@ class Rollout:
         `infos["is_success"]` said last; None if it was never there, as then nothing is
         known of success.
         """
-        return self.terminated if self._asks_to_wait else self._reported_success
+        return self._reported_success if self._success_is_told else self.terminated
 
     def release(self) -> None:
         """Leave the environment as after a reset.

@@ -10,7 +10,8 @@ from gymnasium import spaces
 from gymnasium.vector import VectorEnv
 
 from acl_gym.envs.control.lookup import system_of
-from acl_gym.envs.learned.description import rows_of_inputs
+from acl_gym.envs.learned.description import described_by, rows_of_inputs
+from acl_gym.envs.wrappers.action_grid import grid_over
 from acl_gym.utils import validation
 from acl_gym.utils.boxes import declared_bounds
 from acl_gym.utils.typing import FloatArray
@@ -91,16 +92,25 @@ def usual_model_steps(n_variables: int) -> int:
     return min(MODEL_STEPS * more, MOST_MODEL_STEPS)
 
 
-def grid_of_inputs(env: Any, inputs: Any) -> FloatArray | None:
-    """What each action sets where actions are continuous; None where they are not."""
-    space = env.single_action_space if isinstance(env, VectorEnv) else env.action_space
+def action_space_of(env: Any) -> Any:
+    """Of one slot."""
+    return env.single_action_space if isinstance(env, VectorEnv) else env.action_space
+
+
+def inputs_of_actions(env: Any, inputs: Any) -> FloatArray | None:
+    """What each action of the policy sets, `(n_actions, n_inputs)`.
+
+    Args:
+        env: the plant.
+        inputs: those given; None takes a grid over continuous actions.
+
+    Returns:
+        None where actions are numbered and nobody has said what they set.
+    """
+    space = action_space_of(env)
     if isinstance(space, spaces.Discrete):
-        if inputs is not None:
-            raise ValueError(
-                "inputs belong to continuous actions, got them for "
-                f"{validation.shown(space)}; leave them out."
-            )
-        return None
+        known = None if inputs is None else described_by(env, inputs)["values"]
+        return None if known is None else np.asarray(known)
     if not isinstance(space, spaces.Box) or len(space.shape) != 1:
         raise TypeError(
             "a plant needs Discrete actions or a Box of one axis, got "
@@ -113,9 +123,8 @@ def grid_of_inputs(env: Any, inputs: Any) -> FloatArray | None:
                 "inputs must be given where the Box of actions has no finite bounds, got "
                 f"{validation.shown(space)}."
             )
-        lines = [np.linspace(*ends, VALUES) for ends in zip(low, high, strict=True)]
-        grid = np.meshgrid(*lines, indexing="ij")
-        return np.stack(grid, axis=-1).reshape(-1, len(lines))
+        _, values = grid_over(space, VALUES)
+        return values.astype(np.float64)
     array = rows_of_inputs(inputs, space.shape[0])
     if ((array < space.low) | (array > space.high)).any():
         raise ValueError(

@@ -14,10 +14,12 @@ from pathlib import Path
 from typing import IO, Any
 
 import numpy as np
+from gymnasium import spaces
 from numpy.typing import NDArray
 
 from acl_gym.envs.learned import Transitions
 from acl_gym.envs.learned.description import described_by
+from acl_gym.model_based.arguments import action_space_of
 from acl_gym.utils import validation
 from acl_gym.utils.files import write_atomically
 
@@ -34,7 +36,8 @@ class Journal:
         folder: made if it does not exist.
         settings: of the run, JSON types; a folder that is there must have the same.
         env: the plant, which tells what its numbers are.
-        values: the inputs of each action where these are continuous.
+        values: the inputs of each action where these are continuous, or where somebody
+            has said what numbered ones set.
 
     Attributes:
         transitions: what the file held; None if it is new.
@@ -57,7 +60,8 @@ class Journal:
                 f"folder must be a folder or a new name, got the file {self.folder}."
             )
         self.folder.mkdir(parents=True, exist_ok=True)
-        facts = described_by(env)
+        numbered = isinstance(action_space_of(env), spaces.Discrete)
+        facts = described_by(env, values if numbered else None)
         self._size, self._n_inputs = facts.pop("size"), facts.pop("n_inputs")
         self._facts = facts if values is None else {**facts, "values": values}
         settings = {**settings, "plant": _plain(facts)}

@@ -26,7 +26,7 @@ from acl_gym.envs.learned.system import LearnedSystem
 from acl_gym.model_based.arguments import (
     check_plant,
     episode_steps,
-    grid_of_inputs,
+    inputs_of_actions,
     round_ends,
     task_of,
     usual_model_steps,
@@ -117,7 +117,7 @@ class LearningRun:
             )
         self._arguments = dict(model or {})
         self._steps = episode_steps(env, max_episode_steps)
-        values = grid_of_inputs(env, inputs)
+        values = inputs_of_actions(env, inputs)
         self._journal: Journal | None = None
         self._before: Transitions | None = None
         if folder is not None:
@@ -175,11 +175,25 @@ class LearningRun:
                 f"{validation.shown(callback)}."
             )
         progress(self._made_before)
-        if asynchronous:
-            self._side_by_side(callback, progress)
-        else:
-            self._in_turn(callback, progress)
+        try:
+            if asynchronous:
+                self._side_by_side(callback, progress)
+            else:
+                self._in_turn(callback, progress)
+        except Exception as error:
+            self._tell_what_is_kept(error)
+            raise
         return self._result()
+
+    def _tell_what_is_kept(self, error: Exception) -> None:
+        """Add to an error, of the plant perhaps, that no interaction is lost."""
+        made = self._interactions
+        if self._journal is not None and made:
+            kept = "The interaction" if made == 1 else f"All {made:,} interactions"
+            error.add_note(
+                f"{kept} made so far {'is' if made == 1 else 'are'} kept in "
+                f"{self._journal.folder}; run the same again, and it goes on from there."
+            )
 
     def _in_turn(self, callback: Callback, progress: Callable[[int], Any]) -> None:
         """Plant and colony take turns."""

@@ -11,6 +11,7 @@ from tqdm import tqdm
 from acl_gym.envs.learned import Transitions
 from acl_gym.model_based.learning_run import LearningRun
 from acl_gym.model_based.result import PlantLearning
+from acl_gym.utils import validation
 from acl_gym.utils.typing import Row
 
 
@@ -69,8 +70,11 @@ def learn_from_plant(
         hold: for how many steps a random action is held, >= 1.
         restart_after: steps after which the plant is reset; None: where its episodes
             end. Where a reset is cheap and puts the plant anywhere, short runs tell more.
-        inputs: for continuous actions what each action of the policy sets,
-            `(n_actions, n_inputs)`; None takes five values from end to end of each input.
+        inputs: what each action of the policy sets, `(n_actions,)` or
+            `(n_actions, n_inputs)`. Of continuous actions None takes five values from end
+            to end of each input. Where the environment numbers its actions and does not
+            tell what they set, and you know it, say so: a model then learns from one
+            action what another does.
         goal: see `LearnedVectorEnv`. None takes that of an environment of this package,
             and of others what is learned from terminations.
         tolerance: see there.
@@ -88,7 +92,8 @@ def learn_from_plant(
             the first interaction.
         folder: where every interaction is written down as soon as it was made, and the
             agent after each round. A call with the same arguments goes on with a run
-            that was killed: no interaction is lost, and none is made twice.
+            that was killed, or in which the plant has raised an error: no interaction is
+            lost, and none is made twice.
         asynchronous: let the plant run in a thread of its own, at its own pace, with
             whatever policy is the best at the moment, while the colony learns from what
             was recorded so far and waits for nothing. For a plant whose steps take time;
@@ -105,6 +110,8 @@ def learn_from_plant(
         TypeError: the environment, the agent or an argument is of the wrong kind.
         ValueError: an argument is out of range, or the folder holds another run.
     """
+    asynchronous = validation.boolean("asynchronous", asynchronous)
+    progress_bar = validation.boolean("progress_bar", progress_bar)
     run = LearningRun(
         env,
         agent,

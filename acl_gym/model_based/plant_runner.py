@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 from gymnasium import spaces
-from gymnasium.vector import VectorEnv
 from numpy.typing import NDArray
 
 from acl_gym.envs.learned import Transitions
 from acl_gym.envs.learned.recorder import Recorder
+from acl_gym.model_based.arguments import action_space_of
 from acl_gym.model_based.journal import Journal
 from acl_gym.utils.typing import BoolArray, FloatArray, IntArray, Predictor
 
@@ -23,8 +23,8 @@ class PlantRunner:
 
     Args:
         env: a single or a vector environment.
-        inputs: what each action of the policy sets, for continuous actions,
-            `(n_actions, n_inputs)`; None where the environment numbers them itself.
+        inputs: what each action of the policy sets, `(n_actions, n_inputs)`; None where
+            actions are numbered and nobody has said what they set.
         explore: the share of steps with random actions, in [0, 1].
         hold: for how many steps one is held.
         restart_after: steps after which the plant is reset; None: where episodes end.
@@ -45,17 +45,17 @@ class PlantRunner:
         restart_after: int | None,
         seed: int | None,
     ) -> None:
-        self._recorder = Recorder(env, seed=seed)
-        self._inputs, self._hold = inputs, hold
+        space = action_space_of(env)
+        numbered = isinstance(space, spaces.Discrete)
+        self._recorder = Recorder(env, inputs=inputs if numbered else None, seed=seed)
+        self._inputs = None if numbered else inputs
+        self._hold = hold
         self._restart_after = restart_after
         # So that the share of random steps is `explore`, though each draw is held.
         self._probability = explore / (hold - explore * (hold - 1))
         self._rng = np.random.default_rng(None if seed is None else [seed, 3])
-        space: Any = (
-            env.single_action_space if isinstance(env, VectorEnv) else env.action_space
-        )
-        self._first = int(space.start) if isinstance(space, spaces.Discrete) else 0
-        self.n_actions = len(inputs) if inputs is not None else int(space.n)
+        self._first = int(space.start) if numbered else 0
+        self.n_actions = int(space.n) if numbered else len(inputs)  # type: ignore[arg-type]
         slots = self._recorder.num_envs
         self._held: IntArray = np.zeros(slots, np.int64)
         self._random: IntArray = np.zeros(slots, np.int64)
@@ -103,7 +103,8 @@ class PlantRunner:
         chosen = self._random
         if policy is not None and (self._held == 0).any():
             found, _ = policy.predict(observation)
-            mine = np.asarray(found).reshape(begins.size) - self._first
+            # Where it has learned, in the model, actions are counted from 0.
+            mine = np.asarray(found).reshape(begins.size)
             chosen = np.where(self._held > 0, self._random, mine)
         self._held = np.maximum(self._held - 1, 0)
         return chosen

@@ -14,7 +14,8 @@ class PlantLearning:
     """What `learn_from_plant` has found.
 
     Attributes:
-        policy: the best policy in the newest model; `predict` gives numbers of actions.
+        policy: the best policy in the newest model; `predict` gives numbers of actions,
+            counted from 0.
         agent: what learned it, as it is at the end.
         model: the newest model, in which it learned.
         transitions: everything that was recorded.

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from numbers import Integral
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,8 @@ from acl_gym.envs.navigation.system import Navigation
 from acl_gym.envs.pendulum.system import Pendulum
 from acl_gym.plotting import cells, navigation, palettes, style
 from acl_gym.plotting.plane import Key, Plane, plane_of
-from acl_gym.plotting.subject import Labels, Subject, subject_of
+from acl_gym.plotting.subject import Labels, Subject, subject_of, with_unit
+from acl_gym.policies import InterpolatedPolicy
 from acl_gym.utils import validation
 from acl_gym.utils.typing import FloatArray
 
@@ -33,6 +35,7 @@ def plot_policy(
     labels: Labels = None,
     actions: Sequence[str] | None = None,
     shape: tuple[int, int] | None = None,
+    input: Key | None = None,
     colorbar: bool = True,
 ) -> Axes:
     """Draw which action a policy takes in each state.
@@ -44,13 +47,16 @@ def plot_policy(
     grids with their walls, maps that Gymnasium's own environments give, or
     `shape`; with arrows where it is known where the actions lead.
 
+    Of an `InterpolatedPolicy` the colours are the inputs that it sets, from the lowest to
+    the highest of its grid, also those between its points.
+
     New axes belong to a figure that pyplot does not know, so nothing needs to be
     closed: `plot_policy(agent).figure`. A notebook shows the axes
     as a picture. For a window, pass axes of `plt.subplots()`.
 
     Args:
-        agent: an agent or a policy with a partition; or any model with `predict`, if
-            `env` is given.
+        agent: an agent or a policy with a partition, or an `InterpolatedPolicy`; or any
+            model with `predict`, if `env` is given.
         ax: where to draw; None makes a figure.
         env: gives names and bounds, single or vector; None takes that of the agent.
         axes: one or two state variables, by name or number; None takes two positions in
@@ -61,6 +67,8 @@ def plot_policy(
             from its cosine and sine is one variable, in the place of the cosine.
         actions: names of all actions.
         shape: rows and columns in which numbered states lie, row by row.
+        input: which input of an `InterpolatedPolicy`, by name or number; None takes the
+            first, and draws those of the navigation as arrows.
         colorbar: whether a bar, or a legend, explains the colours.
 
     Returns:
@@ -70,6 +78,15 @@ def plot_policy(
         TypeError: `agent` or `ax` is of the wrong kind.
         ValueError: an argument does not fit the states or actions.
     """
+    if isinstance(agent, InterpolatedPolicy):
+        greedy = subject_of(agent.greedy, env, labels, actions)
+        cells.refuse_shape(shape)
+        return _plot_inputs(agent, greedy, ax, axes, slice, input, colorbar)
+    if input is not None:
+        raise ValueError(
+            "input is for an InterpolatedPolicy, whose inputs are drawn, got "
+            f"{validation.shown(input)} for {type(agent).__name__}; leave it out."
+        )
     subject = subject_of(agent, env, labels, actions)
     if not subject.variables:
         return cells.plot_policy(subject, ax, shape, colorbar)
@@ -80,7 +97,7 @@ def plot_policy(
     wide = 5.2 if colorbar else 4.0
     with style.axes_or_new(ax, wide, 3.9 if plane.fixed else 3.7) as ax:
         if draws_arrows(subject, plane):
-            _draw_forces(ax, subject, plane)
+            _draw_forces(ax, subject, plane, _forces_of_actions(subject))
         else:
             colours = palettes.of_inputs(subject)
             draw_actions(ax, subject, plane, colours)
@@ -212,6 +229,77 @@ def _column(subject: Subject, action: Any) -> int:
     )
 
 
+def _plot_inputs(
+    policy: InterpolatedPolicy,
+    subject: Subject,
+    ax: Axes | None,
+    axes: Sequence[Key] | None,
+    slice: Mapping[Key, float] | None,
+    input: Key | None,
+    colorbar: bool,
+) -> Axes:
+    """The real inputs that a policy sets; see `plot_policy`.
+
+    Args:
+        policy: between the actions of a table.
+        subject: the policy over this table.
+        ax: see there.
+        axes: see there.
+        slice: see there.
+        input: see there.
+        colorbar: see there.
+    """
+    if not subject.variables:
+        raise ValueError(
+            "states must be numbers on axes to draw inputs over them, got numbered "
+            "states; draw policy.greedy, whose actions are shown in their cells."
+        )
+    names = [with_unit(name) for name in policy.signals.inputs]
+    column = 0 if input is None else _input_column(names, input)
+    plane = plane_of(subject, axes, slice)
+    kind = f"policy between {policy.greedy.n_actions} actions"
+    name = style.symbol(names[column])
+    low, high = (float(end) for end in policy.grid.axes[column][[0, -1]])
+    size = (5.2 if colorbar else 4.0, 3.9 if plane.fixed else 3.7)
+    if len(plane.shown) == 1:
+        size = (4.6, 2.4)
+    with style.axes_or_new(ax, *size) as ax:
+        if input is None and draws_arrows(subject, plane):
+            _draw_forces(ax, subject, plane, lambda states: policy.predict(states)[0])
+        elif len(plane.shown) == 1:
+            (points,) = plane.points()
+            values = policy.predict(plane.states(subject))[0][:, column]
+            ax.plot(points, values, color=style.BLUE, linewidth=1.6)
+            margin = 0.05 * ((high - low) or 1.0)
+            ax.set_ylim(low - margin, high + margin)
+            plane.label(ax)
+            ax.set_ylabel(name)
+        else:
+            values = policy.predict(plane.states(subject))[0][:, column]
+            mesh = draw_map(ax, plane, values, *palettes.of_range(low, high))
+            if colorbar:
+                palettes.add_level_bar(ax, mesh, name)
+            draw_goal(ax, subject, plane)
+        _set_title(ax, kind, subject, plane)
+    return ax
+
+
+def _input_column(names: Sequence[str], key: Any) -> int:
+    """The column of an input given by name, with or without its unit, or number."""
+    if isinstance(key, Integral) and not isinstance(key, bool):
+        found = [int(key)] if 0 <= int(key) < len(names) else []
+    else:
+        found = [
+            i for i, name in enumerate(names) if key in {name, name.split(" (")[0]}
+        ]
+    if len(found) != 1:
+        raise ValueError(
+            f"input must be one of {', '.join(map(repr, names))} or a number "
+            f"0..{len(names) - 1}, got {validation.shown(key)}."
+        )
+    return found[0]
+
+
 def _policy_curve(subject: Subject, plane: Plane, ax: Axes | None) -> Axes:
     """The action over one state variable."""
     colours = palettes.of_inputs(subject)
@@ -255,7 +343,18 @@ def _level_curves(
     return ax
 
 
-def _draw_forces(ax: Axes, subject: Subject, plane: Plane) -> None:
+def _forces_of_actions(subject: Subject) -> Callable[[FloatArray], FloatArray]:
+    """What gives the forces `(n, 2)` of the policy in some states."""
+    system: Any = subject.system
+    return lambda states: np.array(system.forces)[subject.columns(states)]
+
+
+def _draw_forces(
+    ax: Axes,
+    subject: Subject,
+    plane: Plane,
+    forces_in: Callable[[FloatArray], FloatArray],
+) -> None:
     """Arrows over the damping, at the velocities of the slice."""
     system: Any = subject.system
     navigation.draw_ground(ax, system)
@@ -264,8 +363,7 @@ def _draw_forces(ax: Axes, subject: Subject, plane: Plane) -> None:
     values: dict[int, Any] = {**plane.fixed, plane.shown[0]: c1, plane.shown[1]: c2}
     for i, value in values.items():
         states[:, i] = value
-    forces = np.array(system.forces)[subject.columns(states)]
-    navigation.draw_forces(ax, system, forces)
+    navigation.draw_forces(ax, system, forces_in(states))
     ax.set_xlabel(style.symbol(plane.axes[0].name))
     ax.set_ylabel(style.symbol(plane.axes[1].name))
 

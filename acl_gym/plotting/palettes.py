@@ -23,6 +23,9 @@ from acl_gym.utils.typing import FloatArray
 LEVELS = "cividis"
 """The colours of levels."""
 
+_SHADES = 256
+"""Colours of a range of inputs."""
+
 _PALE = 200
 """Of 255: a colour whose channels are all above it is hardly seen as a line."""
 
@@ -84,6 +87,16 @@ def of_inputs(subject: Subject) -> Palette:
     if inputs.shape[1] == 2:
         colours = direction_colours(inputs)
     return Palette(np.arange(count), colours, labels, title)
+
+
+def of_range(low: float, high: float) -> tuple[ListedColormap, Normalize]:
+    """Colours of all inputs in a range, those of `of_inputs` at its ends and at 0."""
+    if low == high:  # an input that no action changes
+        low, high = low - 1.0, high + 1.0
+    values = np.linspace(low, high, _SHADES)
+    return ListedColormap(action_colours(_SHADES, values.tolist())), Normalize(
+        low, high
+    )
 
 
 def norm_of(values: FloatArray, limits: tuple[float, float] | None = None) -> Normalize:

@@ -24,7 +24,12 @@ from acl_gym.envs.grid_search.system import GridSearch
 from acl_gym.partitions import Discrete, Grid, Partition
 from acl_gym.plotting import pieces
 from acl_gym.plotting.style import GREEK
-from acl_gym.policies import PartitionPolicy, SoftPolicy, TablePolicy
+from acl_gym.policies import (
+    InterpolatedPolicy,
+    PartitionPolicy,
+    SoftPolicy,
+    TablePolicy,
+)
 from acl_gym.utils import validation
 from acl_gym.utils.typing import FloatArray, IntArray
 
@@ -225,7 +230,7 @@ def subject_of(
     if system is not None and system.observation_space != space:
         system = None  # a wrapper has changed what is observed
     first, count = _actions(policy, env)
-    signals = None if env is None else signals_of(env)
+    signals = getattr(policy, "signals", None) if env is None else signals_of(env)
     inputs, input_names = _inputs(signals, system, count)
     names = _action_names(actions, system, first, count)
     n_states, first_state = 0, 0
@@ -258,6 +263,11 @@ def _policy_of(agent: Any, env: Any) -> tuple[Any, Partition | None, FloatArray 
         return greedy, agent.partition, table
     if isinstance(agent, PartitionPolicy):
         return agent, agent.partition, getattr(agent, "table", None)
+    if isinstance(agent, InterpolatedPolicy):
+        raise TypeError(
+            "agent must choose among actions here, got an InterpolatedPolicy, which only "
+            "plot_policy draws; pass policy.greedy, the policy over its table."
+        )
     predicts = callable(getattr(agent, "predict", None))
     if isinstance(agent, type) or not predicts:
         raise TypeError(
@@ -308,10 +318,10 @@ def _inputs(
     values = np.array(signals.values)
     if len(values) != count:
         return None, ()
-    return values, tuple(map(_with_unit, signals.inputs))
+    return values, tuple(map(with_unit, signals.inputs))
 
 
-def _with_unit(name: str) -> str:
+def with_unit(name: str) -> str:
     """The unit in brackets, as in "torque u (N m)"; notes that follow are left out."""
     word, *rest = name.split(", ")
     return f"{word} ({rest[0]})" if rest else word
@@ -380,7 +390,7 @@ def _own_names(
     for column in range(count + len(angles)):
         if column in sines:
             continue
-        name = _with_unit(known[column]) if known else f"state {column + 1}"
+        name = with_unit(known[column]) if known else f"state {column + 1}"
         if column in cosines:
             whose = f"of {known[column].split(', ')[0]}" if known else f"{column + 1}"
             name = f"angle {whose} (rad)"

@@ -92,6 +92,11 @@ class InterpolatedPolicy(Fixed):
         partition = short(repr(self.greedy.partition))
         return f"InterpolatedPolicy({partition}, between {counts} actions)"
 
+    @property
+    def signals(self) -> Signals:
+        """Names of observations and inputs, and the inputs of each action."""
+        return self._signals
+
     def predict(
         self,
         observation: ArrayLike,

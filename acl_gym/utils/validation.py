@@ -151,6 +151,19 @@ def seed(value: Any, name: str = "seed") -> int | None:
     return None if value is None else integer(name, value, at_least=0, at_most=None)
 
 
+def boolean(name: str, value: Any) -> bool:
+    """Return a switch as a bool, Python's or NumPy's.
+
+    Anything else would be true or false as well, such as the text "no".
+
+    Raises:
+        TypeError: it is not True or False.
+    """
+    if not isinstance(value, bool | np.bool_):
+        raise TypeError(f"{name} must be True or False, got {shown(value)}.")
+    return bool(value)
+
+
 def real_array(
     name: str,
     values: Any,

@@ -17,7 +17,8 @@ import pandas as pd
 import pytest
 
 from acl_gym import Transitions
-from tests.cli.runner import PENDULUM, figures, invoke, refused
+from acl_gym.cli.environments import Environment
+from tests.cli.runner import MODULE, PENDULUM, figures, invoke, refused
 
 FEW = ["train", PENDULUM, "--interactions", "40", "--restart-after", "10"]
 
@@ -84,6 +85,27 @@ def test_the_same_command_goes_on_and_makes_nothing_twice() -> None:
     said = refused(2, *other)
     assert "restart_after=10" in said
     assert "give another name with --out FILE.npz" in said
+
+
+def test_an_error_of_the_plant_names_the_folder_of_what_was_recorded() -> None:
+    """And the same command goes on where it was, once the plant is mended."""
+    blown = MODULE.replace(
+        "def step(self, action):",
+        "def step(self, action):\n"
+        "        import pathlib\n"
+        "        self.made = getattr(self, 'made', 0) + 1\n"
+        "        if self.made > 30 and not pathlib.Path('mended').exists():\n"
+        "            raise ConnectionError('no answer from the rig')",
+    ).replace("Corridor-v0", "Blown-v0")
+    Path("my_blown.py").write_text(blown)
+    command = ["train", "my_blown:Blown-v0", "--interactions", "40", "--quiet"]
+    said = refused(2, *command, "--out", "rig.npz")
+    assert "no answer from the rig. All 30 interactions made so far are kept" in said
+    assert "kept in rig-plant; run the same again, and it goes on from there." in said
+    Path("mended").touch()
+    found = figures(*command, "--out", "rig.npz")
+    assert found["recorded_steps"] == 40
+    assert len(Path("rig-plant/transitions.csv").read_text().splitlines()) == 41
 
 
 @pytest.mark.slow
@@ -164,6 +186,90 @@ def test_continuous_actions_of_another_package() -> None:
     assert again["mean_return"] == found["best"]["policy_return"]
 
 
+def test_continuous_actions_take_values_from_end_to_end() -> None:
+    """As `learn_from_plant` does; and the file is all that its evaluation needs."""
+    found = figures(
+        *("train", "Pendulum-v1", "--interactions", "20", "--max-steps", "20"),
+        *("--out", "p.npz"),
+    )
+    assert (found["discretize"], found["end_to_end"]) == ([5], True)
+    inputs = np.loadtxt("p-plant/transitions.csv", delimiter=",", skiprows=1)[:, 4]
+    assert set(inputs) <= {-2.0, -1.0, 0.0, 1.0, 2.0}
+    assert {-2.0, 2.0} <= set(inputs)  # the middles of five parts end at 1.6
+    again = figures("evaluate", "p-best.npz")
+    assert again["mean_return"] == found["best"]["policy_return"]
+    assert (again["discretize"], again["end_to_end"]) == ([5], True)
+    between = figures("evaluate", "p-best.npz", "--interpolate", "--episodes", "3")
+    assert between["interpolated"]
+    more = figures("train", "--resume", "p.npz", "--trials", "1")
+    assert (more["discretize"], more["end_to_end"]) == ([5], True)
+    assert "must be left out" in refused(
+        2, "train", "--resume", "p.npz", "--discretize", "5"
+    )
+
+
+def test_real_inputs_of_this_package_stay_native() -> None:
+    found = figures(*FEW, "--env-arg", "continuous=true", "--out", "c.npz")
+    assert (found["discretize"], found["end_to_end"]) == ([5], True)
+    again = figures("evaluate", "c-best.npz")
+    assert again["policy_cost"] == found["best"]["policy_cost"]
+    assert again["episodes"] == 100  # from its evaluation states
+    environment = Environment(PENDULUM, {"continuous": True}, (5,), end_to_end=True)
+    single, several = environment.single(), environment.vector(3)
+    assert single.action_space == several.single_action_space
+    states = np.tile([1.0, 2.0], (3, 1))
+    several.reset(options={"state": states})
+    seen = several.step(np.array([4, 4, 4]))[0]
+    single.reset(options={"state": states[0]})
+    np.testing.assert_array_equal(single.step(4)[0], seen[0])
+    real = environment.with_real_inputs().single()
+    real.reset(options={"state": states[0]})
+    np.testing.assert_array_equal(real.step(np.array([0.8]))[0], seen[0])
+
+
+@pytest.fixture
+def corridor() -> list[str]:
+    """Rows of a corridor of another package, and a command that learns from them.
+
+    A row for each moment: what the step gave that begins there, and whether it was the
+    last of its episode. The last row of a run holds the state that it led to.
+    """
+    Path("my_corridor.py").write_text(MODULE)
+    rows: list[dict[str, Any]] = []
+    rng = np.random.default_rng(0)
+    for run in range(8):
+        x, over = float(rng.uniform(1.0, 1.8)), False
+        while not over:
+            u = int(rng.random() < 0.7)
+            after = float(np.clip(x + (0.1 if u else -0.1), 0.0, 2.0))
+            over = after >= 1.95
+            rows.append({"run": run, "x": x, "u": u, "r": -1.0, "end": int(over)})
+            x = after
+        rows.append({"run": run, "x": x, "u": 0, "r": 0.0, "end": 0})
+    pd.DataFrame(rows).to_csv("rows.csv", index=False)
+    command = "train my_corridor:Corridor-v0 --from-data rows.csv"
+    return [*command.split(), "--state", "x", "--input", "u", "--run", "run"]
+
+
+def test_rewards_and_ends_of_a_table_tell_cost_and_goal(corridor: list[str]) -> None:
+    found = figures(*corridor, "--reward", "r", "--terminated", "end")
+    assert found["model"]["learned_cost_error"] < 0.1
+    assert found["model"]["learned_goal_recall"] == 1.0
+    # To the right always, from 0 to 1.8: 11 steps in the mean. At random 60 and more.
+    assert found["best"]["policy_return"] > -13
+    blind = figures(*corridor, "--reward", "r", "--out", "blind.npz")
+    assert blind["model"]["learned_goal_recall"] is None
+    # Without a goal all steps are alike, whatever is done.
+    assert blind["rows"][0]["model_cost"] == pytest.approx(80, rel=0.02)
+
+
+def test_a_table_without_rewards_does_not_tell_a_cost(corridor: list[str]) -> None:
+    said = refused(2, *corridor)
+    assert "rows.csv must hold rewards" in said
+    assert "add --reward COLUMN" in said
+    assert "must have a column 'gain'" in refused(2, *corridor, "--reward", "gain")
+
+
 DATA = ["train", PENDULUM, "--from-data"]
 
 
@@ -180,8 +286,11 @@ DATA = ["train", PENDULUM, "--from-data"]
         ([*DATA, "no.npz"], "no.npz"),
         ([*DATA, "no.csv", "--state", "a,b"], "needs --input"),
         ([*DATA, "no.csv", "--state", "a,", "--input", "u"], "--state must be names"),
+        ([*DATA, "no.npz", "--reward", "r"], "--reward names columns of --from-data"),
+        ([*FEW, "--terminated", "e"], "--terminated names columns of --from-data"),
+        ([*DATA, "no.csv", "--state", "a", "--input", "u", "--terminated", "e"],
+         "--terminated needs --run"),
         ([*DATA, "no.csv", "--state", "a", "--input", "u"], "there is no file no.csv"),
-        (["train", "Pendulum-v1", "--interactions", "9"], "add --discretize 5"),
         (["train", "Taxi-v4", "--interactions", "9"], "Box of one axis"),
     ],
 )  # fmt: skip

@@ -54,6 +54,7 @@ COMMANDS = [["evaluate"], ["train", "--trials", "1", "--resume"]]
         {"env_args": {"torques": {"a": object}}},
         {"env_args": [1]},
         {"discretize": ["5"]},
+        {"discretize": [5], "end_to_end": "yes"},
         {"env_id": 5},
     ],
 )

@@ -196,6 +196,8 @@ def test_rounds() -> None:
         ({"callback": 3}, TypeError, "callback must be a function"),
         ({"model": {"colour": 1}}, TypeError, "colour"),
         ({"model": [1]}, TypeError, "model must be a dict"),
+        ({"asynchronous": "no"}, TypeError, "asynchronous must be True or False"),
+        ({"progress_bar": 1}, TypeError, "progress_bar must be True or False"),
         ({"interactions": 3}, ValueError, "interactions must be 5 or more"),
     ],
 )
@@ -262,6 +264,40 @@ class TestFolder:
             more.transitions.states[:40], first.transitions.states
         )
         assert more.transitions.episodes.max() > first.transitions.episodes.max()
+
+    @pytest.mark.parametrize("asynchronous", [False, True])
+    def test_an_error_of_the_plant_tells_what_is_kept(
+        self, tmp_path: Path, asynchronous: bool
+    ) -> None:
+        class Blown(gym.Wrapper[Any, Any, Any, Any]):
+            left = 12
+
+            def step(self, action: Any) -> Any:
+                self.left -= 1
+                if self.left < 0:
+                    raise ConnectionError("the fuse has blown")
+                return self.env.step(action)
+
+        def learn(env: Any, folder: Path | None) -> Any:
+            return learn_from_plant(
+                env,
+                interactions=20,
+                folder=folder,
+                asynchronous=asynchronous,
+                seed=0,
+                **QUICK,
+            )
+
+        with pytest.raises(ConnectionError) as caught:
+            learn(Blown(pendulum()), tmp_path / "rig")
+        (note,) = caught.value.__notes__
+        assert f"All 12 interactions made so far are kept in {tmp_path}/rig" in note
+        assert "run the same again" in note
+        assert len(self.rows(tmp_path / "rig")) == 12
+        assert len(learn(pendulum(), tmp_path / "rig").transitions) == 20
+        with pytest.raises(ConnectionError) as caught:
+            learn(Blown(pendulum()), None)
+        assert not hasattr(caught.value, "__notes__")
 
     def test_a_line_that_was_not_completed_is_cut_off(self, tmp_path: Path) -> None:
         self.run(tmp_path, interactions=20)

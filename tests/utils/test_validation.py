@@ -84,6 +84,19 @@ class _NoRepr:
         raise RuntimeError
 
 
+@pytest.mark.parametrize("value", [True, False, np.True_, np.False_])
+def test_a_switch_becomes_a_bool(value: Any) -> None:
+    result = validation.boolean("x", value)
+    assert type(result) is bool
+    assert result == value
+
+
+@pytest.mark.parametrize("value", [1, 0, None, "yes", "", np.int8(1), [True]])
+def test_anything_else_is_no_switch(value: Any) -> None:
+    with pytest.raises(TypeError, match=r"^walk must be True or False, got"):
+        validation.boolean("walk", value)
+
+
 def test_any_value_is_shown_shortly() -> None:
     assert validation.shown(1.5) == "1.5"
     assert validation.shown(np.eye(2)) == "array([[1., 0.], [0., 1.]])"  # on one line

@@ -40,6 +40,11 @@ def made_system(kind: type[System], parameters: dict[str, Any]) -> System:
     return kind(**parameters)
 
 
+def of_this_package(kind: type) -> bool:
+    """Whether a class was defined in this package, so that it does as it should."""
+    return kind.__module__.startswith("acl_gym.")
+
+
 def real_input_bounds(system: ControlSystem) -> tuple[FloatArray, FloatArray] | None:
     """The bounds of the inputs of a system whose actions are a Box, else None.
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import copy
 import math
-from typing import Any, ClassVar, Self, TypeGuard
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from gymnasium.error import ResetNeeded
@@ -31,6 +31,7 @@ from acl_gym.envs.control.bookkeeping import (
     finish,
     made_system,
     n_actions_of,
+    of_this_package,
     real_input_bounds,
     states_of_slots,
     warn_of_no_render_mode,
@@ -280,14 +281,16 @@ class ControlVectorEnv(ChoosesAutoreset, VectorEnv[Observation, Any, NDArray[Any
         rewards = np.zeros(n_slots)
         terminated = np.zeros(n_slots, np.bool_)
         truncated = np.zeros(n_slots, np.bool_)
-        n_finished = 0
+        n_finished, failed = 0, None
         slots = self._all_slots if walking is None else walking
         uniforms = draw_uniforms(system, self, slots.size)
         if walking is None:
-            system.advance(state, actions, uniforms, rewards, terminated)
+            failed = system.advance(state, actions, uniforms, rewards, terminated)
+            if failed is not None:
+                terminated |= failed
             n_finished = count_step(self._limit, self._steps, terminated, truncated)
         elif slots.size:
-            n_finished = self._step_some(
+            n_finished, failed = self._step_some(
                 self._limit,
                 slots,
                 self._finished,
@@ -310,6 +313,9 @@ class ControlVectorEnv(ChoosesAutoreset, VectorEnv[Observation, Any, NDArray[Any
             n_left = finish(
                 terminated, truncated, self._finished, walking, ended, success
             )
+            if failed is not None:
+                success &= ~failed
+                self._charge(failed, rewards)
             self._walking = walking[:n_left]
             last = {"is_success": success, "_is_success": ended}
             if (
@@ -323,6 +329,16 @@ class ControlVectorEnv(ChoosesAutoreset, VectorEnv[Observation, Any, NDArray[Any
         if last:
             infos = {**last, **infos}
         return self._observe(), rewards, terminated, truncated, infos
+
+    def _charge(self, failed: BoolArray, rewards: FloatArray) -> None:
+        """Let slots pay that have failed in the step that was just counted.
+
+        Here they do not.
+
+        Args:
+            failed: which, `(num_envs,)`.
+            rewards: of the step, `(num_envs,)`, changed in place.
+        """
 
     def render(self) -> tuple[Frame, ...] | None:
         """A frame `(480, 480, 3)` of each slot.
@@ -436,7 +452,7 @@ class ControlVectorEnv(ChoosesAutoreset, VectorEnv[Observation, Any, NDArray[Any
                 f"give float64 states of a fixed size for {count} slots, got "
                 f"{validation.shown(states)}."
             )
-        if not type(self._system).__module__.startswith(_PACKAGE):
+        if not of_this_package(type(self._system)):
             # Kernels of this package address by them.
             self._system.checked_states(states.T)
 
@@ -492,27 +508,3 @@ def _least_bytes_a_slot(space: Any) -> int:
     of_variables = numbers * (3 * space.dtype.itemsize + 2 + 8)
     # Action, its space (two numbers), steps, index and reward; three flags.
     return int(of_variables + 6 * 8 + 3)
-
-
-_PACKAGE = "acl_gym."
-_OF_A_STEP = {
-    name: getattr(ControlVectorEnv, name)
-    for name in ("step", "_step", "_observe", "_infos")
-}
-
-
-def is_native(env: Any) -> TypeGuard[ControlVectorEnv]:
-    """Whether what `env` returns is sure to fit: it and its system are of this package.
-
-    Of a subclass of a user's own, and of methods that were replaced, nothing is sure.
-    """
-    kind = type(env)
-    if not (isinstance(env, ControlVectorEnv) and kind.__module__.startswith(_PACKAGE)):
-        return False
-    system = env.system
-    return (
-        type(system).__module__.startswith(_PACKAGE)
-        and all(getattr(kind, name) is own for name, own in _OF_A_STEP.items())
-        and vars(env).keys().isdisjoint(_OF_A_STEP)
-        and vars(system).keys().isdisjoint(("advance", "observe", "action_mask"))
-    )

@@ -109,17 +109,18 @@ class ControlEnv(gym.Env[NDArray[Any], Any]):
 
         Returns:
             `(observation, reward, terminated, truncated, info)` with reward
-            = -(stage cost), `terminated` once the goal is reached and the info that
-            `reset` describes with `"is_success"`, whether this step reached the goal.
+            = -(stage cost), `terminated` once the goal is reached or the system says
+            that the episode has failed, and the info that `reset` describes with
+            `"is_success"`, whether this step reached the goal.
 
         Raises:
-            ResetNeeded: there was no `reset` yet, or the goal was reached after it.
+            ResetNeeded: there was no `reset` yet, or the episode is over.
             ValueError: `action` is not an action of this environment.
         """
         if self._state is None or self._finished:
             raise ResetNeeded(
                 "step() needs a running episode, but this one "
-                + ("has not begun" if self._state is None else "reached its goal")
+                + ("has not begun" if self._state is None else "is over")
                 + "; call reset() first."
             )
         actions: NDArray[Any]
@@ -129,14 +130,15 @@ class ControlEnv(gym.Env[NDArray[Any], Any]):
             actions = checked_actions([action], 1, self._n_actions)
         rewards, reached = np.empty(1), np.empty(1, dtype=np.bool_)
         uniforms = draw_uniforms(self.system, self, 1)
-        self.system.advance(self._state, actions, uniforms, rewards, reached)
-        self._finished = bool(reached[0])
+        failed = self.system.advance(self._state, actions, uniforms, rewards, reached)
+        success = bool(reached[0])
+        self._finished = success or (failed is not None and bool(failed[0]))
         self._action = drawn_action(actions[0])
         if self.render_mode == "human":
             self.render()
         observation = self.system.observe(self._state)[0]
         # In every step: whether it is the last, only a wrapper with a limit knows.
-        info = {**self._info(self._state), "is_success": self._finished}
+        info = {**self._info(self._state), "is_success": success}
         return observation, float(rewards[0]), self._finished, False, info
 
     def render(self) -> Frame | None:

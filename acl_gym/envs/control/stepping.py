@@ -52,7 +52,7 @@ class PartialStep:
         rewards: FloatArray,
         terminated: BoolArray,
         truncated: BoolArray,
-    ) -> int:
+    ) -> tuple[int, BoolArray | None]:
         """Step some slots; the entries of the others stay as they are.
 
         Args:
@@ -64,47 +64,58 @@ class PartialStep:
             actions: of all slots.
             uniforms: `(draws_per_step, m)`, None if the system needs none.
             rewards: of all slots, zeros; receives those of `slots`.
-            terminated: of all slots, False; receives whether `slots` are at the goal.
+            terminated: of all slots, False; receives whether `slots` are at the goal, or
+                have failed.
             truncated: of all slots, False; receives whether the limit is reached.
 
         Returns:
-            How many slots have finished.
+            How many slots have finished, and which of all slots have failed,
+            `(num_envs,)`; None if the system says of none that it has.
         """
         if uniforms is None and slots.size > RESTORE_ABOVE * idle.size:
             if self._before.shape != states.shape:
                 self._before = np.empty_like(states)
             np.copyto(self._before, states)
             try:
-                self._system.advance(states, actions, None, rewards, terminated)
+                failed = self._system.advance(
+                    states, actions, None, rewards, terminated
+                )
             except SlotError:
                 # Perhaps in an idle slot: without these it fails for good or not at all.
                 np.copyto(states, self._before)
                 rewards.fill(0.0)
                 terminated.fill(False)
             else:
-                return int(
-                    put_idle_back(
-                        idle,
-                        self._before,
-                        limit,
-                        states,
-                        steps,
-                        rewards,
-                        terminated,
-                        truncated,
-                    )
+                if failed is not None:
+                    failed &= ~idle
+                    terminated |= failed
+                n_finished: int = put_idle_back(
+                    idle,
+                    self._before,
+                    limit,
+                    states,
+                    steps,
+                    rewards,
+                    terminated,
+                    truncated,
                 )
+                return n_finished, failed
         part, part_actions, part_rewards, part_reached = self._scratch_for(
             slots, states
         )
         gather_slots(slots, states, actions, part, part_actions)
         try:
-            self._system.advance(
+            part_failed = self._system.advance(
                 part, part_actions, uniforms, part_rewards, part_reached
             )
         except SlotError as error:
             raise SlotError(error.message, int(slots[error.slot])) from error
-        n_finished: int = put_slots_back(
+        failed = None
+        if part_failed is not None:
+            part_reached |= part_failed
+            failed = np.zeros(idle.size, np.bool_)
+            failed[slots] = part_failed
+        n_finished = put_slots_back(
             slots,
             part,
             part_rewards,
@@ -116,7 +127,7 @@ class PartialStep:
             terminated,
             truncated,
         )
-        return n_finished
+        return n_finished, failed
 
     def _scratch_for(self, slots: IntArray, states: FloatArray) -> Scratch:
         """Return scratch arrays: those of the last step if they have the right size."""

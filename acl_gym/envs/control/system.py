@@ -48,7 +48,7 @@ class ControlSystem(ABC):
     that each variable is one contiguous vector for the kernels.
     """
 
-    # Where the next two depend on the parameters, a system makes them properties.
+    # Where the next four depend on the parameters, a system makes them properties.
     draws_per_step: ClassVar[int] = 0
     """How many uniform random numbers `advance` takes for each slot and step."""
 
@@ -58,6 +58,9 @@ class ControlSystem(ABC):
     fully_observed: ClassVar[bool] = True
     """Whether an observation tells the state, so that a table over observations can be a
     model of the system."""
+
+    may_fail: ClassVar[bool] = False
+    """Whether an episode may end in failure too; see what `advance` returns."""
 
     evaluation_steps: ClassVar[int] = 300
     """T, the longest episode when a policy is evaluated from `evaluation_states`."""
@@ -144,7 +147,7 @@ class ControlSystem(ABC):
         uniforms: FloatArray | None,
         rewards: FloatArray,
         reached: BoolArray,
-    ) -> None:
+    ) -> BoolArray | None:
         """Apply one action to each state.
 
         Args:
@@ -154,6 +157,10 @@ class ControlSystem(ABC):
             uniforms: shape `(draws_per_step, n)` from [0, 1), None if there are none.
             rewards: shape `(n,)`, receives -(stage cost).
             reached: shape `(n,)`, receives whether the next state is the goal.
+
+        Returns:
+            Which episodes end in failure, `(n,)`, none of them at the goal; None if none
+            does.
         """
 
     @abstractmethod

@@ -66,12 +66,8 @@ class GridSearch(NumberedSystem):
             "transition_probability", self.transition_probability, above=0, at_most=1
         )
         object.__setattr__(self, "transition_probability", p)
-        if not isinstance(self.mask_blocked, bool | np.bool_):
-            raise TypeError(
-                "mask_blocked must be True or False, got "
-                f"{validation.shown(self.mask_blocked)}."
-            )
-        object.__setattr__(self, "mask_blocked", bool(self.mask_blocked))
+        mask = validation.boolean("mask_blocked", self.mask_blocked)
+        object.__setattr__(self, "mask_blocked", mask)
 
     @cached_property
     def _map(self) -> NDArray[np.str_]:

@@ -11,6 +11,7 @@ import numpy as np
 from gymnasium import spaces
 
 from acl_gym.envs.control.lookup import signals_of, system_of
+from acl_gym.envs.control.signals import Signals
 from acl_gym.envs.plant.targets import checked_names
 from acl_gym.utils import validation
 from acl_gym.utils.angles import Angles
@@ -121,6 +122,9 @@ def described(
         )
     if sampling_time is not None:
         sampling_time = validation.number("sampling_time", sampling_time, above=0)
+    if values is not None:
+        rows = rows_of_inputs(values, n_inputs, "values")
+        values = tuple(map(tuple, rows.tolist()))
     return Description(
         names,
         of_inputs,
@@ -128,17 +132,19 @@ def described(
         tuple(top.tolist()),
         axes,
         pairs,
-        None if values is None else _rows("values", values, n_inputs),
-        bool(numbered),
+        values,
+        validation.boolean("numbered", numbered),
         sampling_time,
     )
 
 
-def described_by(env: Any) -> dict[str, Any]:
+def described_by(env: Any, inputs: Any = None) -> dict[str, Any]:
     """What an environment tells of its observations and actions.
 
     Args:
         env: a single or a vector environment, wrapped or not.
+        inputs: what each of its numbered actions sets, where somebody knows that and it
+            does not tell: `(n_actions,)` or `(n_actions, n_inputs)`.
 
     Returns:
         Arguments of `described`, and `size` and `n_inputs`.
@@ -146,6 +152,7 @@ def described_by(env: Any) -> dict[str, Any]:
     Raises:
         TypeError: observations are not a Box of one axis, or actions neither `Discrete`
             nor such a Box.
+        ValueError: `inputs` are not a row for each numbered action, or it tells its own.
     """
     single = "single_" if hasattr(env, "single_observation_space") else ""
     seen = getattr(env, f"{single}observation_space")
@@ -160,7 +167,10 @@ def described_by(env: Any) -> dict[str, Any]:
     facts: dict[str, Any] = {"size": seen.shape[0], "low": low, "high": high}
     if isinstance(acted, spaces.Discrete):
         signals = signals_of(env)
-        if signals is None:
+        if inputs is not None:
+            values = _inputs_of_actions(inputs, int(acted.n), signals)
+            facts |= {"n_inputs": values.shape[1], "values": values}
+        elif signals is None:
             first = int(acted.start)
             numbers = np.arange(first, first + int(acted.n), dtype=np.float64)
             facts |= {"n_inputs": 1, "values": numbers[:, None], "numbered": True}
@@ -172,6 +182,11 @@ def described_by(env: Any) -> dict[str, Any]:
                 "state_names": signals.observations or None,
             }
     elif isinstance(acted, spaces.Box) and len(acted.shape) == 1:
+        if inputs is not None:
+            raise ValueError(
+                "inputs belong to numbered actions, of which they say what each sets, got "
+                f"{validation.shown(inputs)} for {validation.shown(acted)}; leave them out."
+            )
         facts |= {"n_inputs": acted.shape[0]}
     else:
         raise TypeError(
@@ -183,6 +198,26 @@ def described_by(env: Any) -> dict[str, Any]:
         facts["circular"] = system.circular
         facts["sampling_time"] = getattr(system, "sampling_time", None)
     return facts
+
+
+def _inputs_of_actions(
+    inputs: Any, n_actions: int, signals: Signals | None
+) -> FloatArray:
+    """What each of the numbered actions sets, `(n_actions, n_inputs)`, checked."""
+    if signals is not None:
+        raise ValueError(
+            "inputs belong to continuous actions, or to an environment that does not tell "
+            f"what its numbered actions set; this one does: {', '.join(signals.inputs)}, "
+            f"got inputs={validation.shown(inputs)}; leave them out."
+        )
+    array = validation.real_array("inputs", inputs)
+    array = array[:, None] if array.ndim == 1 else array
+    if array.ndim != 2 or len(array) != n_actions:
+        raise ValueError(
+            f"inputs must hold a number or a row of numbers for each of the {n_actions} "
+            f"actions of the environment, got shape {array.shape}."
+        )
+    return array
 
 
 def _axes(circular: Any, names: tuple[str, ...]) -> tuple[int, ...]:
@@ -220,33 +255,22 @@ def _end(name: str, values: Any, unknown: float, size: int) -> FloatArray:
     return array
 
 
-def _rows(name: str, values: Any, n_inputs: int) -> tuple[tuple[float, ...], ...]:
-    array = validation.real_array(name, values)
-    if array.ndim == 1 and n_inputs == 1:
-        array = array[:, None]
-    if array.ndim != 2 or array.shape[1] != n_inputs:
-        raise ValueError(
-            f"{name} must hold a row of {n_inputs} inputs for each action, got shape "
-            f"{array.shape}."
-        )
-    return tuple(map(tuple, array.tolist()))
-
-
-def rows_of_inputs(inputs: Any, n_inputs: int) -> FloatArray:
+def rows_of_inputs(inputs: Any, n_inputs: int, name: str = "inputs") -> FloatArray:
     """Return what each action sets, `(n_actions, n_inputs)`.
 
     Args:
         inputs: these rows, or a number for each action.
         n_inputs: numbers in a row.
+        name: what messages call them.
 
     Raises:
         ValueError: they are none.
     """
-    array = validation.real_array("inputs", inputs)
+    array = validation.real_array(name, inputs)
     array = array[:, None] if array.ndim == 1 else array
     if array.ndim != 2 or array.shape[1] != n_inputs:
         raise ValueError(
-            f"inputs must hold a row of {n_inputs} numbers for each action, got shape "
+            f"{name} must hold a row of {n_inputs} numbers for each action, got shape "
             f"{array.shape}."
         )
     return array

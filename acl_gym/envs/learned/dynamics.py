@@ -30,7 +30,7 @@ class LearnedDynamics:
         n_draws: how many other functions there are that fit the data as well: draws from
             the posterior of a Gaussian process, or of random features. Other kinds of
             regression have the five of cross-validation.
-        seed: of the draws.
+        seed: of the draws; None takes another one each time.
         begin: dynamics learned from fewer steps; the search for length scales begins
             there.
 
@@ -38,8 +38,9 @@ class LearnedDynamics:
         features: of states and inputs.
 
     Raises:
-        ValueError: there are too few steps, or an action was never tried with
-            `per_action`.
+        ValueError: there are too few steps, an action was never tried with
+            `per_action`, or the seed is negative.
+        TypeError: `per_action` is not True or False, or the seed no integer.
     """
 
     def __init__(
@@ -49,7 +50,7 @@ class LearnedDynamics:
         *,
         per_action: bool = False,
         n_draws: int = 0,
-        seed: int = 0,
+        seed: int | None = 0,
         begin: LearnedDynamics | None = None,
     ) -> None:
         kind = checked_kind(regressor)
@@ -59,6 +60,10 @@ class LearnedDynamics:
                 "record more."
             )
         n_draws = validation.integer("n_draws", n_draws, at_least=0, at_most=1_000)
+        per_action = validation.boolean("per_action", per_action)
+        seed = validation.seed(seed)
+        if seed is None:
+            seed = int(np.random.default_rng().integers(2**32))
         self.description = transitions.description
         angles = self.description.shown_angles
         before = angles.variables(transitions.states)

@@ -13,11 +13,11 @@ from acl_gym.envs.learned.description import rows_of_inputs
 from acl_gym.envs.learned.dynamics import LearnedDynamics
 from acl_gym.envs.learned.features import periods_of, variable_ends
 from acl_gym.envs.learned.outcomes import LearnedCost, LearnedGoal, can_be_learned
-from acl_gym.envs.learned.quality import DataWarning
+from acl_gym.envs.learned.quality import DataWarning, goal_doubts
 from acl_gym.envs.learned.system import LearnedSystem
 from acl_gym.envs.learned.transitions import Transitions
 from acl_gym.utils import validation
-from acl_gym.utils.typing import FloatArray, IntArray
+from acl_gym.utils.typing import BoolArray, FloatArray, IntArray
 
 MOST_INPUTS = 50
 """Different inputs in a recording that may become actions of their own."""
@@ -72,9 +72,13 @@ class LearnedVectorEnv(ControlVectorEnv):
             from all that fit the data, so that a policy is learned that works for all.
         pessimism: what a step costs more where the model is not sure, for a `spread` of
             1, >= 0.
+        most_spread: where the `spread` of a step is more than this, > 0, the episode
+            ends in failure: the step costs as much as the dearest step does, for itself
+            and for each step that was left. So no policy gains by leaving the data. None
+            lets ants go anywhere.
         dynamics: what was learned already, in place of learning it.
         begin: dynamics learned from fewer steps, from which the search begins.
-        seed: of the draws.
+        seed: of the draws; None takes another one each time.
         autoreset_mode: see `ControlVectorEnv`.
         render_mode: see there.
 
@@ -85,13 +89,14 @@ class LearnedVectorEnv(ControlVectorEnv):
         learned_goal: the `LearnedGoal`; None where `goal` was given or there is none.
 
     Raises:
-        TypeError: `transitions` or `regressor` are of the wrong kind.
+        TypeError: `transitions`, `regressor`, `seed`, `uncertain` or `per_action` are of
+            the wrong kind.
         ValueError: there are too few steps, no rewards and no cost, or an argument does
             not fit the data.
 
     Warns:
         DataWarning: something speaks against learning from this data, see
-            `Transitions.doubts`.
+            `Transitions.doubts`, or the goal is far from what was recorded.
     """
 
     system_type = LearnedSystem
@@ -116,9 +121,10 @@ class LearnedVectorEnv(ControlVectorEnv):
         n_draws: int = 10,
         uncertain: bool = False,
         pessimism: float = 0.0,
+        most_spread: float | None = None,
         dynamics: LearnedDynamics | None = None,
         begin: LearnedDynamics | None = None,
-        seed: int = 0,
+        seed: int | None = 0,
         autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
         render_mode: str | None = None,
     ) -> None:
@@ -129,6 +135,9 @@ class LearnedVectorEnv(ControlVectorEnv):
                 "them."
             )
         steps = validation.integer("max_episode_steps", max_episode_steps, at_least=1)
+        seed = validation.seed(seed)
+        uncertain = validation.boolean("uncertain", uncertain)
+        per_action = validation.boolean("per_action", per_action)
         self.transitions = transitions
         known = transitions.description
         actions = _inputs(inputs, transitions)
@@ -172,7 +181,8 @@ class LearnedVectorEnv(ControlVectorEnv):
             evaluation_states=evaluation_states,
             evaluation_steps=steps,
             pessimism=pessimism,
-            uncertain=bool(uncertain),
+            most_spread=most_spread,
+            uncertain=uncertain,
         )
 
     @property
@@ -203,6 +213,12 @@ class LearnedVectorEnv(ControlVectorEnv):
             actions: `(n,)`, or one for all.
         """
         return self.dynamics.distance(*self._pairs(states, actions))
+
+    def _charge(self, failed: BoolArray, rewards: FloatArray) -> None:
+        """Let slots that leave the data pay for the steps that were left."""
+        limit = self._limit or self.system.evaluation_steps
+        left = np.maximum(limit - self._steps[failed], 0) + 1  # with the step just made
+        rewards[failed] = -self.system.dearest_step * left
 
     def _pairs(self, states: Any, actions: Any) -> tuple[FloatArray, FloatArray]:
         """States and inputs, variables first."""
@@ -277,8 +293,14 @@ def _bounds(
                     f"tolerance must be a number or {bottom.size} of them, got "
                     f"{validation.shown(tolerance)}."
                 )
-        bottom = np.where(circle, bottom, np.minimum(bottom, centre - half))
-        top = np.where(circle, top, np.maximum(top, centre + half))
+        ends = np.stack([centre - half, centre + half])
+        columns = np.array(known.shown_angles.columns)[~circle]
+        recorded = np.stack([least, most])[:, ~circle]
+        names = [known.state_names[column] for column in columns]
+        for doubt in goal_doubts(recorded, ends[:, ~circle], names):
+            warnings.warn(DataWarning(doubt), stacklevel=3)
+        bottom = np.where(circle, bottom, np.minimum(bottom, ends[0]))
+        top = np.where(circle, top, np.maximum(top, ends[1]))
     return _given("low", low, bottom), _given("high", high, top)
 
 

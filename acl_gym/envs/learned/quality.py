@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from acl_gym.envs.learned.description import Description
@@ -15,6 +17,10 @@ MANY_TURNS = 20
 
 OFTEN_TWICE = 0.25
 """The share of rows that may be there twice; a plant at rest repeats itself."""
+
+FAR = 0.5
+"""How many times its recorded range a goal may lie beyond it, in a variable, before that
+is said."""
 
 UNITS = {
     180 / np.pi: "degrees instead of radians",
@@ -135,6 +141,34 @@ def unit_doubts(
                     f"{names[rate]} says, as if one of them were in {near[1]}; give both "
                     "in the same unit."
                 )
+    return found
+
+
+def goal_doubts(
+    recorded: FloatArray, goal: FloatArray, names: Sequence[str]
+) -> list[str]:
+    """What speaks against a goal that is far from what was recorded, a sentence each.
+
+    Args:
+        recorded: the least and the largest value of each variable, `(2, d)`; none of
+            them wraps around.
+        goal: the lower and the upper end of the goal, `(2, d)`.
+        names: of these variables.
+    """
+    found = []
+    (least, most), (goal_low, goal_high) = recorded, goal
+    span = np.maximum(most - least, 1e-3 * (1.0 + np.abs(most)))
+    beyond = np.maximum(least - goal_high, goal_low - most) / span
+    for axis, name in enumerate(names):
+        if beyond[axis] <= FAR:
+            continue
+        near = goal_high[axis] if goal_high[axis] < least[axis] else goal_low[axis]
+        found.append(
+            f"the goal begins at {name} = {near:.4g}, {beyond[axis]:.2g} times the "
+            f"recorded range ({least[axis]:.4g} to {most[axis]:.4g}) beyond it, where the "
+            "model knows nothing and only extrapolates; record on the way to the goal, or "
+            "check the unit of goal."
+        )
     return found
 
 

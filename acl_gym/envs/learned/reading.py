@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
@@ -184,14 +185,7 @@ def arrays_of_minari(dataset: Any) -> dict[str, Any]:
         Arguments of `Transitions`.
     """
     if isinstance(dataset, str | Path):
-        try:
-            import minari
-        except ImportError as error:
-            raise ImportError(
-                "a data set is loaded by its id with Minari, which is not installed; "
-                'run pip install "acl-gym[minari]".'
-            ) from error
-        dataset = minari.load_dataset(str(dataset))
+        dataset = _of_minari_id(str(dataset))
     if not hasattr(dataset, "iterate_episodes"):
         raise TypeError(
             "dataset must be a minari.MinariDataset or the id of one, got "
@@ -230,6 +224,33 @@ def arrays_of_minari(dataset: Any) -> dict[str, Any]:
         numbers = np.arange(int(acted.start), int(acted.start + acted.n))
         facts |= {"values": numbers[:, None].astype(np.float64), "numbered": True}
     return facts
+
+
+def _of_minari_id(name: str) -> Any:
+    """The data set of that id on this machine; see `Transitions.from_minari`."""
+    try:
+        import minari
+    except ImportError as error:
+        raise ImportError(
+            "a data set is loaded by its id with Minari, which is not installed; "
+            'run pip install "acl-gym[minari]".'
+        ) from error
+    try:
+        return minari.load_dataset(name)
+    except FileNotFoundError as error:
+        there = list(minari.list_local_datasets())
+        similar = get_close_matches(name, there, 1)
+        hint = f" Did you mean {similar[0]!r}?" if similar else ""
+        raise FileNotFoundError(
+            f"dataset must be the id of a data set of Minari on this machine, got "
+            f"{validation.shown(name)}; check the spelling, or download it with "
+            f"minari.download_dataset({validation.shown(name)}).{hint}"
+        ) from error
+    except Exception as error:  # whatever Minari and HDF5 raise for a damaged one
+        raise ValueError(
+            f"the data set {validation.shown(name)} of Minari cannot be read: "
+            f"{_first_line(error)}; download or make it again."
+        ) from error
 
 
 def _steps(

@@ -10,7 +10,6 @@ from gymnasium import spaces
 from gymnasium.vector import AutoresetMode, VectorEnv
 from numpy.typing import NDArray
 
-from acl_gym.envs.control.lookup import signals_of
 from acl_gym.envs.learned.description import described_by
 from acl_gym.utils import validation
 from acl_gym.utils.typing import BoolArray, IntArray
@@ -31,6 +30,7 @@ class Recorder:
         env: see `Transitions.record`.
         policy: see there.
         hold: see there.
+        inputs: see there.
         seed: see there.
 
     Attributes:
@@ -40,6 +40,7 @@ class Recorder:
 
     Raises:
         TypeError: observations or actions are of a kind that cannot be recorded.
+        ValueError: `inputs` do not fit the actions.
     """
 
     def __init__(
@@ -48,9 +49,10 @@ class Recorder:
         policy: Policy = None,
         *,
         hold: int = 1,
+        inputs: Any = None,
         seed: int | None = None,
     ) -> None:
-        self.facts = described_by(env)
+        self.facts = described_by(env, inputs)
         self._size = self.facts.pop("size")
         del self.facts["n_inputs"]
         self.env, self.policy = env, policy
@@ -58,8 +60,10 @@ class Recorder:
         self._vector = isinstance(env, VectorEnv)
         self.num_envs = env.num_envs if self._vector else 1
         self._space = env.single_action_space if self._vector else env.action_space
-        signals = signals_of(env)
-        self._values = None if signals is None else np.array(signals.values)
+        # What numbered actions set, where that is known.
+        self._values: NDArray[np.float64] | None = None
+        if isinstance(self._space, spaces.Discrete) and not self.facts.get("numbered"):
+            self._values = np.array(self.facts["values"], dtype=np.float64)
         seed = validation.seed(seed)
         # Another stream than that of the environment, which gets the same seed.
         self._rng = np.random.default_rng(None if seed is None else [seed, 2])

@@ -353,7 +353,9 @@ def _waves(
     errors, terms, rng = [], [], np.random.default_rng(seed)
     for each, own in zip(outputs, scales, strict=True):
         # For exp(-gamma |a - b|^2) with lengths taken out beforehand.
-        sampler = RBFSampler(gamma=0.5, n_components=N_RANDOM, random_state=seed)
+        sampler = RBFSampler(
+            gamma=0.5, n_components=N_RANDOM, random_state=seed % 2**32
+        )
         features = sampler.fit_transform(each.rows / own.lengths)
         # A weight has the prior variance `amplitude`, the features being normalised.
         ridge = own.noise / own.amplitude + 1e-9

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -39,6 +40,7 @@ class LearnedSystem(Plant):
         evaluation_states: see there.
         evaluation_steps: see there.
         pessimism: see `LearnedVectorEnv`.
+        most_spread: see there.
         uncertain: see there.
     """
 
@@ -58,10 +60,14 @@ class LearnedSystem(Plant):
         evaluation_states: Any = None,
         evaluation_steps: int = 300,
         pessimism: float = 0.0,
+        most_spread: float | None = None,
         uncertain: bool = False,
     ) -> None:
         self.dynamics = dynamics
         self.pessimism = validation.number("pessimism", pessimism, at_least=0)
+        if most_spread is not None:
+            most_spread = validation.number("most_spread", most_spread, above=0)
+        self.most_spread = most_spread
         self._learned_cost = cost if isinstance(cost, LearnedCost) else None
         known = dynamics.description
         self._angles = known.shown_angles
@@ -124,6 +130,20 @@ class LearnedSystem(Plant):
             return max(self._learned_cost.largest, 0.0)
         return super().max_stage_cost
 
+    @property
+    def may_fail(self) -> bool:  # type: ignore[override]
+        """Whether episodes end where the model is not sure enough."""
+        return self.most_spread is not None
+
+    @cached_property
+    def dearest_step(self) -> float:
+        """The most that a step costs from which an episode goes on; >= 0.
+
+        An estimate where the cost is a function of a user's own.
+        """
+        spread = 0.0 if self.most_spread is None else self.most_spread
+        return max(self.max_stage_cost, 0.0) + self.pessimism * spread
+
     def observe(self, states: FloatArray) -> FloatArray:
         """Return observations, a new array `(n, n_observed)`."""
         return self._angles.observations(super().observe(states))
@@ -139,19 +159,32 @@ class LearnedSystem(Plant):
         uniforms: FloatArray | None,
         rewards: FloatArray,
         reached: BoolArray,
-    ) -> None:
+    ) -> BoolArray | None:
         """One sampling time; see `ControlSystem.advance`."""
-        if self._learned_cost is None and self.pessimism == 0.0:
+        asks = self.pessimism > 0.0 or self.most_spread is not None
+        if self._learned_cost is None and not asks:
             super().advance(states, actions, uniforms, rewards, reached)
-            return
+            return None
         before = states[: self.low.size].copy()
         super().advance(states, actions, uniforms, rewards, reached)
         inputs = self.inputs.T[:, actions]
         if self._learned_cost is not None:
             after = states[: self.low.size]
-            rewards[:] = -self._learned_cost(before, after, inputs)
+            costs = self._learned_cost(before, after, inputs)
+            if self.most_spread is not None:
+                # Nothing that was learned may cost more than to leave the data.
+                costs = np.minimum(costs, self.max_stage_cost)
+            rewards[:] = -costs
+        if not asks:
+            return None
+        spread = self.dynamics.spread(before, inputs)
         if self.pessimism > 0.0:
-            rewards -= self.pessimism * self.dynamics.spread(before, inputs)
+            rewards -= self.pessimism * spread
+        if self.most_spread is None:
+            return None
+        failed = spread > self.most_spread
+        reached &= ~failed
+        return failed
 
 
 class Predicted:

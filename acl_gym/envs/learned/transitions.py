@@ -9,7 +9,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from acl_gym.envs.learned import reading
+from acl_gym.envs.learned import reading, saving
 from acl_gym.envs.learned.arrays import (
     checked_column,
     checked_flags,
@@ -23,12 +23,6 @@ from acl_gym.envs.learned.recorder import Policy, Recorder
 from acl_gym.utils import archives, validation
 from acl_gym.utils.angles import find_angles
 from acl_gym.utils.typing import BoolArray, FloatArray, IntArray
-
-MOST_BYTES = 2**32
-"""What a file of transitions may hold unpacked, unless `load` is told otherwise."""
-
-_ARRAYS = ("states", "inputs", "next_states", "rewards", "terminated", "episodes")
-_FLAT = ("state_names", "input_names", "circular", "angles", "numbered")
 
 
 class Transitions:
@@ -274,17 +268,10 @@ class Transitions:
         Returns:
             The path written; None for an open file.
         """
-        known = self.description
-        header = {name: getattr(known, name) for name in _FLAT}
-        header["sampling_time"] = known.sampling_time
-        arrays: dict[str, NDArray[Any]] = dict(self._arrays)
-        arrays |= {"low": np.array(known.low), "high": np.array(known.high)}
-        if known.values is not None:
-            arrays["values"] = np.array(known.values)
-        return archives.save(path, header, arrays, archives.TRANSITIONS)
+        return saving.save(path, self.description, self._arrays)
 
     @classmethod
-    def load(cls, path: archives.Target, *, max_bytes: int = MOST_BYTES) -> Self:
+    def load(cls, path: archives.Target, *, max_bytes: int = saving.MOST_BYTES) -> Self:
         """Read what `save` wrote. A file from a stranger runs no code.
 
         Args:
@@ -295,22 +282,7 @@ class Transitions:
             FileNotFoundError: there is no such file.
             ValueError: it is none of this package, or is damaged.
         """
-        archive = archives.Archive(path, max_bytes, archives.TRANSITIONS)
-        try:
-            header = {name: archive.header[name] for name in _FLAT}
-            header["sampling_time"] = archive.header["sampling_time"]
-            arrays = {n: archive.arrays[n] for n in _ARRAYS if n in archive.arrays}
-            for name in ("low", "high", "values"):
-                header[name] = archive.arrays.get(name)
-            facts: dict[str, Any] = {**arrays, **header}
-            return cls(**facts)
-        except archives.TooLargeError as error:
-            raise ValueError(f"{archive.name} {error}") from error
-        except Exception as error:  # whatever a damaged file leads to
-            raise ValueError(
-                f"{archive.name} is not a complete file of transitions: {error} Save "
-                "them again or use another copy."
-            ) from error
+        return saving.load(path, max_bytes, lambda facts: cls(**facts))
 
     @classmethod
     def record(
@@ -320,6 +292,7 @@ class Transitions:
         policy: Policy = None,
         *,
         hold: int = 1,
+        inputs: Any = None,
         seed: int | None = None,
     ) -> Self:
         """Run an environment and keep what it did.
@@ -335,10 +308,14 @@ class Transitions:
                 them from the action space.
             hold: for how many steps a random action is kept, >= 1. An input that changes
                 in each step hardly moves a sluggish plant.
+            inputs: what each numbered action sets, `(n_actions,)` or
+                `(n_actions, n_inputs)`, where you know it and the environment does not
+                tell. These values are then recorded: a model learns from one action what
+                another does, which from mere numbers it cannot.
             seed: of the environment and of random actions.
         """
         steps = validation.integer("steps", steps, at_least=1)
-        recorder = Recorder(env, policy, hold=hold, seed=seed)
+        recorder = Recorder(env, policy, hold=hold, inputs=inputs, seed=seed)
         while recorder.steps < steps:
             recorder.step()
         facts: dict[str, Any] = {**recorder.arrays(), **recorder.facts}
@@ -395,6 +372,8 @@ class Transitions:
 
         Raises:
             ImportError: an id is given, and minari is not installed.
+            FileNotFoundError: there is no data set of that id on this machine.
+            ValueError: it is damaged, or holds no episode.
             TypeError: observations or actions are not arrays of one axis or numbers.
         """
         return cls(**{**reading.arrays_of_minari(dataset), **described})

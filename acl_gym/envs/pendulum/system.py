@@ -81,12 +81,8 @@ class Pendulum(BlockSystem):
             "substeps", self.substeps, at_least=1, at_most=parameters.MOST_SUBSTEPS
         )
         torques = validation.real_array("torques", self.torques, ndim=1)
-        if not isinstance(self.continuous, bool):
-            raise TypeError(
-                "continuous must be True or False, got "
-                f"{validation.shown(self.continuous)}."
-            )
-        if self.continuous and torques.min() == torques.max():
+        continuous = validation.boolean("continuous", self.continuous)
+        if continuous and torques.min() == torques.max():
             raise ValueError(
                 "torques must hold two different ones, the ends of the range, where the "
                 f"torque is continuous, got {validation.shown(self.torques)}."
@@ -95,7 +91,7 @@ class Pendulum(BlockSystem):
         weight = _weight_matrix(self.state_weight)
         canonical: dict[str, Any] = {
             "torques": tuple(torques.tolist()),
-            "continuous": self.continuous,
+            "continuous": continuous,
             "goal_bounds": tuple(bounds.tolist()),
             "state_weight": tuple(map(tuple, weight.tolist())),
             "substeps": int(self.substeps),

@@ -10,12 +10,12 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from acl_gym.envs.control import sampling
 from acl_gym.envs.control.parameters import MOST_SUBSTEPS
 from acl_gym.envs.control.signals import Signals
 from acl_gym.envs.control.system import ControlSystem, SlotError
 from acl_gym.envs.plant import kernels, targets
 from acl_gym.envs.plant.dynamics import Equations, sample_count
+from acl_gym.envs.plant.initial import InitialStates
 from acl_gym.envs.plant.models import Model, is_model
 from acl_gym.envs.plant.uncertain import PlantParameters
 from acl_gym.utils import validation
@@ -97,7 +97,7 @@ class Plant(ControlSystem):
             discrete_time = model.discrete_time
             state_names = state_names or model.state_names
             input_names = input_names or model.input_names
-        self.discrete_time = bool(discrete_time)
+        self.discrete_time = validation.boolean("discrete_time", discrete_time)
         samples = self._draw(np.random.default_rng(0), sample_count())
         self._equations = Equations(
             dynamics, samples, self.inputs, self.discrete_time, self.parameters
@@ -114,11 +114,19 @@ class Plant(ControlSystem):
             ),
             tuple(map(tuple, self.inputs.tolist())),
         )
-        self._initial = self._checked_initial(initial)
+        self._initial = InitialStates(
+            initial,
+            (size, size + self.parameters.count) if size > 1 else (size,),
+            self._checked_rows,
+            self._draw,
+            self._goal.reached,
+        )
         self._evaluation_states = (
             self._default_evaluation_states()
             if evaluation_states is None
-            else self.checked_states(evaluation_states)
+            else self._with_nominal(
+                self._checked_rows(evaluation_states, "evaluation_states")
+            )
         )
 
     @property
@@ -185,26 +193,10 @@ class Plant(ControlSystem):
 
         Uncertain parameters are drawn with them, unless `initial` holds these too.
         """
-        states = self._sample(rng, count)
+        states = self._initial.draw(rng, count)
         if len(states) > self.low.size or not self.parameters.count:
             return states
         return np.concatenate([states, self.parameters.draw(rng, count)])
-
-    def _sample(self, rng: np.random.Generator, count: int) -> FloatArray:
-        """Initial states, with parameters only where `initial` holds them."""
-        if callable(self._initial):
-            rows = self._checked_rows(self._initial(rng, count))
-            if len(rows) != count:
-                raise ValueError(
-                    f"initial must return {count} states, one a row, got {len(rows)}."
-                )
-            return np.ascontiguousarray(rows.T)
-        if self._initial is not None and not isinstance(self._initial, spaces.Box):
-            rows = self._initial[rng.integers(len(self._initial), size=count)]
-            return np.ascontiguousarray(rows.T)
-        return sampling.sample_outside(
-            lambda n: self._draw_initial(rng, n), self._goal.reached, count
-        )
 
     def checked_states(self, states: Any) -> FloatArray:
         """Return states `(n, state_size)`, circular variables brought into X.
@@ -224,10 +216,15 @@ class Plant(ControlSystem):
         own = np.tile(self.parameters.nominal_drawn, (len(rows), 1))
         return np.concatenate([rows, own], axis=1)
 
-    def _checked_rows(self, states: Any) -> FloatArray:
-        """The states, checked, with parameters only where these are given."""
+    def _checked_rows(self, states: Any, name: str = "states") -> FloatArray:
+        """The states, checked, with parameters only where these are given.
+
+        Args:
+            states: `(n, ...)`.
+            name: what messages call them.
+        """
         size, more = self.low.size, self.parameters.count
-        array = validation.real_array("states", states, finite=False)
+        array = validation.real_array(name, states, finite=False)
         if array.ndim == 1 and size == 1:
             array = array[:, None]
         if array.ndim != 2 or array.shape[1] not in (size, size + more):
@@ -236,13 +233,13 @@ class Plant(ControlSystem):
                 names = ", ".join(self.parameters.uncertain)
                 wider = f", or {size + more} with the uncertain parameters {names}"
             raise ValueError(
-                f"states must be rows of {size} variables, shape (n, {size}){wider}, got "
+                f"{name} must be rows of {size} variables, shape (n, {size}){wider}, got "
                 f"{array.shape}."
             )
         if not np.isfinite(array).all():
             row = int(np.flatnonzero(~np.isfinite(array).all(axis=1))[0])
             raise ValueError(
-                f"states must be finite, got {array[row].tolist()} in row {row}."
+                f"{name} must be finite, got {array[row].tolist()} in row {row}."
             )
         array, own = array[:, :size], array[:, size:]
         if own.size:
@@ -251,7 +248,7 @@ class Plant(ControlSystem):
         if outside.any():
             row, axis = np.argwhere(outside)[0]
             raise ValueError(
-                f"states must lie within low and high, variable {axis} in "
+                f"{name} must lie within low and high, variable {axis} in "
                 f"[{self.low[axis]:g}, {self.high[axis]:g}], got {array[row, axis]:g} in "
                 f"row {row}."
             )
@@ -272,7 +269,7 @@ class Plant(ControlSystem):
         uniforms: FloatArray | None,
         rewards: FloatArray,
         reached: BoolArray,
-    ) -> None:
+    ) -> BoolArray | None:
         """One sampling time; see `ControlSystem.advance`.
 
         Raises:
@@ -303,6 +300,7 @@ class Plant(ControlSystem):
             )
         kernels.settle(states, self.low, self.high, self._period)
         self._cost.judge(states, actions, self._goal, rewards, reached, given)
+        return None
 
     def evaluation_states(self) -> FloatArray:
         """The states given, or 100 initial ones drawn once, `(n, state_size)`."""
@@ -326,40 +324,11 @@ class Plant(ControlSystem):
         span = (self.high - self.low)[:, None]
         return self.low[:, None] + span * rng.random((self.low.size, count))
 
-    def _draw_initial(self, rng: np.random.Generator, count: int) -> FloatArray:
-        if not isinstance(self._initial, spaces.Box):
-            return self._draw(rng, count)
-        low, high = self._initial.low[:, None], self._initial.high[:, None]
-        return low + (high - low) * rng.random((self.low.size, count))
-
-    def _checked_initial(self, initial: Any) -> Any:
-        size = self.low.size
-        if isinstance(initial, spaces.Box):
-            self.checked_states(np.stack([initial.low, initial.high]).reshape(2, -1))
-            initial = spaces.Box(
-                initial.low.astype(float), initial.high.astype(float), dtype=np.float64
-            )
-        elif initial is not None and not callable(initial):
-            rows = validation.real_array("initial", initial)
-            whole = (size + self.parameters.count,) if size > 1 else (size,)
-            one = rows.shape in ((size,), whole)
-            return self._checked_rows(rows[None] if one else rows)
-        self._initial = initial
-        if callable(initial) and not isinstance(initial, spaces.Box):
-            self.sample_states(np.random.default_rng(0), 3)
-            return initial
-        drawn = self._draw_initial(np.random.default_rng(0), 1000)
-        if self._goal.reached(drawn).mean() > 0.99:
-            raise ValueError(
-                "the goal must leave 1% or more of the initial states outside it; "
-                "narrow the goal or the tolerance, or give other initial states."
-            )
-        return initial
-
     def _default_evaluation_states(self) -> FloatArray:
-        if isinstance(self._initial, np.ndarray) and len(self._initial) <= _EVALUATED:
-            return self._with_nominal(self._initial)
-        drawn = self._sample(np.random.default_rng(0), _EVALUATED)
+        few = self._initial.rows
+        if few is not None and len(few) <= _EVALUATED:
+            return self._with_nominal(few)
+        drawn = self._initial.draw(np.random.default_rng(0), _EVALUATED)
         return self._with_nominal(np.ascontiguousarray(drawn.T))
 
 

@@ -64,15 +64,9 @@ class ActionGrid(VectorActionWrapper[Any, Any, Any, Any]):
         self, env: VectorEnv[Any, Any, Any], counts: int | Sequence[int] = 5
     ) -> None:
         require_vector_env(env)
-        space: Any = env.single_action_space
-        low, high = input_bounds("the actions of env", space)
+        self.counts, self.values = grid_over(env.single_action_space, counts)
         super().__init__(env)
-        self.counts = _checked_counts(counts, low.size)
-        axes = map(_spread, low, high, self.counts)
-        rows = np.array(list(itertools.product(*axes)))
-        # Rounding to a narrower type cannot lead beyond bounds, which are of that type.
-        self.values: NDArray[Any] = validation.read_only(rows.astype(space.dtype))
-        self.single_action_space = spaces.Discrete(len(rows))
+        self.single_action_space = spaces.Discrete(len(self.values))
         self.action_space = batch_space(self.single_action_space, self.num_envs)
 
     def actions(self, actions: ArrayLike) -> NDArray[Any]:
@@ -84,6 +78,30 @@ class ActionGrid(VectorActionWrapper[Any, Any, Any, Any]):
         """
         chosen = checked_actions(actions, self.num_envs, len(self.values))
         return self.values[chosen]
+
+
+def grid_over(
+    space: spaces.Space[Any], counts: int | Sequence[int]
+) -> tuple[tuple[int, ...], NDArray[Any]]:
+    """The points of a grid over a Box of inputs, both bounds included.
+
+    Args:
+        space: a bounded Box of one axis.
+        counts: see `ActionGrid`.
+
+    Returns:
+        How many values each input has; and the points, the last input varying fastest,
+        `(n_points, n_inputs)`, in the type of the Box, read-only.
+
+    Raises:
+        TypeError: a count is not an integer.
+        ValueError: see `ActionGrid`.
+    """
+    low, high = input_bounds("the actions of env", space)
+    checked = _checked_counts(counts, low.size)
+    rows = np.array(list(itertools.product(*map(_spread, low, high, checked))))
+    # Rounding to a narrower type cannot lead beyond bounds, which are of that type.
+    return checked, validation.read_only(rows.astype(space.dtype))
 
 
 def _spread(low: float, high: float, count: int) -> FloatArray:

@@ -114,7 +114,7 @@ class Shield(VectorWrapper[Any, Any, Any, Any]):
                 )
         self.baseline, self.safe, self.predict = baseline, safe, predict
         self.look_ahead = validation.integer("look_ahead", look_ahead, at_least=1)
-        self.mask_actions = bool(mask_actions)
+        self.mask_actions = validation.boolean("mask_actions", mask_actions)
         self._actuator = Actuator(env)
         self._model = self._checked_model()
         if self.mask_actions and self._actuator.n_actions is None:

@@ -199,7 +199,7 @@ def test_step_needs_a_running_episode(case: SystemCase) -> None:
         env.step(1)
     env.reset(options={"state": case.near})
     assert env.step(case.near_action)[2]
-    with pytest.raises(ResetNeeded, match="reached its goal"):
+    with pytest.raises(ResetNeeded, match="this one is over"):
         env.step(1)
     env.reset()
     env.step(1)

@@ -145,6 +145,20 @@ def test_one_regression_for_each_action() -> None:
         LearnedDynamics(few, per_action=True)
 
 
+def test_any_seed_draws_and_no_seed_draws_anew() -> None:
+    """Also one that is too large for the generators of scikit-learn."""
+    data = pendulum(30)
+    x, u = np.array([[1.0], [5.0]]), np.array([[0.4]])
+
+    def drawn(seed: int | None, kind: str) -> float:
+        dynamics = LearnedDynamics(data, kind, n_draws=1, seed=seed)
+        return float(dynamics.next_variables(x, u, np.array([1]))[1, 0])
+
+    for kind in ("gaussian process", "random features"):
+        assert drawn(2**40 + 1, kind) == drawn(2**40 + 1, kind)
+        assert len({drawn(seed, kind) for seed in (0, 1, None, None)}) == 4
+
+
 def test_numbers_of_actions_have_no_order() -> None:
     rng = np.random.default_rng(0)
     x, u = rng.uniform(-1, 1, 60), rng.integers(0, 3, 60)

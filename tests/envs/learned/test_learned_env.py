@@ -239,7 +239,8 @@ def test_variables_stay_within_what_was_recorded() -> None:
     for _ in range(30):
         seen, *_ = env.step(np.full(3, 2))
     assert (seen == space.high).all()
-    wide = LearnedVectorEnv(data, cost="time", low=[-9], high=[None], goal=[5.0])
+    with pytest.warns(DataWarning, match=r"the goal begins at x\[0\]"):
+        wide = LearnedVectorEnv(data, cost="time", low=[-9], high=[None], goal=[5.0])
     assert wide.single_observation_space.low[0] == -9  # type: ignore[attr-defined]
     assert wide.single_observation_space.high[0] > 5  # type: ignore[attr-defined]
 
@@ -284,6 +285,31 @@ def test_doubts_are_warned_of() -> None:
         LearnedVectorEnv(still, cost="time", inputs=[-1.0, 1.0])
 
 
+def test_a_goal_far_from_the_data_is_warned_of() -> None:
+    """How far, in units of what was recorded; and not where the goal is near."""
+    data = Transitions(**line(), state_names=["position, m"])
+    both = np.concatenate([data.states, data.next_states])
+    least, most = both.min(), both.max()
+    known: dict[str, Any] = {"cost": "time", "dynamics": LearnedDynamics(data)}
+    for goal in (most + 2.1 * (most - least), least - 2.1 * (most - least)):
+        with pytest.warns(DataWarning) as caught:
+            env = LearnedVectorEnv(
+                data, goal=[goal], tolerance=0.1 * (most - least), **known
+            )
+        (said,) = (str(each.message) for each in caught)
+        assert "position, m" in said
+        assert "2 times the recorded range" in said
+        assert f"({least:.4g} to {most:.4g})" in said
+        assert "record on the way to the goal" in said
+        space: Any = env.single_observation_space
+        assert space.low[0] <= goal <= space.high[0]
+    # No warning, which would be an error here.
+    LearnedVectorEnv(data, goal=[most + 0.4 * (most - least)], **known)
+    # All of a circle is near, whatever was recorded of it.
+    half = pendulum(120)[np.cos(pendulum(120).states[:, 0]) > 0.5]
+    LearnedVectorEnv(half, dynamics=model().dynamics, **TASK)
+
+
 @pytest.mark.parametrize(
     ("arguments", "error", "message"),
     [
@@ -301,6 +327,10 @@ def test_doubts_are_warned_of() -> None:
         ),
         ({"goal": [1.0, 2.0, 3.0]}, ValueError, "goal must be a state of 1 variables"),
         ({"regressor": "neural"}, ValueError, "regressor must be one of"),
+        ({"seed": "a"}, TypeError, "seed must be an integer, got 'a'"),
+        ({"seed": -1}, ValueError, "seed must be at least 0"),
+        ({"uncertain": "yes"}, TypeError, "uncertain must be True or False, got 'yes'"),
+        ({"per_action": 1}, TypeError, "per_action must be True or False, got 1"),
     ],
 )
 def test_bad_arguments_get_one_clear_error(
@@ -309,6 +339,24 @@ def test_bad_arguments_get_one_clear_error(
     data = Transitions(**line())
     with pytest.raises(error, match=message):
         LearnedVectorEnv(data, **{"cost": "time", **arguments})
+
+
+@pytest.mark.parametrize(
+    ("initial", "words"),
+    [
+        (lambda rng, n: 1 / 0, r"but it raised ZeroDivisionError"),
+        (lambda rng, n: np.full((n, 1), 99.0), "states must lie within low and high"),
+        (lambda rng, n: "anywhere", "must be an array of real numbers"),
+    ],
+)
+def test_a_function_of_initial_states_is_named(initial: Any, words: str) -> None:
+    data = Transitions(**line())
+    expected = rf"initial\(rng, n\) must return n states.*{words}"
+    with pytest.raises(ValueError, match=expected) as caught:
+        LearnedVectorEnv(data, cost="time", initial=initial)
+    assert caught.value.__cause__ is not None
+    with pytest.raises(ValueError, match="initial must lie within low and high"):
+        LearnedVectorEnv(data, cost="time", initial=[[99.0]])
 
 
 def test_what_is_no_recording_is_refused() -> None:

@@ -201,6 +201,22 @@ class TestMinari:
         np.testing.assert_array_equal(by_name.states, data.states)
         assert by_name.state_names == ("a", "b", "c", "d")
 
+    @pytest.mark.parametrize("name", ["cartpole/randon-v0", "a b", "..", "x" * 300])
+    def test_an_id_that_is_none_is_one_error(self, dataset: Any, name: str) -> None:
+        with pytest.raises((FileNotFoundError, ValueError)) as caught:
+            Transitions.from_minari(name)
+        said = str(caught.value)
+        assert "of Minari" in said
+        assert ("minari.download_dataset" in said) or ("cannot be read" in said)
+        assert ("Did you mean 'cartpole/random-v0'?" in said) == ("randon" in name)
+        assert caught.value.__cause__ is not None
+
+    def test_a_data_set_that_is_damaged_is_one_error(self, dataset: Any) -> None:
+        for file in Path(dataset.storage.data_path).iterdir():
+            file.write_bytes(b"{")
+        with pytest.raises(ValueError, match=r"of Minari cannot be read: .*again\."):
+            Transitions.from_minari("cartpole/random-v0")
+
     def test_what_is_no_data_set_is_refused(self) -> None:
         with pytest.raises(TypeError, match=r"must be a minari\.MinariDataset"):
             Transitions.from_minari(3)

@@ -249,7 +249,7 @@ NAN = np.where(np.arange(40)[:, None] == 7, np.nan, 0.0)
         ({"low": [1.0], "high": [1.0]}, "low must be below high"),
         ({"low": [np.nan]}, "low must hold a number or None"),
         ({"sampling_time": 0.0}, "sampling_time must lie in"),
-        ({"values": [[1.0, 2.0]]}, "values must hold a row of 1 inputs"),
+        ({"values": [[1.0, 2.0]]}, "values must hold a row of 1 numbers"),
         ({"angles": [(0, 1)]}, "angles must be pairs of different numbers"),
     ],
 )

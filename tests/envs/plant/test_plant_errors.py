@@ -96,9 +96,12 @@ NARROW = spaces.Box(-0.1, 0.1, (2,), np.float64)
         ({"tolerance": -1.0}, "tolerance must be a number >= 0"),
         ({"tolerance": 5.0}, "must leave 1% or more of the initial states"),
         ({"initial": NARROW}, "must leave 1% or more of the initial states"),
-        ({"initial": [[2.0, 0.0]]}, "states must lie within low and high"),
-        ({"initial": lambda rng, n: [[0.5, 0.5]]}, "initial must return 3 states"),
-        ({"evaluation_states": [[0.0]]}, r"rows of 2 variables"),
+        ({"initial": [[2.0, 0.0]]}, "initial must lie within low and high"),
+        ({"initial": spaces.Box(-9, 9, (2,))}, "initial must lie within low and high"),
+        (
+            {"evaluation_states": [[0.0]]},
+            "evaluation_states must be rows of 2 variables",
+        ),
         ({"cost": "energy"}, "cost must be one of 'time'"),
         ({"cost": 1.0}, 'cost must be "time", a pair'),
         ({"cost": ([1, 1, 1], 0)}, r"Q of cost=\(Q, R\) must be"),
@@ -131,6 +134,41 @@ def test_parameters(changes: dict[str, Any], words: str) -> None:
 def test_types(name: str) -> None:
     with pytest.raises(TypeError, match=f"{name} must be"):
         make_mass(**{name: "many"})
+
+
+def fails(rng: Any, n: int) -> Any:
+    raise KeyError("speed")
+
+
+RUBBISH = [
+    (fails, r"but it raised KeyError\('speed'\) for n = \d"),
+    (lambda rng: [[0.0, 0.0]], "but it raised TypeError"),
+    (lambda rng, n: None, "must be an array of real numbers, got None"),
+    (lambda rng, n: [["a", "b"]] * n, "must be an array of real numbers"),
+    (lambda rng, n: [[0.5, 0.5]], "got 1 rows for n = "),
+    (lambda rng, n: np.zeros((n, 3)), r"rows of 2 variables, shape \(n, 2\), got"),
+    (lambda rng, n: np.full((n, 2), np.nan), r"must be finite, got \[nan, nan\]"),
+    (lambda rng, n: np.full((n, 2), 5.0), r"variable 0 in \[-1, 1\], got 5 in row 0"),
+]
+"""Functions `initial`, and what is said of what they do."""
+
+
+@pytest.mark.parametrize(("initial", "words"), RUBBISH)
+def test_what_initial_does_is_told_of_initial(initial: Any, words: str) -> None:
+    """Also where it fails only later, in the middle of learning."""
+    expected = rf"initial\(rng, n\) must return n states.*{words}"
+    with pytest.raises(ValueError, match=expected) as caught:
+        make_mass(initial=initial)
+    assert caught.value.__cause__ is not None or "rows for n" in words
+    begun = []
+    env = make_mass(
+        initial=lambda rng, n: initial(rng, n) if begun else np.zeros((n, 2)),
+        num_envs=4,
+    )
+    env.reset()
+    begun.append(True)
+    with pytest.raises(ValueError, match=expected):
+        env.reset()
 
 
 def test_states_of_a_reset() -> None:

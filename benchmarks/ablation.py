@@ -21,7 +21,6 @@ of the best that there is, and its last and best return; medians over the seeds.
 
 from __future__ import annotations
 
-import argparse
 import json
 import statistics
 from collections.abc import Callable, Iterable, Sequence
@@ -45,6 +44,16 @@ from acl_gym import (
 from acl_gym.agents.base import TabularAgent
 from acl_gym.partitions import Partition
 from acl_gym.utils.text import replace_unprintable_letters
+
+# The script beside this one.
+from tables import (  # isort: skip
+    add_seeds,
+    at_least_one,
+    markdown,
+    number,
+    parser_of,
+    some_of,
+)
 
 SLOTS = 5
 WITHIN = (0.25, 0.10)
@@ -237,69 +246,38 @@ def ablation(
 
 def as_markdown(rows: Sequence[Row], seeds: int) -> str:
     """The table."""
-    lines = [
-        "| task | variant | steps to 25% | seconds | steps to 10% | seconds "
-        "| last return | best |",
-        "| --- | --- | ---: | ---: | ---: | ---: | ---: | ---: |",
-    ]
+    heads = ["task", "variant"]
+    heads += ["steps to 25%", "seconds", "steps to 10%", "seconds"]
+    heads += ["last return", "best"]
+    lines = []
     for row in rows:
         cells = [row["task"], row["variant"]]
         for name in ("25", "10"):
             reached = row[f"reached_{name}"]
             some = f" ({reached} of {seeds})" if reached < seeds else ""
-            cells.append(_number(row[f"steps_{name}"], ",.0f") + some)
-            cells.append(_number(row[f"seconds_{name}"], ".2f"))
+            cells.append(number(row[f"steps_{name}"], ",.0f") + some)
+            cells.append(number(row[f"seconds_{name}"], ".2f"))
         cells += [f"{row['last']:.2f}", f"{row['best']:.2f}"]
-        lines.append(f"| {' | '.join(cells)} |")
-    return "\n".join(lines)
-
-
-def _number(value: float | None, form: str) -> str:
-    return "-" if value is None else format(value, form)
-
-
-def _names(known: Iterable[str]) -> Callable[[str], list[str]]:
-    def names(text: str) -> list[str]:
-        given = text.split(",")
-        for name in given:
-            if name not in known:
-                raise argparse.ArgumentTypeError(
-                    f"{name!r} is not one of {', '.join(known)}"
-                )
-        return given
-
-    return names
-
-
-def at_least_one(text: str) -> int:
-    if not (text.isdecimal() and int(text) >= 1):
-        raise argparse.ArgumentTypeError(f"must be an integer >= 1, got {text!r}")
-    return int(text)
+        lines.append(cells)
+    return markdown(heads, lines, names=(0, 1))
 
 
 def main(arguments: list[str] | None = None) -> int:
     """Run and print; returns the exit code."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = parser_of(__doc__)
     parser.add_argument(
         "--tasks",
-        type=_names(TASKS),
+        type=some_of(TASKS),
         default=list(TASKS),
         help=f"some of {', '.join(TASKS)}, with commas (default: all)",
     )
     parser.add_argument(
         "--variants",
-        type=_names(VARIANTS),
+        type=some_of(VARIANTS),
         default=list(VARIANTS),
         help=f"some of {', '.join(VARIANTS)}, with commas (default: all)",
     )
-    parser.add_argument(
-        "--seeds",
-        type=at_least_one,
-        default=10,
-        help="runs of each, with seeds 0, 1, ... (default: %(default)s)",
-    )
+    add_seeds(parser, 10)
     parser.add_argument(
         "--steps",
         type=at_least_one,

@@ -26,7 +26,6 @@ it draws both over the size of the change.
 
 from __future__ import annotations
 
-import argparse
 import json
 import statistics
 import tempfile
@@ -58,7 +57,8 @@ from acl_gym.evaluation import with_slots_for
 from acl_gym.plotting.style import BLUE, GREEN, ORANGE, in_style, new_figure
 from acl_gym.utils.text import replace_unprintable_letters
 
-from ablation import at_least_one  # isort: skip  # the scripts beside this one
+# The scripts beside this one.
+from tables import add_results, add_seeds, markdown, parser_of, rows_of  # isort: skip
 from uncertain_plants import (  # isort: skip
     NOMINAL,
     SETTINGS,
@@ -344,23 +344,21 @@ def summary(rows: Sequence[Row], change: str, method: str) -> Row | None:
 
 def as_markdown(rows: Sequence[Row]) -> str:
     """The table."""
-    lines = [
-        "| change | J* | method | cost at the change | extra cost | within 25% after | "
-        "runs | cost at the end |",
-        "| --- | ---: | --- | ---: | ---: | ---: | ---: | ---: |",
-    ]
+    heads = ["change", "J*", "method", "cost at the change", "extra cost"]
+    heads += ["within 25% after", "runs", "cost at the end"]
+    lines = []
     for change in _in_order(CHANGES, rows, "change"):
         for method in _in_order(METHODS, rows, "method"):
             each = summary(rows, change, method)
             if each is None:
                 continue
             near = "never" if each["near"] == np.inf else f"{each['near']:,.0f}"
-            lines.append(
-                f"| {change} | {each['best']:.1f} | {method} | {each['first']:.1f} | "
-                f"{each['extra']:.1f} | {near} | {each['runs']}/{each['of']} | "
-                f"{each['last']:.1f} |"
+            best, first, extra, last = (
+                f"{each[name]:.1f}" for name in ("best", "first", "extra", "last")
             )
-    return "\n".join(lines)
+            runs = f"{each['runs']}/{each['of']}"
+            lines.append([change, best, method, first, extra, near, runs, last])
+    return markdown(heads, lines, names=(0, 2))
 
 
 LOOKS: dict[str, Row] = {
@@ -428,10 +426,7 @@ def _in_order(
 
 def main(arguments: list[str] | None = None) -> int:
     """Run and print; returns the exit code."""
-    parser = argparse.ArgumentParser(
-        description=__doc__.replace("%", "%%"),
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+    parser = parser_of(__doc__)
     for option, allowed in (("--changes", CHANGES), ("--methods", METHODS)):
         parser.add_argument(
             option,
@@ -441,27 +436,13 @@ def main(arguments: list[str] | None = None) -> int:
             metavar="NAME",
             help=f"some of {', '.join(map(repr, allowed))} (default: all)",
         )
-    parser.add_argument(
-        "--seeds",
-        type=at_least_one,
-        default=5,
-        help="runs of each, with successive seeds (default: %(default)s)",
-    )
-    parser.add_argument(
-        "--from-json",
-        type=Path,
-        nargs="+",
-        metavar="FILE",
-        help="show what --json has printed, of several parts together",
-    )
-    parser.add_argument("--figure", type=Path, metavar="PNG", help="draw the medians")
-    parser.add_argument("--json", action="store_true", help="print JSON, no table")
+    add_seeds(parser)
+    add_results(parser, "the medians")
     options = parser.parse_args(arguments)
     if options.from_json is None:
         rows = study(options.changes, options.methods, range(options.seeds))
     else:
-        parts = [json.loads(path.read_text()) for path in options.from_json]
-        rows = [row for part in parts for row in part["rows"]]
+        rows = rows_of(options.from_json)
     if options.figure is not None:
         draw(rows, options.figure)
     if options.json:

@@ -49,6 +49,7 @@ from typing import Any
 
 from few_methods import METHODS, Row, run  # isort: skip  # the scripts beside this one
 from few_plants import BEST, PENDULUM, PlantTask  # isort: skip
+from tables import markdown  # isort: skip
 
 from tqdm.auto import tqdm
 
@@ -144,10 +145,7 @@ def table(rows: Sequence[Row], best: float | None) -> str:
     near = [] if best is None else [f"within {more:.0%}" for more in NEAR]
     heads = ["method", "interactions", "made", "runs", "cost, median", "range", *near]
     heads += ["success", "seconds"]
-    lines = [
-        f"| {' | '.join(heads)} |",
-        f"| --- |{' ---: |' * (len(heads) - 1)}",
-    ]
+    lines = []
     for each in summary(rows, best):
         known = each["success"]
         cells = [
@@ -161,8 +159,8 @@ def table(rows: Sequence[Row], best: float | None) -> str:
             "-" if known is None else f"{known:.0%}",
             f"{each['seconds']:.1f}",
         ]
-        lines.append(f"| {' | '.join(cells)} |")
-    return "\n".join(lines)
+        lines.append(cells)
+    return markdown(heads, lines)
 
 
 def figure(rows: Sequence[Row], best: float | None, path: Path) -> None:

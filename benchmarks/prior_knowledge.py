@@ -21,7 +21,6 @@ best, its cost after a tenth of the run, and at the end; medians over the seeds.
 
 from __future__ import annotations
 
-import argparse
 import json
 import statistics
 import time
@@ -52,7 +51,15 @@ from acl_gym.partitions.automatic import thesis_partition
 from acl_gym.plotting.style import BLUE, GREEN, ORANGE, in_style, new_figure
 from acl_gym.utils.text import replace_unprintable_letters
 
-from ablation import at_least_one  # isort: skip  # the script beside this one
+# The script beside this one.
+from tables import (  # isort: skip
+    add_results,
+    add_seeds,
+    markdown,
+    parser_of,
+    rows_of,
+    some_of,
+)
 
 Row = dict[str, Any]
 Array = np.ndarray
@@ -255,12 +262,10 @@ def study(
 
 def as_markdown(rows: Sequence[Row]) -> str:
     """The table."""
-    lines = [
-        "| task | agent | knowledge | told as | within 25% after | runs | within 10% "
-        "after | runs | cost before | after a tenth | at the end | worst |",
-        "| --- | --- | --- | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: "
-        "| ---: |",
-    ]
+    heads = ["task", "agent", "knowledge", "told as"]
+    heads += ["within 25% after", "runs", "within 10% after", "runs"]
+    heads += ["cost before", "after a tenth", "at the end", "worst"]
+    lines = []
     for row in rows:
         near = []
         for each in row["near"]:
@@ -269,8 +274,8 @@ def as_markdown(rows: Sequence[Row]) -> str:
             near.append(f"{each['runs']}/{len(row['runs'])}")
         costs = [f"{row[n]:.1f}" for n in ("before", "tenth", "last", "worst")]
         names = [row["task"], row["agent"], row["knowledge"], row["way"]]
-        lines.append(f"| {' | '.join([*names, *near, *costs])} |")
-    return "\n".join(lines)
+        lines.append([*names, *near, *costs])
+    return markdown(heads, lines, names=range(4))
 
 
 COLOURS = {"none": "0.35", "good": GREEN, "useless": BLUE, "wrong": ORANGE}
@@ -322,25 +327,9 @@ def _median_curve(runs: Sequence[Row], steps: int) -> tuple[Array, Array]:
     return when, np.median(costs, axis=0)
 
 
-def _names(allowed: Sequence[str]) -> Callable[[str], list[str]]:
-    def names(text: str) -> list[str]:
-        given = [name.strip() for name in text.split(",")]
-        for name in given:
-            if name not in allowed:
-                raise argparse.ArgumentTypeError(
-                    f"{name!r} is not one of {', '.join(allowed)}"
-                )
-        return given
-
-    return names
-
-
 def main(arguments: list[str] | None = None) -> int:
     """Run and print; returns the exit code."""
-    parser = argparse.ArgumentParser(
-        description=__doc__.replace("%", "%%"),
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+    parser = parser_of(__doc__)
     for option, allowed in (
         ("--tasks", list(TASKS)),
         ("--agents", list(AGENTS)),
@@ -348,24 +337,15 @@ def main(arguments: list[str] | None = None) -> int:
     ):
         parser.add_argument(
             option,
-            type=_names(allowed),
+            type=some_of(allowed),
             default=allowed,
             help=f"some of {', '.join(allowed)} (default: all)",
         )
-    parser.add_argument(
-        "--seeds",
-        type=at_least_one,
-        default=5,
-        help="runs of each, with successive seeds (default: %(default)s)",
-    )
-    parser.add_argument(
-        "--from-json", type=Path, metavar="FILE", help="draw what --json has printed"
-    )
-    parser.add_argument("--figure", type=Path, metavar="PNG", help="draw the curves")
-    parser.add_argument("--json", action="store_true", help="print JSON, no table")
+    add_seeds(parser)
+    add_results(parser, "the curves")
     options = parser.parse_args(arguments)
     if options.from_json is not None:
-        rows = json.loads(options.from_json.read_text())["rows"]
+        rows = rows_of(options.from_json)
     else:
         seeds = range(options.seeds)
         rows = study(options.tasks, options.agents, options.ways, seeds)

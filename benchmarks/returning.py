@@ -28,7 +28,14 @@ from tqdm.auto import tqdm
 from acl_gym import ReturningACL, WaitingVectorEnv, evaluate_policy_cost
 from acl_gym.utils.text import replace_unprintable_letters
 
-from ablation import at_least_one  # isort: skip  # the script beside this one
+# The script beside this one.
+from tables import (  # isort: skip
+    add_seeds,
+    markdown,
+    number,
+    parser_of,
+    some_of,
+)
 
 ANTS = 5
 Row = dict[str, Any]
@@ -143,40 +150,24 @@ def study(tasks: Iterable[str], seeds: range, parameters: dict[str, Any]) -> lis
 
 def as_markdown(rows: Sequence[Row]) -> str:
     """The table."""
+    heads = ["task", "good", "first good after", "latest", "runs", "return since"]
+    heads += ["at the end", "worst", "seconds", "cells"]
     lines = [
-        "| task | good | first good after | latest | runs | return since | at the end "
-        "| worst | seconds | cells |",
-        "| --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |",
-    ]
-    for row in rows:
-        cells = [
+        [
             row["task"],
             f"{row['good']:g}",
-            _number(row["first"], ",.0f"),
-            _number(row["latest"], ",.0f"),
+            number(row["first"], ",.0f"),
+            number(row["latest"], ",.0f"),
             f"{row['reached']}/{len(row['runs'])}",
-            _number(row["since"], ".4g"),
+            number(row["since"], ".4g"),
             f"{row['end']:.4g}",
             f"{row['worst_end']:.4g}",
             f"{row['seconds']:.2f}",
             f"{row['cells']:,.0f}",
         ]
-        lines.append(f"| {' | '.join(cells)} |")
-    return "\n".join(lines)
-
-
-def _number(value: float | None, form: str) -> str:
-    return "-" if value is None else format(value, form)
-
-
-def _names(text: str) -> list[str]:
-    given = [name.strip() for name in text.split(";")]
-    for name in given:
-        if name not in TASKS:
-            raise argparse.ArgumentTypeError(
-                f"{name!r} is not one of {'; '.join(TASKS)}"
-            )
-    return given
+        for row in rows
+    ]
+    return markdown(heads, lines)
 
 
 def _parameter(text: str) -> tuple[str, Any]:
@@ -192,23 +183,16 @@ def _parameter(text: str) -> tuple[str, Any]:
 
 def main(arguments: list[str] | None = None) -> int:
     """Run and print; returns the exit code."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = parser_of(__doc__)
     parser.add_argument(
         "--tasks",
-        type=_names,
+        type=some_of(TASKS, ";"),
         default=list(TASKS),
         help=f"some of {'; '.join(TASKS)}, with semicolons (default: all)".replace(
             "%", "%%"
         ),
     )
-    parser.add_argument(
-        "--seeds",
-        type=at_least_one,
-        default=10,
-        help="runs of each, with successive seeds (default: %(default)s)",
-    )
+    add_seeds(parser, 10)
     parser.add_argument(
         "--first-seed", type=int, default=0, help="the first seed (default: 0)"
     )

@@ -18,7 +18,6 @@ With --figure it draws the costs.
 
 from __future__ import annotations
 
-import argparse
 import functools
 import itertools
 import json
@@ -45,7 +44,15 @@ from acl_gym import (
 from acl_gym.plotting.style import BLUE, GREEN, ORANGE, in_style, new_figure
 from acl_gym.utils.text import replace_unprintable_letters
 
-from ablation import at_least_one  # isort: skip  # the script beside this one
+# The script beside this one.
+from tables import (  # isort: skip
+    add_results,
+    at_least_one,
+    markdown,
+    parser_of,
+    rows_of,
+    some_of,
+)
 
 Row = dict[str, Any]
 
@@ -189,11 +196,9 @@ def median(
 
 def as_markdown(rows: Sequence[Row], best: Sequence[Row]) -> str:
     """The table."""
-    lines = [
-        "| uncertain | learned on | nominal cost | mean cost | worst cost | lowest "
-        "success | optimum, nominal | optimum, hardest corner |",
-        "| --- | --- | ---: | ---: | ---: | ---: | ---: | ---: |",
-    ]
+    heads = ["uncertain", "learned on", "nominal cost", "mean cost", "worst cost"]
+    heads += ["lowest success", "optimum, nominal", "optimum, hardest corner"]
+    lines = []
     for each in best:
         case, width = each["case"], each["width"]
         for learned in LEARNED_ON:
@@ -201,12 +206,11 @@ def as_markdown(rows: Sequence[Row], best: Sequence[Row]) -> str:
                 name: median(rows, case, width, learned, name)
                 for name in ("nominal", "mean", "worst", "success")
             }
-            lines.append(
-                f"| {case} ±{width}% | {learned} | {cost['nominal']:.1f} | "
-                f"{cost['mean']:.1f} | {cost['worst']:.1f} | {cost['success']:.0%} | "
-                f"{each['nominal']:.1f} | {each['hardest']:.1f} |"
-            )
-    return "\n".join(lines)
+            costs = [f"{cost[name]:.1f}" for name in ("nominal", "mean", "worst")]
+            optima = [f"{each[name]:.1f}" for name in ("nominal", "hardest")]
+            names = [f"{case} ±{width}%", learned]
+            lines.append([*names, *costs, f"{cost['success']:.0%}", *optima])
+    return markdown(heads, lines, names=(0, 1))
 
 
 COLOURS = dict(zip(LEARNED_ON, (BLUE, ORANGE, GREEN), strict=True))
@@ -272,30 +276,13 @@ def draw(rows: Sequence[Row], best: Sequence[Row], path: Path) -> None:
     figure.savefig(path)
 
 
-def _some(allowed: Sequence[Any]) -> Any:
-    def some(text: str) -> list[Any]:
-        known = {str(each): each for each in allowed}
-        names = [name.strip() for name in text.split(",")]
-        for name in names:
-            if name not in known:
-                raise argparse.ArgumentTypeError(
-                    f"{name!r} is not one of {', '.join(known)}"
-                )
-        return [known[name] for name in names]
-
-    return some
-
-
 def main(arguments: list[str] | None = None) -> int:
     """Run and print; returns the exit code."""
-    parser = argparse.ArgumentParser(
-        description=__doc__.replace("%", "%%"),
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+    parser = parser_of(__doc__)
     for option, allowed in (("--cases", list(CASES)), ("--widths", list(WIDTHS))):
         parser.add_argument(
             option,
-            type=_some(allowed),
+            type=some_of(allowed),
             default=allowed,
             help=f"some of {', '.join(map(str, allowed))} (default: all)",
         )
@@ -307,15 +294,7 @@ def main(arguments: list[str] | None = None) -> int:
         parser.add_argument(
             option, type=at_least_one, default=default, help=f"{text} ({default:,})"
         )
-    parser.add_argument(
-        "--from-json",
-        type=Path,
-        nargs="+",
-        metavar="FILE",
-        help="show what --json has printed, of several parts together",
-    )
-    parser.add_argument("--figure", type=Path, metavar="PNG", help="draw the costs")
-    parser.add_argument("--json", action="store_true", help="print JSON, no table")
+    add_results(parser, "the costs")
     options = parser.parse_args(arguments)
     if options.from_json is None:
         rows, best = study(
@@ -326,9 +305,8 @@ def main(arguments: list[str] | None = None) -> int:
             options.draws,
         )
     else:
-        parts = [json.loads(path.read_text()) for path in options.from_json]
-        rows = [row for part in parts for row in part["rows"]]
-        best = [each for part in parts for each in part["best"]]
+        rows = rows_of(options.from_json)
+        best = rows_of(options.from_json, "best")
     if options.figure is not None:
         draw(rows, best, options.figure)
     if options.json:

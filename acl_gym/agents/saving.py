@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 import os
 from abc import abstractmethod
 from collections.abc import Callable, Mapping
@@ -14,6 +13,13 @@ import numpy as np
 from gymnasium.vector import VectorEnv
 from numpy.typing import ArrayLike, NDArray
 
+from acl_gym.agents.constructors import (
+    NOT_GIVEN,
+    check_constructor,
+    keywords_of,
+    lacking_in,
+    saved_parameter,
+)
 from acl_gym.envs.control.signals import Signals
 from acl_gym.partitions import (
     given_partition,
@@ -23,26 +29,11 @@ from acl_gym.partitions import (
 from acl_gym.policies import PartitionPolicy
 from acl_gym.utils import archives, validation
 from acl_gym.utils.serialization import (
-    Missing,
     from_json,
     missing_in,
-    own_name,
     to_json,
-    to_settings,
 )
 from acl_gym.utils.typing import FloatArray, RankArray, Row
-
-_NOT_GIVEN = (
-    "env",
-    "executor",
-    "heuristic",
-    "initial",
-    "n_actions",
-    "seed",
-    "workers",
-)
-"""Arguments of constructors that a file holds otherwise, that `load` has itself, or that
-say where the environment is."""
 
 _COLUMNS = (
     "trial",
@@ -90,7 +81,7 @@ class SavedAgent(PartitionPolicy):
     _ranks: RankArray
 
     _given_again: ClassVar[tuple[str, ...]] = ()
-    """Of `_NOT_GIVEN` what `load` takes nevertheless, because it may be a function."""
+    """Of `NOT_GIVEN` what `load` takes nevertheless, because it may be a function."""
 
     @property
     @abstractmethod
@@ -183,11 +174,11 @@ class SavedAgent(PartitionPolicy):
                 constructor of a subclass does not take what `load` would pass.
         """
         parameters = self.parameters()
-        _check_constructor(type(self), parameters)
+        check_constructor(type(self), parameters)
         header = {
             "agent": type(self).__name__,
-            "parameters": {n: _parameter(v) for n, v in parameters.items()},
-            "unsaved": sorted(_keywords(type(self)) - parameters.keys()),
+            "parameters": {n: saved_parameter(v) for n, v in parameters.items()},
+            "unsaved": sorted(keywords_of(type(self)) - parameters.keys()),
             "partition": partition_to_settings(self.partition),
             "n_actions": self.n_actions,
             "first_action": self.first_action,
@@ -277,11 +268,11 @@ class SavedAgent(PartitionPolicy):
                 f"{header.get('agent')!r:.80}; "
                 "load it with that class."
             )
-        takes = _keywords(cls) | set(cls._given_again)
+        takes = keywords_of(cls) | set(cls._given_again)
         if unknown := given.keys() - takes - {"partition"}:
             raise TypeError(
                 f"{cls.__name__}.load takes the arguments of {cls.__name__} except "
-                f"{', '.join(sorted(set(_NOT_GIVEN) - takes))}, got "
+                f"{', '.join(sorted(set(NOT_GIVEN) - takes))}, got "
                 f"{', '.join(sorted(unknown))}; one of {', '.join(sorted(takes))} may be "
                 "given."
             )
@@ -293,7 +284,10 @@ class SavedAgent(PartitionPolicy):
             if arrays["table"].shape != shape or arrays["ranks"].shape != shape:
                 raise ValueError(f"its arrays must have shape {shape}")
             saved = from_json(header["parameters"])
-            lacking = _lacking(saved, header.get("unsaved", []), cls) - given.keys()
+            lacking = (
+                lacking_in(saved, header.get("unsaved", []), cls, cls._given_again)
+                - given.keys()
+            )
         except _DAMAGES as error:
             raise _damaged(name, error) from error
         if lacking:
@@ -380,54 +374,6 @@ def _is_row(row: Any) -> bool:
     return isinstance(row, dict) and all(
         isinstance(row[name], (int, float)) for name in _COLUMNS if name in row
     )
-
-
-def _keywords(kind: type) -> set[str]:
-    """The arguments of an agent's constructor that a file holds or `load` is given."""
-    return {
-        name
-        for name, parameter in inspect.signature(kind).parameters.items()
-        if parameter.kind not in (parameter.VAR_POSITIONAL, parameter.VAR_KEYWORD)
-        and name not in _NOT_GIVEN
-    } - {"partition"}
-
-
-def _check_constructor(kind: type, parameters: dict[str, Any]) -> None:
-    """Refuse to write what `load` could not make again.
-
-    Raises:
-        TypeError: the constructor does not take what `load` passes to it.
-    """
-    passed = dict.fromkeys({"n_actions", *_keywords(kind), *parameters})
-    try:
-        inspect.signature(kind).bind(None, None, **passed)
-    except TypeError as error:
-        raise TypeError(
-            f"{kind.__name__} must be made by {kind.__name__}(env, partition, "
-            "n_actions=..., and what `parameters` returns) to be saved, because load "
-            f"makes it so, but {error}; let its constructor take these, for instance "
-            "by **keywords that it passes on."
-        ) from error
-
-
-def _parameter(value: Any) -> Any:
-    """The saved form of a parameter: the value itself, or the name of its class."""
-    try:
-        return to_json(value, "a parameter")
-    except TypeError:
-        return to_settings(Missing("", own_name(value)))
-
-
-def _lacking(saved: Any, unsaved: Any, kind: type[SavedAgent]) -> set[str]:
-    """The arguments of the constructor that the file does not hold."""
-    known = {"cost", "deposit", "update", "alpha", "beta", "epsilon"}
-    known |= set(kind._given_again)
-    by_name = {
-        name
-        for name, value in saved.items()
-        if isinstance(value, dict) and value.get("type") == "function"
-    }
-    return (by_name - known) | (set(unsaved) & _keywords(kind))
 
 
 def _damaged(name: str, error: Exception) -> ValueError:

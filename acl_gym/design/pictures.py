@@ -17,7 +17,8 @@ from acl_gym.envs.control.environments import ControlVectorEnv
 from acl_gym.envs.plant import Plant
 from acl_gym.partitions import Grid
 from acl_gym.plotting import palettes, plot_policy, style
-from acl_gym.plotting.subject import Subject, subject_of, with_unit
+from acl_gym.plotting.names import with_unit
+from acl_gym.plotting.subject import Subject, subject_of
 from acl_gym.policies import TablePolicy
 from acl_gym.utils.text import digits
 from acl_gym.utils.typing import FloatArray

@@ -9,7 +9,7 @@ from acl_gym.design.pictures import levels_shown, mark_goal, most_divided
 from acl_gym.design.recordings import spread_over
 from acl_gym.envs.learned.env import LearnedVectorEnv
 from acl_gym.plotting import palettes, style
-from acl_gym.plotting.subject import with_unit
+from acl_gym.plotting.names import with_unit
 from acl_gym.policies import TablePolicy
 
 

@@ -11,7 +11,7 @@ import io
 import json
 import os
 from pathlib import Path
-from typing import IO, Any
+from typing import IO, Any, NamedTuple
 
 import numpy as np
 from gymnasium import spaces
@@ -22,11 +22,26 @@ from acl_gym.envs.learned.description import described_by
 from acl_gym.model_based.arguments import action_space_of
 from acl_gym.utils import validation
 from acl_gym.utils.files import write_atomically
+from acl_gym.utils.typing import Row
 
-DATA, SETTINGS, STATE = "transitions.csv", "run.json", "state.json"
+DATA, SETTINGS = "transitions.csv", "run.json"
 AGENT, BEST = "agent.npz", "best.npz"
 
-_VERSION = 1
+_STATE, _VERSION = "state.json", 1
+
+
+class State(NamedTuple):
+    """How far a run has come.
+
+    Attributes:
+        interactions: after how many the colony has learned; -1: it has not.
+        seconds: of computing.
+        history: see `PlantLearning`.
+    """
+
+    interactions: int
+    seconds: float
+    history: list[Row]
 
 
 class Journal:
@@ -77,6 +92,30 @@ class Journal:
     def path(self, name: str) -> Path:
         """A file of the run."""
         return self.folder / name
+
+    def keep_state(self, state: State) -> None:
+        """Write down how far the run has come."""
+        content = json.dumps(state._asdict()).encode()
+        write_atomically(self.folder / _STATE, content)
+
+    def kept_state(self) -> State | None:
+        """How far the run had come; None if nothing was learned.
+
+        Raises:
+            ValueError: the file is damaged.
+        """
+        path = self.folder / _STATE
+        if not path.exists():
+            return None
+        try:
+            found = json.loads(path.read_text())
+            rows = [dict(row) for row in found["history"]]
+            return State(int(found["interactions"]), float(found["seconds"]), rows)
+        except (ValueError, KeyError, TypeError) as error:
+            raise ValueError(
+                f"{path} cannot be read: {error}; remove it to learn anew from what was "
+                "recorded."
+            ) from error
 
     def append(self, steps: dict[str, NDArray[Any]], runs: NDArray[np.int64]) -> None:
         """Write steps down; when this returns, they outlive the process.

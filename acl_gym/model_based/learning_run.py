@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import logging
 import os
 import threading
@@ -32,13 +31,12 @@ from acl_gym.model_based.arguments import (
     usual_model_steps,
 )
 from acl_gym.model_based.improving import Improving
-from acl_gym.model_based.journal import AGENT, BEST, STATE, Journal
+from acl_gym.model_based.journal import AGENT, BEST, Journal, State
 from acl_gym.model_based.plant_runner import PlantRunner
 from acl_gym.model_based.result import PlantLearning
 from acl_gym.partitions.around_goal import partition_around_goal
 from acl_gym.partitions.grid import Fuzzy
 from acl_gym.utils import validation
-from acl_gym.utils.files import write_atomically
 from acl_gym.utils.typing import FloatArray, Row
 
 logger = logging.getLogger("acl_gym")
@@ -146,9 +144,8 @@ class LearningRun:
             None if self._journal is None else self._journal.path(BEST),
         )
         self._model: LearnedVectorEnv | None = None
-        self._history: list[Row] = []
-        self._seconds = 0.0
-        self._learned_at = self._restored()
+        state = None if self._journal is None else self._journal.kept_state()
+        self._learned_at, self._seconds, self._history = state or State(-1, 0.0, [])
 
     def close(self) -> None:
         """Close the file of interactions."""
@@ -373,28 +370,8 @@ class LearningRun:
         if self._journal is None or not isinstance(self._improving.agent, TabularAgent):
             return
         self._improving.agent.save(self._journal.path(AGENT))
-        state = {
-            "interactions": self._learned_at,
-            "seconds": self._seconds,
-            "history": self._history,
-        }
-        write_atomically(self._journal.path(STATE), json.dumps(state).encode())
-
-    def _restored(self) -> int:
-        """After how many interactions the colony had learned; -1: it had not."""
-        if self._journal is None or not self._journal.path(STATE).exists():
-            return -1
-        path = self._journal.path(STATE)
-        try:
-            state = json.loads(path.read_text())
-            self._seconds = float(state["seconds"])
-            self._history = [dict(row) for row in state["history"]]
-            return int(state["interactions"])
-        except (ValueError, KeyError, TypeError) as error:
-            raise ValueError(
-                f"{path} cannot be read: {error}; remove it to learn anew from what was "
-                "recorded."
-            ) from error
+        state = State(self._learned_at, self._seconds, self._history)
+        self._journal.keep_state(state)
 
 
 def default_agent(

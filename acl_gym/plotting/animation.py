@@ -16,9 +16,9 @@ from PIL import Image
 
 from acl_gym.agents.base import TabularAgent
 from acl_gym.plotting import style
+from acl_gym.plotting.names import Labels
 from acl_gym.plotting.plane import Key
 from acl_gym.plotting.scenes import Stage, draw_stage, stages_of
-from acl_gym.plotting.subject import Labels
 from acl_gym.utils import validation
 from acl_gym.utils.files import checked_target, write_atomically
 

@@ -13,8 +13,9 @@ from matplotlib.colors import Colormap, Normalize
 from acl_gym.envs.navigation.system import Navigation
 from acl_gym.envs.pendulum.system import Pendulum
 from acl_gym.plotting import cells, navigation, palettes, style
+from acl_gym.plotting.names import Labels, with_unit
 from acl_gym.plotting.plane import Key, Plane, plane_of
-from acl_gym.plotting.subject import Labels, Subject, subject_of, with_unit
+from acl_gym.plotting.subject import Subject, subject_of
 from acl_gym.policies import InterpolatedPolicy
 from acl_gym.utils import validation
 from acl_gym.utils.typing import FloatArray

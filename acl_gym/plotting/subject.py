@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -23,6 +23,7 @@ from acl_gym.envs.control.system import ControlSystem
 from acl_gym.envs.grid_search.system import GridSearch
 from acl_gym.partitions import Discrete, Grid, Partition
 from acl_gym.plotting import pieces
+from acl_gym.plotting.names import Labels, action_names, variable_names, with_unit
 from acl_gym.plotting.style import GREEK
 from acl_gym.policies import (
     InterpolatedPolicy,
@@ -35,11 +36,6 @@ from acl_gym.utils.typing import FloatArray, IntArray
 
 _BATCH = 20_000
 """States that are looked up at once: a fuzzy one has 2^d degrees."""
-
-_DIRECTIONS = {(-1, 0): "north", (1, 0): "south", (0, 1): "east", (0, -1): "west"}
-
-Labels = Sequence[str] | Mapping[int, str] | None
-"""Names of state variables: of all in order, or of some by their number."""
 
 
 @dataclass(frozen=True)
@@ -232,7 +228,7 @@ def subject_of(
     first, count = _actions(policy, env)
     signals = getattr(policy, "signals", None) if env is None else signals_of(env)
     inputs, input_names = _inputs(signals, system, count)
-    names = _action_names(actions, system, first, count)
+    names = action_names(actions, system, first, count)
     n_states, first_state = 0, 0
     variables: tuple[Variable, ...] = ()
     if isinstance(space, spaces.Discrete):
@@ -321,28 +317,6 @@ def _inputs(
     return values, tuple(map(with_unit, signals.inputs))
 
 
-def with_unit(name: str) -> str:
-    """The unit in brackets, as in "torque u (N m)"; notes that follow are left out."""
-    word, *rest = name.split(", ")
-    return f"{word} ({rest[0]})" if rest else word
-
-
-def _action_names(
-    given: Sequence[str] | None, system: ControlSystem | None, first: int, count: int
-) -> tuple[str, ...]:
-    if given is not None:
-        names = tuple(given) if not isinstance(given, str) else ()
-        if len(names) != count or not all(isinstance(name, str) for name in names):
-            raise ValueError(
-                f"actions must be {count} names, one for each action, got "
-                f"{validation.shown(given)}."
-            )
-        return names
-    if isinstance(system, GridSearch) and len(system.directions) == count:
-        return tuple(_DIRECTIONS[move] for move in system.directions)
-    return tuple(f"action {first + u}" for u in range(count))
-
-
 def _variables(
     partition: Partition | None,
     space: Any,
@@ -371,56 +345,11 @@ def _variables(
             f"{space if partition is None else partition!r}."
         )
     angles = partition.angles if isinstance(partition, Grid) else ()
-    names = _labels(labels, signals, len(made), angles)
+    names = variable_names(labels, signals, len(made), angles)
     return tuple(
         Variable(name, edges[0], edges[-1], edges, period)
         for name, (edges, period) in zip(names, made, strict=True)
     )
-
-
-def _own_names(
-    signals: Signals | None, count: int, angles: Sequence[tuple[int, int]]
-) -> list[str]:
-    """The names of variables that nobody has given: those of their observations."""
-    known = () if signals is None else signals.observations
-    if len(known) != count + len(angles):
-        known = ()
-    cosines, sines = zip(*angles, strict=True) if angles else ((), ())
-    names = []
-    for column in range(count + len(angles)):
-        if column in sines:
-            continue
-        name = with_unit(known[column]) if known else f"state {column + 1}"
-        if column in cosines:
-            whose = f"of {known[column].split(', ')[0]}" if known else f"{column + 1}"
-            name = f"angle {whose} (rad)"
-        names.append(name)
-    return names
-
-
-def _labels(
-    labels: Labels,
-    signals: Signals | None,
-    count: int,
-    angles: Sequence[tuple[int, int]],
-) -> list[str]:
-    names = _own_names(signals, count, angles)
-    if labels is None:
-        return names
-    given: dict[Any, Any] = {}
-    if isinstance(labels, Mapping):
-        given = dict(labels)
-    elif isinstance(labels, Sequence) and not isinstance(labels, str):
-        given = dict(enumerate(labels))
-    fits = given and all(
-        isinstance(name, str) and key in range(count) for key, name in given.items()
-    )
-    if not fits or (len(given) != count and not isinstance(labels, Mapping)):
-        raise ValueError(
-            f"labels must be {count} names, one for each state variable, or a dict "
-            f"from numbers 0..{count - 1} to names, got {validation.shown(labels)}."
-        )
-    return [given.get(i, name) for i, name in enumerate(names)]
 
 
 def _batches(states: NDArray[Any]) -> list[NDArray[Any]]:

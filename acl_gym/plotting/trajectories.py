@@ -16,8 +16,9 @@ from acl_gym.envs.pendulum.system import Pendulum
 from acl_gym.evaluation import Trajectory, record_trajectory
 from acl_gym.evaluation.rollout import Rollout
 from acl_gym.plotting import cells, navigation, style
+from acl_gym.plotting.names import Labels
 from acl_gym.plotting.plane import Key, Plane, plane_of
-from acl_gym.plotting.subject import Labels, Subject, subject_of
+from acl_gym.plotting.subject import Subject, subject_of
 from acl_gym.utils import validation
 from acl_gym.utils.typing import FloatArray
 

@@ -60,6 +60,9 @@ from acl_gym.utils.text import replace_unprintable_letters
 NEAR = (0.25, 0.10)
 """How much more than the best policy one may cost to be near it."""
 
+WARM = 40
+"""The most interactions of a run whose only purpose is that kernels are compiled."""
+
 LOOKS: dict[str, dict[str, Any]] = {
     "model": {"color": "#D55E00", "marker": "o", "markersize": 3},
     "model-acl": {"color": "black", "marker": "^", "markersize": 3},
@@ -98,7 +101,7 @@ def measure(
         for method, seed in bar:
             bar.set_postfix_str(f"{method}, seed {seed}")
             if method not in warm and method != "pets":
-                run(method, task, 0, marks[:1])  # Numba compiles
+                run(method, task, 0, [min(marks[0], WARM)])  # Numba compiles
                 warm.add(method)
             rows += run(method, task, seed, marks)
             keep(rows)

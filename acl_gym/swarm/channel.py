@@ -86,7 +86,7 @@ class Lossy(Channel):
     def __init__(self, channel: Channel, p: float, symmetric: bool = False) -> None:
         self.channel = _checked_channel(channel)
         self.p = validation.number("p", p, at_least=0, at_most=1)
-        self.symmetric = validation.flag("symmetric", symmetric)
+        self.symmetric = validation.boolean("symmetric", symmetric)
 
     def reset(self, n: int) -> None:
         """See `Channel.reset`."""

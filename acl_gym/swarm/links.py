@@ -112,7 +112,7 @@ class Links:
             ValueError: it is < 1.
         """
         n = validation.integer("n", n, at_least=1)
-        include_self = validation.flag("include_self", include_self)
+        include_self = validation.boolean("include_self", include_self)
         links = cls.__new__(cls)
         links._set(n, complete=include_self, all_others=not include_self)
         return links

@@ -80,7 +80,7 @@ def run(
     steps = validation.integer("steps", steps, at_least=0)
     channel = Everyone() if channel is None else channel
     _check_kinds(agents, environment, channel, record, callback)
-    stale = validation.flag("stale", stale)
+    stale = validation.boolean("stale", stale)
     if not isinstance(rng, np.random.Generator):
         rng = np.random.default_rng(validation.seed(rng, "rng"))
 

@@ -41,7 +41,7 @@ class Everyone(_ByNumber):
     """
 
     def __init__(self, include_self: bool = True) -> None:
-        self.include_self = validation.flag("include_self", include_self)
+        self.include_self = validation.boolean("include_self", include_self)
 
     def _links_of(self, n: int) -> Links:
         return Links.everyone(n, self.include_self)
@@ -66,7 +66,7 @@ class Ring(_ByNumber):
 
     def __init__(self, k: int = 1, include_self: bool = True) -> None:
         self.k = validation.integer("k", k, at_least=1)
-        self.include_self = validation.flag("include_self", include_self)
+        self.include_self = validation.boolean("include_self", include_self)
 
     def _links_of(self, n: int) -> Links:
         if 2 * self.k + 1 >= n:
@@ -102,7 +102,7 @@ class VonNeumann(_ByNumber):
         if rows is not None:
             rows = validation.integer("rows", rows, at_least=1)
         self.rows = rows
-        self.include_self = validation.flag("include_self", include_self)
+        self.include_self = validation.boolean("include_self", include_self)
 
     def _links_of(self, n: int) -> Links:
         rows = self.rows
@@ -145,7 +145,7 @@ class Radius(Topology):
 
     def __init__(self, sigma: ArrayLike, include_self: bool = True) -> None:
         self.sigma = per_agent("sigma", sigma, infinite=True, at_least=0)
-        self.include_self = validation.flag("include_self", include_self)
+        self.include_self = validation.boolean("include_self", include_self)
 
     def links(self, x: FloatArray) -> Links:
         """See `Topology.links`.
@@ -182,7 +182,7 @@ class Nearest(Topology):
 
     def __init__(self, k: int, include_self: bool = False) -> None:
         self.k = validation.integer("k", k, at_least=1)
-        self.include_self = validation.flag("include_self", include_self)
+        self.include_self = validation.boolean("include_self", include_self)
 
     def links(self, x: FloatArray) -> Links:
         """See `Topology.links`.

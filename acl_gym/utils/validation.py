@@ -130,17 +130,6 @@ def integer(
     return int(value)
 
 
-def flag(name: str, value: Any) -> bool:
-    """Return `value`, which must be True or False.
-
-    Raises:
-        TypeError: it is neither.
-    """
-    if not isinstance(value, (bool, np.bool_)):
-        raise TypeError(f"{name} must be True or False, got {shown(value)}.")
-    return bool(value)
-
-
 def seed(value: Any, name: str = "seed") -> int | None:
     """Return a seed as an int, Python's or NumPy's; None stays None.
 

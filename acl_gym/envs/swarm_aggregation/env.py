@@ -94,7 +94,7 @@ class SwarmAggregationEnv(gym.Env[Any, Any]):
     ## Episode End
     Never terminated; truncated after 100 steps, unless `max_episode_steps` sets another
     limit (-1: none). The infos of a step hold `"distance"`, d, and `"collisions"`, k; no
-    success is told, because it has no meaning here.
+    success is reported, because it has no meaning here.
 
     ## Arguments
     Every parameter of `SwarmAggregation` is a keyword of `gym.make` and `gym.make_vec`.

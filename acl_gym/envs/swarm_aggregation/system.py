@@ -113,7 +113,7 @@ class SwarmAggregation:
                 "followers", self.followers, at_least=0, at_most=MOST_FOLLOWERS
             )
         for name in ("point_mass", "continuous"):
-            values[name] = validation.flag(name, getattr(self, name))
+            values[name] = validation.boolean(name, getattr(self, name))
         for name in _POSITIVE:
             values[name] = validation.number(name, getattr(self, name), above=0)
         for name in _NOT_NEGATIVE:

@@ -37,7 +37,7 @@ class Objective:
                 f"{validation.shown(function)}."
             )
         self.function = function
-        self.vectorized = validation.flag("vectorized", vectorized)
+        self.vectorized = validation.boolean("vectorized", vectorized)
         self.evaluations = 0
         self._warned = False
 

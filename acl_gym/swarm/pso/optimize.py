@@ -146,7 +146,7 @@ def minimize(
             "callback must be a function of an OptimizeResult, got "
             f"{validation.shown(callback)}."
         )
-    history = validation.flag("history", history)
+    history = validation.boolean("history", history)
     if not isinstance(seed, np.random.Generator):
         seed = np.random.default_rng(validation.seed(seed))
 

@@ -57,7 +57,8 @@ def test_a_goal_out_of_reach_is_1_and_says_what_to_try() -> None:
         "design", plant("[-0.01, 0.01]"), "--out", "weak", "--steps", "1000"
     )
     assert result.exit_code == 1
-    lines = result.stderr.splitlines()
+    # On a busy machine its progress is reported as well.
+    lines = [line for line in result.stderr.splitlines() if ": learning, " not in line]
     assert len(lines) == 1
     assert "less than 95%. What to try: " in lines[0]
     assert "the worst start" in lines[0]

@@ -1,8 +1,8 @@
 """Sums of bells and waves: how Gaussian processes and random features are evaluated.
 
-Both are fitted by scikit-learn; what is fitted is then a sum of Gaussian bells around
-data points, or of cosines in random directions. The kernels here evaluate it some ten
-times as fast as `predict` does for a few hundred states, without threads of their own, so
+What was fitted is a sum of Gaussian bells around data points, or of cosines in random
+directions. The kernels here evaluate it some ten times as fast as scikit-learn's
+`predict` does for a few hundred states, without threads of their own, so
 that the same states give the same bits on any machine.
 """
 

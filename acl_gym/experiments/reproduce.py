@@ -230,7 +230,7 @@ def write_pages(directory: Path) -> Path:
     found = read_outcome(directory)
     facts = (
         f"{found['runs']} run{'s' * (found['runs'] != 1)} of each setting ({FEWER} at "
-        "most of what was tried beside the thesis's experiments and takes long), seeds "
+        "most of what takes long and is not an experiment of the thesis), seeds "
         f"from {found['first_seed']}. In brackets: 95% bootstrap intervals of the "
         "interquartile mean over the runs; in a ratio the runs of each setting are drawn "
         "separately."

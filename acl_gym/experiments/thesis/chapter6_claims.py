@@ -9,6 +9,7 @@ import numpy as np
 from acl_gym.experiments.claims import Part, Tried
 from acl_gym.experiments.results import Results
 from acl_gym.experiments.statistics import estimate, median, ratio
+from acl_gym.experiments.swarms.delays import growth_of_disturbances
 from acl_gym.experiments.swarms.study import SwarmStudy
 from acl_gym.experiments.swarms.tables import (
     SOLVED,
@@ -29,6 +30,9 @@ MOVES = 1e-3
 
 RESTS = 0.01
 """A swarm rests whose centre is slower, in lengths per second, over the last quarter."""
+
+SHORT = 5
+"""Delays up to this are looked at in theory; the eigenvalues of longer ones take long."""
 
 MOST = 0.9
 """The share of runs that "nine of ten" stands for."""
@@ -126,7 +130,18 @@ def _speeds(results: Results) -> Tried:
     return Tried(what, listed(found, "; "))
 
 
-@claim(_speeds)
+def _linear_theory(results: Results) -> Tried:
+    rest = results.runs(chapter6.LATE[0])[0].table.reshape(chapter6.AGENTS, -1)
+    found = {
+        f"{steps} steps": f"{growth_of_disturbances(rest, chapter6.TIME_STEP, steps):.4f}"
+        for steps in chapter6.LATE
+        if steps <= SHORT
+    }
+    what = "the factor by which a small disturbance at rest grows in a step, in theory"
+    return Tried(what, listed(found))
+
+
+@claim(_speeds, _linear_theory)
 def _c28(results: Results) -> Iterator[Part]:
     for steps, study in list(chapter6.LATE.items())[1:]:
         speed, parts = late_speed(results, study), results.last(study, "parts")

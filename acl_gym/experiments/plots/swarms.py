@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -15,8 +14,8 @@ from matplotlib.ticker import LogLocator
 from acl_gym.experiments.results import Results
 from acl_gym.experiments.statistics import estimate, median
 from acl_gym.experiments.study import Experiment
+from acl_gym.experiments.swarms.measures import late_speed, least_values, size_swing
 from acl_gym.experiments.swarms.study import SwarmStudy
-from acl_gym.experiments.swarms.tables import least_values
 from acl_gym.plotting import style
 from acl_gym.plotting.intervals import draw_points
 from acl_gym.plotting.style import BLACK, BLUE, GREEN, ORANGE
@@ -52,26 +51,28 @@ def centre(experiment: Experiment[SwarmStudy], results: Results) -> Figure:
 
 
 def delays(experiment: Experiment[SwarmStudy], results: Results) -> Figure:
-    """The speed of the centre and its drift as time goes by: a line for each delay."""
-    figure, axes = style.small_multiples(2, 2, 2.7)
-    shades = mpl.colormaps["viridis"](np.linspace(0.0, 0.92, len(experiment.studies)))
-    handles = []
-    for color, (label, study) in zip(shades, experiment.studies.items(), strict=True):
-        line = {"color": color, "linewidth": 1.2}
-        steps = np.array(study.curve_points())
-        for ax, measure in zip(axes, ("centre_speed", "drift"), strict=True):
-            values = np.maximum(results.values(study, measure), _ROUNDING)
-            style.draw_band(ax, steps, values, line, alpha=0.12)
-        handles.append(Line2D([], [], label=label, **line))
-    for ax, name in zip(
-        axes, ("speed of the centre (1/s)", "drift of the centre"), strict=True
+    """Speed, swing of the size and parts in the end: a row for each delay."""
+    figure, axes = _shared_rows(3, list(experiment.studies), 1.2)
+    for place, study in enumerate(experiment.studies.values()):
+        columns = (
+            late_speed(results, study),
+            100 * size_swing(results, study),
+            results.last(study, "parts"),
+        )
+        for ax, values in zip(axes, columns, strict=True):
+            _row(ax, place, np.maximum(values, _ROUNDING), BLUE)
+    for ax, name, limit in zip(
+        axes,
+        ("speed of the centre (1/s)", "swing of the size (%)", "number of parts"),
+        (0.01, 5.0, None),
+        strict=True,
     ):
-        ax.set_yscale("log")
-        ax.set_xlabel("step")
-        ax.set_ylabel(name)
-        ax.set_xlim(left=0)
-    axes[0].axhline(0.01, **style.BOUND)
-    style.legend(figure, handles)
+        ax.set_xlabel(name)
+        ax.set_xscale("log")
+        if limit is not None:
+            ax.axvline(limit, **style.BOUND)
+    style.plain_log(axes[1].xaxis)
+    style.plain_log(axes[2].xaxis)
     return figure
 
 

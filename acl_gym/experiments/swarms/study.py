@@ -102,6 +102,7 @@ def make_channel(
     *,
     sigma: float | list[float] = 0.0,
     neighbours: int = 1,
+    include_self: bool = False,
     loss: float = 0.0,
     symmetric: bool = False,
     delay: int = 0,
@@ -114,6 +115,7 @@ def make_channel(
         sigma: the radius of "radius"; or the least and the largest one, between which
             those of the agents are evenly spaced.
         neighbours: of "ring", on each side, and of "nearest".
+        include_self: whether an agent of "nearest" hears itself beside them.
         loss: the probability that a message is lost, in [0, 1].
         symmetric: whether losses are those of both directions together.
         delay: how many steps messages are late.
@@ -131,7 +133,7 @@ def make_channel(
     elif topology == "ring":
         channel = Ring(neighbours)
     elif topology == "nearest":
-        channel = Nearest(neighbours)
+        channel = Nearest(neighbours, include_self)
     else:
         channel = Everyone() if topology == "everyone" else VonNeumann()
     if loss > 0.0:

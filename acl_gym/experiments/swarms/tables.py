@@ -5,62 +5,26 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
-import numpy as np
-from scipy.stats import rankdata
-
 from acl_gym.experiments.results import Results
 from acl_gym.experiments.statistics import estimate, median
 from acl_gym.experiments.study import Experiment
+from acl_gym.experiments.swarms.measures import (
+    SOLVED,
+    mean_ranks,
+    settling_steps,
+    size_swing,
+    solved,
+)
 from acl_gym.experiments.swarms.study import SwarmStudy
 from acl_gym.experiments.tables import Table
 from acl_gym.utils.text import digits
-from acl_gym.utils.typing import FloatArray
-
-SOLVED = 1e-10
-"""A value of a benchmark function below which it counts as solved, and as this."""
-
-SETTLED = 0.05
-"""A swarm has settled when its rms distance stays within this share of the last one."""
-
-
-def settling_steps(results: Results, study: SwarmStudy) -> FloatArray:
-    """The recorded step from which on the size of each run stays near its end, `(runs,)`."""
-    rms = results.values(study, "rms")
-    near = np.abs(rms - rms[:, -1:]) <= SETTLED * rms[:, -1:]
-    from_end = np.logical_and.accumulate(near[:, ::-1], axis=1)[:, ::-1]
-    points = np.array(study.curve_points())
-    return np.asarray(points[from_end.argmax(axis=1)])
-
-
-def least_values(results: Results, study: SwarmStudy) -> FloatArray:
-    """The least value of each run, or `SOLVED` where it is below, `(runs,)`."""
-    return np.maximum(results.last(study, "value"), SOLVED)
-
-
-def solved(results: Results, study: SwarmStudy) -> float:
-    """The share of runs that end below `SOLVED`."""
-    return float((results.last(study, "value") < SOLVED).mean())
-
-
-def mean_ranks(
-    results: Results, rows: Mapping[str, Mapping[str, SwarmStudy]]
-) -> FloatArray:
-    """The mean over functions of the rank of each channel's median value; 1 is the best.
-
-    Channels that have solved a function share their ranks.
-    """
-    medians = [
-        [median(least_values(results, study)) for study in row.values()]
-        for row in rows.values()
-    ]
-    return np.asarray(np.mean([rankdata(each) for each in medians], axis=0))
 
 
 def aggregation(experiment: Experiment[SwarmStudy], results: Results) -> Table:
     """Drift, speed, size, parts and settling of each swarm."""
     headings = [
         *("Channel", "drift of the centre", "its speed in the end", "rms distance"),
-        *("outermost agent", "parts", "steps to settle"),
+        *("outermost agent", "swing of the size", "parts", "steps to settle"),
     ]
     rows = []
     for label, study in experiment.studies.items():
@@ -72,6 +36,7 @@ def aggregation(experiment: Experiment[SwarmStudy], results: Results) -> Table:
         rows.append(
             [
                 *(label, *map(str, ends)),
+                f"{median(size_swing(results, study)):.1%}",
                 f"{digits(parts.mean())}\n{parts.min():.0f} to {parts.max():.0f}",
                 f"{median(settling_steps(results, study)):.0f}",
             ]

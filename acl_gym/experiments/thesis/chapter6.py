@@ -112,11 +112,13 @@ PSO_DELAYS = (1, 5, 20)
 
 def _pso_channels(largest: float) -> dict[str, dict[str, Any]]:
     """Channels of particle swarms by label; radii are relative to the search range."""
+    nearest = {"topology": "nearest", "neighbours": 5}
     return {
         "everyone": {},
         "von Neumann": {"topology": "von_neumann"},
         "ring": {"topology": "ring"},
-        "5 nearest": {"topology": "nearest", "neighbours": 5},
+        "5 nearest": {**nearest, "include_self": True},
+        "5 nearest, not oneself": nearest,
         "radius 2 L": {"topology": "radius", "sigma": 2.0 * largest},
         "radius 1 L": {"topology": "radius", "sigma": largest},
         **{f"{loss:.0%} lost": {"loss": loss} for loss in PSO_LOSSES},

@@ -18,7 +18,7 @@ from acl_gym.cli.errors import (
 
 HELP = """Repeat experiments of the thesis and judge its claims.
 
-Runs the figures that are named, 30 colonies for each setting, and writes figures,
+Runs the figures that are named, 30 runs of each setting, and writes figures,
 results.json, results.parquet and report.html. A run that is there already, made by the
 same code, is not made again: after an interruption the same command continues.
 
@@ -28,7 +28,8 @@ Examples:
   acl-gym reproduce fig5.4 --runs 3        one figure, in a minute
   acl-gym reproduce claims --out results   all that decides a claim
   acl-gym reproduce comparison --runs 3    against Q-learning, DQN, PPO and A2C
-  acl-gym reproduce all                    everything, about an hour
+  acl-gym reproduce fig6.centre --runs 3   swarms that lose messages
+  acl-gym reproduce all                    everything, over an hour
   acl-gym reproduce all --executor ray     needs pip install acl-gym[cluster]
 """
 
@@ -88,7 +89,7 @@ def reproduce(
         ),
     ] = None,
     executor: Annotated[
-        str, typer.Option(metavar="local|ray", help="Who runs the colonies.")
+        str, typer.Option(metavar="local|ray", help="Who makes the runs.")
     ] = "local",
     figures: Annotated[
         bool, typer.Option(help="Draw figures and write the report.")

@@ -23,7 +23,9 @@ from acl_gym.evaluation import Predictor, evaluate_policy_cost, policy_measures
 from acl_gym.experiments.episode_costs import EPISODE_COSTS
 from acl_gym.experiments.names import GROWING, NETWORKS
 from acl_gym.experiments.results import Run
-from acl_gym.experiments.study import Study
+from acl_gym.experiments.study import AnyStudy, Study
+from acl_gym.experiments.swarms.runs import run_aggregation, run_ants, run_pso
+from acl_gym.experiments.swarms.study import AGGREGATION, ANTS, PSO
 from acl_gym.partitions.settings import (
     partition_from_settings,
     partition_to_settings,
@@ -35,19 +37,19 @@ from acl_gym.utils.typing import Row
 
 
 class Method(NamedTuple):
-    """A way to come to a policy. Its label in figures is in `names.METHODS`.
+    """A way to make runs. The label of a learning one in figures is in `names.METHODS`.
 
     Attributes:
         run: makes one run of a study.
         restore: makes the last policy of a run again, for the system without
-            perturbations.
+            perturbations; None: a run has none.
     """
 
-    run: Callable[[Study, int], Run]
-    restore: Callable[[Study, Run], Predictor]
+    run: Callable[[Any, int], Run]
+    restore: Callable[[Study, Run], Predictor] | None = None
 
 
-def run(study: Study, seed: int) -> Run:
+def run(study: AnyStudy, seed: int) -> Run:
     """Run a study once.
 
     Args:
@@ -61,7 +63,7 @@ def run(study: Study, seed: int) -> Run:
 _WARM: set[tuple[Any, ...]] = set()
 
 
-def warm_up(study: Study) -> None:
+def warm_up(study: AnyStudy) -> None:
     """Compile the kernels of a study, so that measured times exclude compilation."""
     if study.kernels not in _WARM:
         METHODS[study.method].run(study.brief(), 0)
@@ -69,8 +71,15 @@ def warm_up(study: Study) -> None:
 
 
 def restore_policy(study: Study, run: Run) -> Any:
-    """The last policy of a run."""
-    return METHODS[study.method].restore(study, run)
+    """The last policy of a run.
+
+    Raises:
+        ValueError: runs of the method have no policy.
+    """
+    restore = METHODS[study.method].restore
+    if restore is None:
+        raise ValueError(f"runs of {study.method} have no policy to restore.")
+    return restore(study, run)
 
 
 class Evaluation(Callback):
@@ -266,5 +275,8 @@ METHODS = {
     "q-learning": Method(_learn_table, _restore_table),
     **{name: Method(_learn_network, _restore_network) for name in NETWORKS},
     "planning": Method(_plan, _restore_table),
+    AGGREGATION: Method(run_aggregation),
+    PSO: Method(run_pso),
+    ANTS: Method(run_ants),
 }
 """The methods by name."""

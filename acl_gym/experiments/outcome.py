@@ -2,21 +2,44 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from acl_gym.experiments import plots
 from acl_gym.experiments.results import Results
 from acl_gym.experiments.statistics import estimate
-from acl_gym.experiments.study import Experiment, Study
+from acl_gym.experiments.study import AnyStudy, Experiment
+from acl_gym.experiments.swarms.tables import SWARM_TABLES
 from acl_gym.experiments.tables import TABLES
 from acl_gym.utils.typing import FloatArray
 
 Outcome = dict[str, Any]
 """JSON types."""
 
-CURVES = ("policy_cost", "ants_cost", "policy_variation", "sensitivity")
+
+class Measure(NamedTuple):
+    """A measure whose curves a report shows: its name, and whether the axis is logarithmic."""
+
+    name: str
+    logarithmic: bool = False
+
+
+MEASURES = {
+    "policy_cost": Measure("policy cost", True),
+    "ants_cost": Measure("cost of the ants", True),
+    "policy_variation": Measure("policy variation"),
+    "sensitivity": Measure("sensitivity"),
+    "size": Measure("distance of the outermost agent from the centre"),
+    "rms": Measure("rms distance from the centre"),
+    "drift": Measure("drift of the centre"),
+    "centre_speed": Measure("speed of the centre"),
+    "parts": Measure("number of parts"),
+    "miss": Measure("rms distance of the agents from the goal"),
+    "centre_miss": Measure("distance of the centre from the goal"),
+    "value": Measure("least value so far", True),
+    "differing": Measure("entries that differ"),
+}
 """The measures whose curves a report shows."""
 
 POINTS = 250
@@ -24,7 +47,7 @@ POINTS = 250
 
 
 def summary(
-    experiment: Experiment, results: Results, group: str = "Experiments"
+    experiment: Experiment[Any], results: Results, group: str = "Experiments"
 ) -> Outcome:
     """What an experiment found.
 
@@ -36,9 +59,10 @@ def summary(
     Returns:
         Name, title, section, text and claims; its `figures`, each with file, caption
         and alternative text; its `table`, see `tables`; and its `studies`, each with
-        the costs of its last policies and its curves.
+        what its runs ended with (`last`) and its curves; and the `measures` of these.
     """
-    make_table = TABLES.get(experiment.table)
+    make_table = {**TABLES, **SWARM_TABLES}.get(experiment.table)
+    first = next(iter(experiment.studies.values()))
     return {
         "name": experiment.name,
         "title": experiment.title,
@@ -56,6 +80,8 @@ def summary(
             for plot in experiment.plots
         ],
         "table": vars(make_table(experiment, results)) if make_table else None,
+        "measure": MEASURES[first.measure].name,
+        "measures": _known_measures(experiment, results),
         "studies": [
             _study(label, study, results)
             for label, study in {**experiment.studies, **experiment.references}.items()
@@ -63,20 +89,29 @@ def summary(
     }
 
 
-def _study(label: str, study: Study, results: Results) -> Outcome:
-    costs, points = results.last(study), study.curve_points()
-    every = -(-results.values(study).shape[1] // POINTS)
+def _known_measures(experiment: Experiment[Any], results: Results) -> list[Outcome]:
+    """The measures that some study of an experiment has, that of the studies first."""
+    rows = [results.runs(study)[0].rows for study in experiment.everything]
+    first = next(iter(experiment.studies.values())).measure
+    names = [name for name in MEASURES if any(name in each for each in rows)]
+    names.sort(key=lambda name: name != first)
+    return [{"key": name, **MEASURES[name]._asdict()} for name in names]
+
+
+def _study(label: str, study: AnyStudy, results: Results) -> Outcome:
+    ends, points = results.last(study, study.measure), study.curve_points()
+    every = -(-results.values(study, study.measure).shape[1] // POINTS)
     seconds = [run.seconds for run in results.runs(study)]
     return {
         "label": label,
         "key": study.key,
         "setting": study.inputs,
         "parameters": str(study),
-        "runs": len(costs),
-        "policy_cost": {
-            **estimate(costs).as_json("interquartile_mean"),
-            "min": float(costs.min()),
-            "max": float(costs.max()),
+        "runs": len(ends),
+        "last": {
+            **estimate(ends).as_json("interquartile_mean"),
+            "min": float(ends.min()),
+            "max": float(ends.max()),
         },
         "success_rate": float(results.last(study, "success_rate").mean())
         if results.knows(study, "success_rate")
@@ -84,9 +119,10 @@ def _study(label: str, study: Study, results: Results) -> Outcome:
         "seconds": float(np.median(seconds)),
         "every": every,
         "positions": points and points[::every],
+        "unit": study.unit,
         "curves": {
             measure: _curve(results.values(study, measure)[:, ::every])
-            for measure in CURVES
+            for measure in MEASURES
             if measure in results.runs(study)[0].rows
         },
     }

@@ -16,7 +16,7 @@ from acl_gym.utils.files import write_atomically
 from acl_gym.utils.text import digits
 
 _CLASSES = {HOLDS: "yes", IN_PART: "part", NOT: "no", UNDECIDED: "open"}
-_CURVES = ("label", "every", "positions", "curves")
+_CURVES = ("label", "every", "positions", "unit", "curves")
 
 
 def write_report(

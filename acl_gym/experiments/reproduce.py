@@ -7,6 +7,7 @@ import logging
 import os
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from rich.console import Console
 
@@ -35,7 +36,10 @@ logger = logging.getLogger("acl_gym")
 
 __all__ = ["EXECUTORS", "RUNS", "without_curves"]
 
-EXPERIMENTS = (*thesis.EXPERIMENTS, *comparison.EXPERIMENTS)
+EXPERIMENTS: tuple[Experiment[Any], ...] = (
+    *thesis.EXPERIMENTS,
+    *comparison.EXPERIMENTS,
+)
 
 PAGE, CLAIMS_TABLE = "report.html", "claims.md"
 RESULTS, ROWS = "results.json", "results.parquet"
@@ -47,7 +51,7 @@ ANIMATION, ANIMATED = "learning.gif", "fig5.6"
 _AGAINST = "Against reinforcement learning"
 
 
-def chosen(names: Sequence[str]) -> list[Experiment]:
+def chosen(names: Sequence[str]) -> list[Experiment[Any]]:
     """The experiments of these names, in the order of the thesis.
 
     Args:
@@ -147,7 +151,9 @@ def reproduce(
     return made, False
 
 
-def _outcome(experiments: Sequence[Experiment], results: Results, runs: int) -> Outcome:
+def _outcome(
+    experiments: Sequence[Experiment[Any]], results: Results, runs: int
+) -> Outcome:
     """Each experiment summed up, and each claim judged."""
     summaries = [
         outcome.summary(
@@ -168,7 +174,7 @@ def _outcome(experiments: Sequence[Experiment], results: Results, runs: int) -> 
 
 
 def _write_rows(
-    path: Path, experiments: Sequence[Experiment], results: Results
+    path: Path, experiments: Sequence[Experiment[Any]], results: Results
 ) -> None:
     """The rows of all runs as one table; those of a study stand where it comes first."""
     shown = {
@@ -224,7 +230,7 @@ def write_pages(directory: Path) -> Path:
     found = read_outcome(directory)
     facts = (
         f"{found['runs']} run{'s' * (found['runs'] != 1)} of each setting ({FEWER} at "
-        "most of what was tried beside the thesis's experiments and takes long), seeds "
+        "most of what takes long and is not an experiment of the thesis), seeds "
         f"from {found['first_seed']}. In brackets: 95% bootstrap intervals of the "
         "interquartile mean over the runs; in a ratio the runs of each setting are drawn "
         "separately."

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from acl_gym.experiments.study import Study
+from acl_gym.experiments.study import AnyStudy
 from acl_gym.utils.steps import hold_last_value
 from acl_gym.utils.typing import FloatArray
 
@@ -56,7 +56,7 @@ class Results:
     def __init__(self, runs: Mapping[str, list[Run]]) -> None:
         self._runs = runs
 
-    def runs(self, study: Study) -> list[Run]:
+    def runs(self, study: AnyStudy) -> list[Run]:
         """All runs of a study.
 
         Raises:
@@ -67,7 +67,7 @@ class Results:
             raise MissingRunsError(f"{study} was not run.")
         return found
 
-    def values(self, study: Study, measure: str = "policy_cost") -> FloatArray:
+    def values(self, study: AnyStudy, measure: str = "policy_cost") -> FloatArray:
         """A measure as learning goes on, `(runs, points)`, at `Study.curve_points`.
 
         Where evaluations are not after each trial, a policy counts from its evaluation
@@ -81,31 +81,31 @@ class Results:
             [hold_last_value(r["env_steps"], r[measure], points) for r in rows]
         )
 
-    def knows(self, study: Study, measure: str) -> bool:
+    def knows(self, study: AnyStudy, measure: str) -> bool:
         """Whether the runs of a study have a measure."""
         return all(measure in run.rows for run in self.runs(study))
 
-    def last(self, study: Study, measure: str = "policy_cost") -> FloatArray:
+    def last(self, study: AnyStudy, measure: str = "policy_cost") -> FloatArray:
         """A measure at the end of each run, `(runs,)`."""
         return np.array([run.rows[measure].iloc[-1] for run in self.runs(study)])
 
-    def best(self, study: Study, measure: str = "policy_cost") -> FloatArray:
+    def best(self, study: AnyStudy, measure: str = "policy_cost") -> FloatArray:
         """The measure of the cheapest policy of each run, `(runs,)`."""
         rows = [run.rows for run in self.runs(study)]
         return np.array(
             [each[measure].iloc[int(each["policy_cost"].argmin())] for each in rows]
         )
 
-    def best_run(self, study: Study) -> int:
+    def best_run(self, study: AnyStudy) -> int:
         """The number of the run whose last policy is the cheapest."""
         return int(np.argmin(self.last(study)))
 
-    def median_run(self, study: Study) -> int:
+    def median_run(self, study: AnyStudy) -> int:
         """The run with the median last policy cost; of an even number, the cheaper."""
         order = np.argsort(self.last(study), kind="stable")
         return int(order[(len(order) - 1) // 2])
 
-    def first_within(self, study: Study, cost: float, measure: str) -> FloatArray:
+    def first_within(self, study: AnyStudy, cost: float, measure: str) -> FloatArray:
         """When a policy first cost no more than `cost`, `(runs,)`; infinity if never.
 
         Args:
@@ -119,7 +119,7 @@ class Results:
             found.append(float(at.iloc[0]) if len(at) else math.inf)
         return np.array(found)
 
-    def frame(self, studies: Mapping[str, Study]) -> pd.DataFrame:
+    def frame(self, studies: Mapping[str, AnyStudy]) -> pd.DataFrame:
         """All rows of some studies as one long table.
 
         Args:
@@ -134,7 +134,7 @@ class Results:
         first = ["study", "method", "seed"]
         return table[first + [name for name in table.columns if name not in first]]
 
-    def made(self, studies: Iterable[Study]) -> dict[str, list[str]]:
+    def made(self, studies: Iterable[AnyStudy]) -> dict[str, list[str]]:
         """By which commits, when, and on which processors the runs were made."""
         facts = [run.made for study in studies for run in self.runs(study)]
         return {

@@ -27,7 +27,7 @@ from acl_gym.experiments.methods import warm_up
 from acl_gym.experiments.names import NETWORKS
 from acl_gym.experiments.results import Results, Run
 from acl_gym.experiments.store import Job, Store
-from acl_gym.experiments.study import Study
+from acl_gym.experiments.study import AnyStudy
 from acl_gym.utils.files import remove_stale
 
 logger = logging.getLogger("acl_gym")
@@ -38,7 +38,7 @@ class FolderInUseError(RuntimeError):
 
 
 def run_studies(
-    studies: Iterable[Study],
+    studies: Iterable[AnyStudy],
     seeds: Sequence[int],
     directory: Path,
     *,
@@ -91,13 +91,13 @@ def run_studies(
     return Results(found)
 
 
-def list_jobs(studies: Iterable[Study], seeds: Sequence[int]) -> list[Job]:
+def list_jobs(studies: Iterable[AnyStudy], seeds: Sequence[int]) -> list[Job]:
     """The runs to be made, seed by seed, so that early ones are of all studies.
 
     Of equal studies the most demanding says how many runs are made. Those of networks
     come first: they take longest, and no core is to wait for them at the end.
     """
-    distinct: dict[str, Study] = {}
+    distinct: dict[str, AnyStudy] = {}
     for study in studies:
         known = distinct.setdefault(study.key, study)
         if known.most_runs is not None and (

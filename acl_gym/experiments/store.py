@@ -17,7 +17,7 @@ import pyarrow.parquet as pq
 
 from acl_gym.experiments.provenance import code_of_runs, versions
 from acl_gym.experiments.results import Run
-from acl_gym.experiments.study import Study
+from acl_gym.experiments.study import AnyStudy
 from acl_gym.utils.files import write_atomically
 from acl_gym.utils.hashing import hashed
 from acl_gym.utils.typing import FloatArray
@@ -43,15 +43,14 @@ _UNREADABLE = (
 class Job:
     """One run to be made: a study with a seed."""
 
-    study: Study
+    study: AnyStudy
     seed: int
 
     @property
     def name(self) -> str:
         """The file name, without extension."""
         study = self.study
-        system = study.task.short_name.lower()
-        return f"{study.method}-{system}-{study.key}-{self.seed}"
+        return f"{study.method}-{study.subject}-{study.key}-{self.seed}"
 
     @cached_property
     def key(self) -> str:

@@ -2,18 +2,23 @@
 
 A study contains only JSON types, so that it can be kept beside its results, compared,
 and sent to other processes. An experiment is a few studies and how they are shown.
+
+`AnyStudy` is what the engine needs of a study. `Study` is one of a method that learns a
+policy; `swarms.study.SwarmStudy` is one of a swarm of moving agents.
 """
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, Generic
 
 import gymnasium as gym
 import numpy as np
 from gymnasium.vector import VectorEnv
+from typing_extensions import TypeVar
 
 from acl_gym.envs.control.environments import ControlVectorEnv
 from acl_gym.envs.wrappers.perturbations import perturbed
@@ -125,8 +130,63 @@ class Task:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Study:
-    """A method with its settings on a task: all that a run depends on but its seed.
+class AnyStudy(ABC):
+    """All that a run depends on but its seed, and what the engine needs to know of it.
+
+    Attributes:
+        method: a key of `methods.METHODS`, which makes the runs.
+        settings: of the method, JSON types.
+        most_runs: how many runs are made at most. No result depends on it.
+    """
+
+    method: str
+    settings: dict[str, Any] = field(default_factory=dict)
+    most_runs: int | None = None
+
+    @property
+    def inputs(self) -> dict[str, Any]:
+        """All that a result depends on but the seed, JSON types."""
+        inputs = asdict(self)
+        del inputs["most_runs"]
+        return inputs
+
+    @cached_property
+    def key(self) -> str:
+        """A short name that is a function of `inputs`."""
+        return hashed(self.inputs)[:12]
+
+    @property
+    @abstractmethod
+    def subject(self) -> str:
+        """What the method is applied to, as the names of files have it."""
+
+    @property
+    @abstractmethod
+    def measure(self) -> str:
+        """The column of `Run.rows` by which runs are summed up."""
+
+    @property
+    @abstractmethod
+    def unit(self) -> str:
+        """What curves are drawn over: "trial", "interaction", "step", "evaluation"."""
+
+    @property
+    @abstractmethod
+    def kernels(self) -> tuple[Any, ...]:
+        """Two studies for which this is the same need the same compiled kernels."""
+
+    @abstractmethod
+    def brief(self) -> AnyStudy:
+        """The same for a few steps: to compile its kernels, or to try it out."""
+
+    @abstractmethod
+    def curve_points(self) -> list[int] | None:
+        """The values of `env_steps` at which curves have points; None: those of rows."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Study(AnyStudy):
+    """A method that learns a policy, with its settings, on a task.
 
     Attributes:
         task: what is learned.
@@ -148,12 +208,9 @@ class Study:
             each evaluation.
         reversed_slots: whether the slots are in reverse order, each with the random
             numbers that it has otherwise.
-        most_runs: how many runs are made at most. No result depends on it.
     """
 
     task: Task
-    method: str
-    settings: dict[str, Any] = field(default_factory=dict)
     slots: int = 1
     kind: str = "fuzzy"
     cells: Any = None
@@ -163,23 +220,25 @@ class Study:
     spacing: float = 1.0
     watched: dict[str, tuple[int, int]] = field(default_factory=dict)
     reversed_slots: bool = False
-    most_runs: int | None = None
 
     @property
-    def inputs(self) -> dict[str, Any]:
-        """All that a result depends on but the seed, JSON types."""
-        inputs = asdict(self)
-        del inputs["most_runs"]
-        return inputs
+    def subject(self) -> str:
+        """See `AnyStudy.subject`."""
+        return self.task.short_name.lower()
 
-    @cached_property
-    def key(self) -> str:
-        """A short name that is a function of `inputs`."""
-        return hashed(self.inputs)[:12]
+    @property
+    def measure(self) -> str:
+        """The cost of the policy."""
+        return "policy_cost"
+
+    @property
+    def unit(self) -> str:
+        """See `AnyStudy.unit`."""
+        return "trial" if self.curve_points() is None else "interaction"
 
     @property
     def kernels(self) -> tuple[Any, ...]:
-        """Two studies for which this is the same need the same compiled kernels."""
+        """See `AnyStudy.kernels`."""
         task, settings = self.task, self.settings
         return (
             *(task.env_id, len(task.env), bool(task.perturbations), task.cost),
@@ -190,7 +249,7 @@ class Study:
         )
 
     def brief(self) -> Study:
-        """The same for a few steps: to compile its kernels, or to try it out."""
+        """See `AnyStudy.brief`."""
         if self.method == "planning":
             return replace(self, settings={**self.settings, "max_iterations": 1})
         if self.method in NETWORKS:
@@ -244,9 +303,14 @@ def _short(value: Any) -> str:
     return f"{value:.4g}" if isinstance(value, float) else str(value)
 
 
+S = TypeVar("S", bound=AnyStudy, default=Study)
+
+
 @dataclass(frozen=True, kw_only=True)
-class Experiment:
+class Experiment(Generic[S]):
     """A figure of the thesis, a trial beside it, or a comparison of methods.
+
+    Its studies are of one kind, which is `Study` where nothing else is said.
 
     Attributes:
         name: for instance "fig5.4".
@@ -265,8 +329,8 @@ class Experiment:
     name: str
     title: str
     section: str
-    studies: Mapping[str, Study]
-    references: Mapping[str, Study] = field(default_factory=dict)
+    studies: Mapping[str, S]
+    references: Mapping[str, S] = field(default_factory=dict)
     plots: tuple[str, ...] = ()
     table: str = ""
     claims: tuple[str, ...] = ()
@@ -275,6 +339,6 @@ class Experiment:
     options: Mapping[str, Any] = field(default_factory=dict)
 
     @property
-    def everything(self) -> list[Study]:
+    def everything(self) -> list[S]:
         """All that is run."""
         return [*self.studies.values(), *self.references.values()]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import zlib
 from collections.abc import Iterable
 from dataclasses import replace
 from typing import Any
@@ -12,6 +13,7 @@ import pandas as pd
 from acl_gym.experiments import systems
 from acl_gym.experiments.results import Results, Run
 from acl_gym.experiments.study import PENDULUM, Experiment, Study, Task
+from acl_gym.experiments.swarms.study import SwarmStudy
 
 OPTIMUM = 40.0
 TRIALS = 20
@@ -47,13 +49,33 @@ def make_run(study: Study, seed: int, costs: Iterable[float] | None = None) -> R
     return Run(pd.DataFrame(rows), table, float(at[-1]), "", seed, made)
 
 
-def make_results(experiment: Experiment, seeds: int = 3, **costs: Any) -> Results:
+def make_swarm_run(study: SwarmStudy, seed: int) -> Run:
+    """A run of a swarm: numbers drawn by the study and the seed, from 0.1 to 1."""
+    rng = np.random.default_rng([seed, zlib.crc32(study.key.encode())])
+    points = study.curve_points() or [study.steps]
+    names = {
+        "aggregation": ("drift", "centre_speed", "size", "rms", "parts"),
+        "pso": ("value",),
+        "moving-ants": ("entries", "learned", "differing", "same_draws"),
+    }[study.method]
+    if study.measure == "miss":
+        names = (*names, "miss", "centre_miss")
+    rows = {name: rng.uniform(0.1, 1.0, len(points)) for name in names}
+    at = {"env_steps": np.array(points, dtype=np.float64)}
+    table = rng.random(2 * study.settings.get("agents", 50))
+    return Run(pd.DataFrame({**at, **rows}), table, 1.0, "", seed)
+
+
+def make_results(experiment: Experiment[Any], seeds: int = 3, **costs: Any) -> Results:
     """Runs of all studies; `costs` are those of each seed under a study's label."""
     named = {**experiment.studies, **experiment.references}
     runs = {}
     for label, study in named.items():
         count = min(seeds, study.most_runs or seeds)
         given = costs.get(label, [None] * count)
+        if isinstance(study, SwarmStudy):
+            runs[study.key] = [make_swarm_run(study, seed) for seed in range(count)]
+            continue
         runs[study.key] = [make_run(study, i, each) for i, each in enumerate(given)]
     return Results(runs)
 

@@ -262,7 +262,7 @@ def test_files_that_were_changed_do_not_count_as_done(
     def edit_results() -> None:
         path = tmp_path / "results.json"
         values = json.loads(path.read_text())
-        values["experiments"][0]["studies"][0]["policy_cost"]["min"] = 0.0
+        values["experiments"][0]["studies"][0]["last"]["min"] = 0.0
         path.write_text(json.dumps(values))
         with pytest.raises(ValueError, match="damaged or edited since"):
             reproduce.write_pages(tmp_path)
@@ -293,5 +293,5 @@ def test_files_that_were_changed_do_not_count_as_done(
             *(found["experiments"][0]["studies"] for found in (first, again)),
             strict=True,
         ):
-            assert one["policy_cost"] == other["policy_cost"]
+            assert one["last"] == other["last"]
         assert reproduced(tmp_path)[1]

@@ -115,14 +115,14 @@ class TestSummary:
         assert list(studies) == [*pendulums(), "J*"]
         study = studies["ACL, fuzzy"]
         assert study["runs"] == 3
-        assert study["policy_cost"]["min"] < study["policy_cost"]["interquartile_mean"]
+        assert study["last"]["min"] < study["last"]["interquartile_mean"]
         assert study["parameters"] == str(pendulums()["ACL, fuzzy"])
         for curve in study["curves"].values():
             assert len(curve["mean"]) == TRIALS
             lines = (curve[name] for name in ("low", "mean", "high"))
             for low, mean, high in zip(*lines, strict=True):
                 assert low <= mean * (1 + 1e-4) <= high * (1 + 2e-4)
-        assert studies["J*"]["policy_cost"]["low"] is None
+        assert studies["J*"]["last"]["low"] is None
 
     def test_long_curves_are_thinned(self) -> None:
         study = pendulums()["ACL, fuzzy"]

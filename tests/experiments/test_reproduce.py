@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -13,7 +14,7 @@ from tests.experiments.synthetic import make_results
 
 DRAWN = list(
     {
-        (each.plots, next(iter(each.studies.values())).task.env_id): each
+        (each.plots, next(iter(each.studies.values())).subject): each
         for each in reproduce.EXPERIMENTS
     }.values()
 )
@@ -22,7 +23,7 @@ DRAWN = list(
 
 @pytest.mark.parametrize("experiment", DRAWN, ids=lambda each: each.name)
 def test_every_figure_of_every_system_is_drawn(
-    experiment: Experiment, tmp_path: Path
+    experiment: Experiment[Any], tmp_path: Path
 ) -> None:
     plots.save(experiment, make_results(experiment, 2), tmp_path, ("svg",))
     assert "<svg" in (tmp_path / f"{experiment.name}.svg").read_text()[:1000]
@@ -33,7 +34,7 @@ def test_every_figure_of_every_system_is_drawn(
     [each for each in reproduce.EXPERIMENTS if each.table or each in DRAWN],
     ids=lambda each: each.name,
 )
-def test_every_kind_of_summary_is_json(experiment: Experiment) -> None:
+def test_every_kind_of_summary_is_json(experiment: Experiment[Any]) -> None:
     found = outcome.summary(experiment, make_results(experiment, 2))
     read = json.loads(json.dumps(found, allow_nan=False))
     assert read["name"] == experiment.name

@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 
 from acl_gym.experiments import systems
 from acl_gym.experiments.methods import make_agent
-from acl_gym.experiments.plots import curves, dots, policies, theory
+from acl_gym.experiments.plots import curves, dots, policies, swarms, theory
 from acl_gym.experiments.plots.looks import in_symbols
 from acl_gym.experiments.results import Results
 from acl_gym.experiments.study import Experiment
@@ -22,7 +22,7 @@ from acl_gym.plotting.animation import SHOWN, animate
 from acl_gym.plotting.style import in_style
 from acl_gym.utils.files import write_atomically
 
-PLOTS: dict[str, Callable[[Experiment, Results], Figure]] = {
+PLOTS: dict[str, Callable[[Experiment[Any], Results], Figure]] = {
     "bands": curves.bands,
     "measures": curves.measures,
     "policies": policies.policies,
@@ -40,6 +40,12 @@ PLOTS: dict[str, Callable[[Experiment, Results], Figure]] = {
     "returns": curves.returns,
     "policy_maps": policies.policy_maps,
     "trajectories": policies.trajectories,
+    "centre": swarms.centre,
+    "delays": swarms.delays,
+    "foraging": swarms.foraging,
+    "optimum": swarms.optimum,
+    "least_values": swarms.least_values_over_time,
+    "colonies": swarms.colonies,
 }
 """What draws the figure of each name."""
 
@@ -50,7 +56,7 @@ CAPTIONS: dict[str, dict[str, str]] = tomllib.loads(
 
 
 @in_style()
-def draw(plot: str, experiment: Experiment, results: Results) -> Figure:
+def draw(plot: str, experiment: Experiment[Any], results: Results) -> Figure:
     """Draw a figure.
 
     Args:
@@ -63,7 +69,7 @@ def draw(plot: str, experiment: Experiment, results: Results) -> Figure:
     return figure
 
 
-def file_name(experiment: Experiment, plot: str) -> str:
+def file_name(experiment: Experiment[Any], plot: str) -> str:
     """The name of a figure's files: that of the experiment, or of one figure of many."""
     return experiment.name if len(experiment.plots) == 1 else plot
 
@@ -116,7 +122,7 @@ def drawing(directory: Path) -> Iterator[Callable[..., None]]:
 
 
 def save(
-    experiment: Experiment,
+    experiment: Experiment[Any],
     results: Results,
     directory: Path,
     kinds: tuple[str, ...] = ("png", "svg"),
@@ -140,7 +146,7 @@ def save(
 @in_style()
 def _save_figure(
     plot: str,
-    experiment: Experiment,
+    experiment: Experiment[Any],
     results: Results,
     directory: Path,
     kinds: tuple[str, ...],

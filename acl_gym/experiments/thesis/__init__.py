@@ -4,6 +4,8 @@ The parameters are those of Tables 4.1 and 5.2; what the thesis leaves open is d
 `experiments.systems`, and said in the text of the experiment.
 """
 
+from typing import Any
+
 from acl_gym.experiments.claims import Claim
 from acl_gym.experiments.study import Experiment
 from acl_gym.experiments.thesis import (
@@ -12,6 +14,8 @@ from acl_gym.experiments.thesis import (
     chapter4,
     chapter5,
     chapter5_claims,
+    chapter6,
+    chapter6_claims,
     theory,
 )
 from acl_gym.experiments.thesis.common import FEWER
@@ -21,11 +25,12 @@ __all__ = ["CLAIMS", "EXPERIMENTS", "FEWER", "RUNS"]
 RUNS = 30
 """Runs of each study, as in the thesis; their seeds are 0 to 29."""
 
-EXPERIMENTS: tuple[Experiment, ...] = (
+EXPERIMENTS: tuple[Experiment[Any], ...] = (
     *theory.EXPERIMENTS,
     *chapter3.EXPERIMENTS,
     *chapter4.EXPERIMENTS,
     *chapter5.EXPERIMENTS,
+    *chapter6.EXPERIMENTS,
 )
 
 CLAIMS: tuple[Claim, ...] = (
@@ -33,4 +38,5 @@ CLAIMS: tuple[Claim, ...] = (
     *chapter4.CLAIMS,
     *chapter5_claims.CLAIMS,
     *theory.CLAIMS,
+    *chapter6_claims.CLAIMS,
 )

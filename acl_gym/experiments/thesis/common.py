@@ -14,11 +14,12 @@ import numpy as np
 from acl_gym.experiments.claims import Claim, Part, Tried
 from acl_gym.experiments.results import Results
 from acl_gym.experiments.statistics import estimate, median, ratio
-from acl_gym.experiments.study import Experiment, Study
+from acl_gym.experiments.study import AnyStudy, Experiment, Study
 from acl_gym.utils.text import digits
 from acl_gym.utils.typing import FloatArray
 
 T = TypeVar("T")
+S = TypeVar("S", bound=AnyStudy)
 
 _WORDS = tomllib.loads(
     files("acl_gym.experiments.thesis")
@@ -62,7 +63,7 @@ def sweep(symbol: str, values: Iterable[Any], make: Callable[[Any], T]) -> dict[
     return {f"{symbol} = {number(value)}": make(value) for value in values}
 
 
-def fewer(studies: Mapping[str, Study]) -> dict[str, Study]:
+def fewer(studies: Mapping[str, S]) -> dict[str, S]:
     """The same studies with at most `FEWER` runs."""
     return {label: replace(s, most_runs=FEWER) for label, s in studies.items()}
 

@@ -23,6 +23,7 @@ from acl_gym.experiments.results import Results
 from acl_gym.experiments.study import Experiment, Study
 from acl_gym.plotting.learning import steps_of
 from acl_gym.plotting.style import WIDTH
+from tests.experiments.plots.test_swarms import BY_PLOT as OF_SWARMS
 from tests.experiments.synthetic import (
     OPTIMUM,
     TRIALS,
@@ -137,7 +138,8 @@ def lines_of(ax: Any, study: Study) -> list[Any]:
 
 
 def test_every_plot_has_a_case_and_a_caption() -> None:
-    assert {plot for _, plot, _ in CASES.values()} == set(plots.PLOTS)
+    cases = {plot for _, plot, _ in CASES.values()}
+    assert cases | set(OF_SWARMS) == set(plots.PLOTS)
     assert set(plots.CAPTIONS) == set(plots.PLOTS)
     for caption in plots.CAPTIONS.values():
         assert caption["text"].endswith(".")

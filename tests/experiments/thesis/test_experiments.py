@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from typing import Any
 
 import pytest
 
@@ -23,6 +24,8 @@ FIGURES = [
     *(f"fig3.{n}" for n in range(11, 15)),
     *(f"fig4.{n}" for n in range(6, 15)),
     *(f"fig5.{n}" for n in range(2, 18)),
+    *("fig6.centre", "fig6.delays", "fig6.foraging", "fig6.optimum"),
+    *("fig6.order", "fig6.colony"),
 ]
 BESIDE = {
     *("row-choices", "row-orders", "world-choices"),
@@ -50,7 +53,7 @@ def test_every_figure_is_there_and_what_was_tried_beside_them() -> None:
 
 @pytest.mark.parametrize("experiment", EXPERIMENTS, ids=lambda each: each.name)
 def test_experiments_decide_or_explain_claims_that_there_are(
-    experiment: Experiment,
+    experiment: Experiment[Any],
 ) -> None:
     known = {claim.name for claim in CLAIMS}
     assert {*experiment.claims, *experiment.explains} <= known
@@ -132,7 +135,7 @@ def test_what_takes_long_beside_the_thesis_has_fewer_runs() -> None:
     long = {name for name, most in by_runs.items() if most == {FEWER}}
     assert long == {
         *("navigation-long", "omega-max", "local-update"),
-        *("pendulum-long", "fuzzy-ants"),
+        *("pendulum-long", "fuzzy-ants", "fig6.optimum"),
     }
     assert all(most == {None} for name, most in by_runs.items() if name not in long)
 

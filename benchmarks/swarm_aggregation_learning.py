@@ -76,8 +76,10 @@ def of_table(kind: Any, seed: int) -> tuple[dict[str, float], int]:
 
 def of_ppo(seed: int) -> tuple[dict[str, float], int]:
     """Stable-Baselines3's PPO, one network for all agents."""
+    import torch
     from stable_baselines3 import PPO
 
+    torch.set_num_threads(1)  # networks are small
     model = PPO(
         "MlpPolicy",
         VectorEnvAdapter(make()),

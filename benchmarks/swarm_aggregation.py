@@ -9,7 +9,8 @@ that the density is the same for any number of agents. Measured are
   pettingzoo  the same through its view as a `ParallelEnv`
 
 and beside them mpe2's simple_spread, in the same run, if `make peers-mpe2` has made its
-environment. All use one core. The growth is the exponent p of the line that fits the
+environment. All use one core, and seconds are those of the processor, so that other work
+on the machine counts less. The growth is the exponent p of the line that fits the
 logarithms best: the time of a step is proportional to n^p.
 
 examples:
@@ -134,8 +135,8 @@ def seconds_a_step(work: Work, seconds: float, repetitions: int) -> float:
     work()  # compiles
     best = math.inf
     for _ in range(repetitions):
-        steps, start = 0, time.perf_counter()
-        while (passed := time.perf_counter() - start) < seconds or steps == 0:
+        steps, start = 0, time.process_time()
+        while (passed := time.process_time() - start) < seconds or steps == 0:
             steps += work()
         best = min(best, passed / steps)
     return best

@@ -28,7 +28,7 @@ from acl_gym import ACL, Fuzzy, QLearning, ReturningACL, VectorEnvAdapter
 ENV = "acl_gym/SwarmAggregation-v0"
 AGENTS, STEPS, EPISODES = 10, 100, 10
 CELLS = (9, 9)
-TRIALS, PPO_STEPS = 200, 500_000
+TRIALS, PPO_STEPS = 200, 300_000
 """A trial of ten agents is 1,000 interactions."""
 
 Policy = Callable[[np.ndarray], Any]
@@ -76,8 +76,10 @@ def of_table(kind: Any, seed: int) -> tuple[dict[str, float], int]:
 
 def of_ppo(seed: int) -> tuple[dict[str, float], int]:
     """Stable-Baselines3's PPO, one network for all agents."""
+    import torch
     from stable_baselines3 import PPO
 
+    torch.set_num_threads(1)  # networks are small
     model = PPO(
         "MlpPolicy",
         VectorEnvAdapter(make()),

@@ -13,8 +13,11 @@ from acl_gym.utils import validation
 from acl_gym.utils.compiling import njit
 from acl_gym.utils.typing import FloatArray, IntArray
 
-_PAIRS_AT_ONCE = 10_000_000
-"""Pairs of agents that are looked at before the room for links is checked."""
+_FEW_PAIRS = 4_000_000
+"""Pairs of agents in neighbouring cells up to which room for all of them is reserved."""
+
+_SAMPLE = 100
+"""Agents whose links are counted to see whether there is room for those of all."""
 
 _NOTHING: IntArray = np.empty(0, np.int64)
 
@@ -40,22 +43,30 @@ def within_radius(
     useful = sigma[(sigma > 0.0) & np.isfinite(sigma)]
     side = float(np.median(useful)) if useful.size else math.inf
     cells = sort_into_cells(np.ascontiguousarray(x[:, :MOST_AXES]), side)
-    offsets = np.zeros(n + 1, np.int64)
-    n_links, at_once = 0, max(1, _PAIRS_AT_ONCE // n)
-    for begin in range(0, n, at_once):
-        n_links += _within(
-            *(x, sigma, include_self, cells),
-            *(begin, min(begin + at_once, n), offsets, _NOTHING),
-        )
-        # Now and then, because counting what has no room would take long.
-        validation.check_memory(
-            f"{n_links:,} links", 24 * n_links, "use a smaller radius or fewer agents"
-        )
-    np.cumsum(offsets, out=offsets)
-    sender = np.empty(n_links, np.int64)
-    _within(x, sigma, include_self, cells, 0, n, offsets, sender)
-    # Transposed twice, the senders of each receiver are sorted.
-    return _transposed(*_transposed(sender, offsets))
+    counts, room = np.empty(n, np.int64), _pairs(sigma, cells, _FEW_PAIRS)
+    if room > _FEW_PAIRS:
+        room = n + _counted(x, sigma, include_self, cells, counts)
+    sender = np.empty(room, np.int64)
+    n_links = _within(x, sigma, include_self, cells, 1, counts, sender)
+    return _transposed(*_by_sender(sender[:n_links], counts, cells[2]))
+
+
+def _counted(
+    x: FloatArray,
+    sigma: FloatArray,
+    include_self: bool,
+    cells: tuple[Any, ...],
+    counts: IntArray,
+) -> int:
+    """Count the links before there is room for them; see `within_radius`."""
+    n = len(x)
+    step = max(1, n // _SAMPLE)
+    sampled = _within(x, sigma, include_self, cells, step, counts, _NOTHING)
+    about = sampled * n // -(-n // step)
+    validation.check_memory(
+        f"about {about:,} links", 24 * about, "use a smaller radius or fewer agents"
+    )
+    return int(_within(x, sigma, include_self, cells, 1, counts, _NOTHING))
 
 
 def nearest(x: FloatArray, k: int, include_self: bool) -> tuple[IntArray, IntArray]:
@@ -95,71 +106,127 @@ def _within(
     sigma: FloatArray,
     include_self: bool,
     cells: tuple[Any, ...],
-    begin: int,
-    end: int,
-    offsets: IntArray,
+    step: int,
+    counts: IntArray,
     sender: IntArray,
 ) -> int:
-    """Count the links of receiver i in `offsets[i + 1]`, or fill in the senders.
+    """Count the links of some receivers, and list the senders if there is room.
 
     Args:
         x: see `within_radius`.
         sigma: see there.
         include_self: see there.
         cells: the fields of `Cells`, of the first three coordinates.
-        begin: the first of the receivers, in the order of the cells.
-        end: the one after the last.
-        offsets: receives the numbers of links; else where those of each receiver begin.
-        sender: of no length, to count; else receives the senders, in any order.
+        step: 1 for all receivers, 2 for every other one in the order of the cells.
+        counts: `(n,)`, receives how many links each receiver has.
+        sender: receives the senders, receiver after receiver in the order of the cells,
+            and has room for n more; or of no length.
 
     Returns:
         How many links they are.
     """
-    shape, first, agent, cell, place, width = cells
-    n, dim = x.shape
-    planes, rows, columns = shape
-    counting = sender.size == 0
-    found = np.empty(0 if counting else n + 1, np.int64)
+    _, first, agent, _, place, _ = cells
+    dim = x.shape[1]
+    listing = sender.size > 0
     total = 0
-    for at in range(begin, end):
+    for at in range(0, agent.size, step):
         i = agent[at]
         radius = sigma[i]
-        rest, column = divmod(cell[at], columns)
-        plane, row = divmod(rest, rows)
-        to_planes = _reach(radius, width[0], planes)
-        to_rows = _reach(radius, width[1], rows)
-        to_columns = _reach(radius, width[2], columns)
-        from_column = max(column - to_columns, 0)
-        to_column = min(column + to_columns + 1, columns)
+        planes, rows, columns = _block(at, radius, cells)
         x0, x1, x2 = place[0, at], place[1, at], place[2, at]
         count = 0
-        for p in range(max(plane - to_planes, 0), min(plane + to_planes + 1, planes)):
-            for q in range(max(row - to_rows, 0), min(row + to_rows + 1, rows)):
-                line = (p * rows + q) * columns
-                for j in range(first[line + from_column], first[line + to_column]):
+        for p in range(planes[0], planes[1]):
+            for q in range(rows[0], rows[1]):
+                line = _line(p, q, cells)
+                for j in range(first[line + columns[0]], first[line + columns[1]]):
                     d0, d1, d2 = x0 - place[0, j], x1 - place[1, j], x2 - place[2, j]
                     square = d0 * d0 + d1 * d1 + d2 * d2
                     for k in range(MOST_AXES, dim):
                         d = x[i, k] - x[agent[j], k]
                         square += d * d
-                    if not counting:
+                    if listing:
                         # Overwritten by the next one if it is too far: no branch.
-                        found[np.uint64(count)] = agent[j]
+                        sender[np.uint64(total + count)] = agent[j]
                     count += (np.sqrt(square) < radius) & (include_self | (j != at))
         total += count
-        if counting:
-            offsets[i + 1] = count
-        else:
-            for link in range(count):
-                sender[offsets[i] + link] = found[link]
+        counts[i] = count
     return total
 
 
 @njit(error_model="numpy")
-def _reach(radius: float, width: float, count: int) -> int:
-    """How many cells along an axis a radius reaches to either side."""
+def _pairs(sigma: FloatArray, cells: tuple[Any, ...], enough: int) -> int:
+    """How many pairs of agents `_within` looks at; it stops beyond `enough`."""
+    _, first, agent, _, _, _ = cells
+    total = 0
+    for at in range(agent.size):
+        planes, rows, columns = _block(at, sigma[agent[at]], cells)
+        for p in range(planes[0], planes[1]):
+            for q in range(rows[0], rows[1]):
+                line = _line(p, q, cells)
+                total += first[line + columns[1]] - first[line + columns[0]]
+        if total > enough:
+            break
+    return total
+
+
+Span = tuple[int, int]
+
+
+@njit(inline="always")
+def _block(at: int, radius: float, cells: tuple[Any, ...]) -> tuple[Span, Span, Span]:
+    """The planes, rows and columns of cells that the radius of an agent reaches."""
+    shape, _, _, cell, _, width = cells
+    rest, column = divmod(cell[at], shape[2])
+    plane, row = divmod(rest, shape[1])
+    return (
+        _span(plane, radius, width[0], shape[0]),
+        _span(row, radius, width[1], shape[1]),
+        _span(column, radius, width[2], shape[2]),
+    )
+
+
+@njit(error_model="numpy")
+def _span(index: int, radius: float, width: float, count: int) -> Span:
+    """The cells along an axis that a radius reaches: the first, and the one after the last."""
     cells = np.ceil(radius * SLACK / width)
-    return int(cells) if cells < count else count
+    reach = int(cells) if cells < count else count
+    return max(index - reach, 0), min(index + reach + 1, count)
+
+
+@njit(inline="always")
+def _line(plane: int, row: int, cells: tuple[Any, ...]) -> int:
+    """The number of the first cell of a row."""
+    shape = cells[0]
+    return int((plane * shape[1] + row) * shape[2])
+
+
+@njit
+def _by_sender(
+    sender: IntArray, counts: IntArray, order: IntArray
+) -> tuple[IntArray, IntArray]:
+    """The receivers of each sender, in any order, and where those of each begin.
+
+    Args:
+        sender: of all links, receiver after receiver.
+        counts: how many links each receiver has.
+        order: the receivers in that order.
+    """
+    n = order.size
+    begin = np.zeros(n + 1, np.int64)
+    for j in sender:
+        begin[j + 1] += 1
+    for j in range(n):
+        begin[j + 1] += begin[j]
+    free = begin[:-1].copy()
+    receivers = np.empty_like(sender)
+    link = 0
+    for i in order:
+        for _ in range(counts[i]):
+            j = sender[link]
+            receivers[free[j]] = i
+            free[j] += 1
+            link += 1
+    return receivers, begin
 
 
 @njit

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -301,4 +302,4 @@ def _distance(one: FloatArray, other: FloatArray) -> float:
     for axis in range(one.size):
         y = one[axis] - other[axis]
         square += y * y
-    return float(np.sqrt(square))
+    return math.sqrt(square)

@@ -265,7 +265,7 @@ def _entry(
     if length == 0.0 or ahead <= 0.0 or np.sqrt(square) >= radius:
         return 1.0
     back = np.sqrt(max(0.0, radius * radius - square) / length)
-    return max(0.0, min(1.0, ahead / length - back))
+    return float(max(0.0, min(1.0, ahead / length - back)))
 
 
 @njit

@@ -5,8 +5,10 @@ a row of an `Environment`; its mind is a row of `DynamicAgents`; a `Channel` car
 messages between minds. `run` lets them run. docs/moving-agents.md has the framework in
 words, and an example to begin with.
 
-`acl_gym.swarm.pso` has particle swarm optimization; `minimize` and its parts, which are
-imported when they are first used, are names of this package as well.
+`acl_gym.swarm.pso` has particle swarm optimization, and `acl_gym.swarm.aggregation` has
+swarms that aggregate and forage. `minimize` and its parts, `AggregatingAgents`, `Field`
+and `flow` are names of this package as well. All of these are imported when they are
+first used.
 
 Nothing in this package needs Gymnasium.
 """
@@ -24,21 +26,30 @@ from acl_gym.swarm.run import History, run
 from acl_gym.swarm.topologies import Everyone, Nearest, Radius, Ring, VonNeumann
 
 if TYPE_CHECKING:
+    from acl_gym.swarm import aggregation, pso
+    from acl_gym.swarm.aggregation import AggregatingAgents, Field, flow
     from acl_gym.swarm.pso import Landscape, ParticleSwarm, minimize
 
 # Name -> module, imported on first use.
 _LAZY = {
+    "AggregatingAgents": "acl_gym.swarm.aggregation",
+    "Field": "acl_gym.swarm.aggregation",
     "Landscape": "acl_gym.swarm.pso",
     "ParticleSwarm": "acl_gym.swarm.pso",
+    "flow": "acl_gym.swarm.aggregation",
     "minimize": "acl_gym.swarm.pso",
 }
 
+_PACKAGES = ("aggregation", "pso")
+
 __all__ = [
+    "AggregatingAgents",
     "Channel",
     "Delayed",
     "DynamicAgents",
     "Environment",
     "Everyone",
+    "Field",
     "History",
     "Inbox",
     "Landscape",
@@ -50,7 +61,10 @@ __all__ = [
     "Ring",
     "Topology",
     "VonNeumann",
+    "aggregation",
+    "flow",
     "minimize",
+    "pso",
     "run",
 ]
 
@@ -58,8 +72,10 @@ __all__ = [
 def __getattr__(name: str) -> Any:
     if name in _LAZY:
         return getattr(import_module(_LAZY[name]), name)
+    if name in _PACKAGES:
+        return import_module(f"acl_gym.swarm.{name}")
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *_LAZY})
+    return sorted({*globals(), *_LAZY, *_PACKAGES})

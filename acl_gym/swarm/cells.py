@@ -67,7 +67,9 @@ def sort_into_cells(
             largest = max(largest, positions[i, k])
         extent = largest - least
         count = min(most, np.floor(extent / (radius * SLACK)))
-        if count >= 1.0 and extent < np.inf:
+        # Where agents are too close to each other to be told apart, `count / extent` is
+        # infinite: one cell holds them.
+        if count >= 1.0 and extent < np.inf and count / extent < np.inf:
             axis = absent + k
             shape[axis] = int(count)
             low[axis], scale[axis] = least, count / extent
@@ -81,7 +83,7 @@ def sort_into_cells(
         for k in range(dim):
             axis = absent + k
             index = int((positions[i, k] - low[axis]) * scale[axis])
-            cell = cell * shape[axis] + min(index, shape[axis] - 1)
+            cell = cell * shape[axis] + max(0, min(index, shape[axis] - 1))
         cell_of[i] = cell
         first[cell + 1] += 1
     for cell in range(1, first.size):

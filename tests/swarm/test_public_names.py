@@ -8,7 +8,7 @@ import sys
 import pytest
 
 from acl_gym import swarm
-from acl_gym.swarm import pso
+from acl_gym.swarm import aggregation, pso
 
 
 def test_every_public_name_is_there() -> None:
@@ -16,7 +16,9 @@ def test_every_public_name_is_there() -> None:
         assert hasattr(swarm, name)
     assert set(swarm.__all__) <= set(dir(swarm))
     for name in swarm._LAZY:
-        assert getattr(swarm, name) is getattr(pso, name)
+        source = pso if hasattr(pso, name) else aggregation
+        assert getattr(swarm, name) is getattr(source, name)
+    assert {"AggregatingAgents", "Field", "flow", "minimize"} <= set(swarm._LAZY)
 
 
 def test_an_unknown_name_is_an_attribute_error() -> None:
@@ -32,6 +34,8 @@ from acl_gym import swarm
 print("acl_gym.swarm.pso" in sys.modules)
 found = swarm.minimize(lambda x: (x * x).sum(axis=1), [(-1, 1)], seed=0)
 print("acl_gym.swarm.pso" in sys.modules, found.fun < 1e-9)
+print("acl_gym.swarm.aggregation" in sys.modules)
+print(swarm.aggregation.Field is swarm.Field, swarm.pso.minimize is swarm.minimize)
 """
     done = subprocess.run(
         [sys.executable, "-W", "error", "-c", code],
@@ -40,4 +44,4 @@ print("acl_gym.swarm.pso" in sys.modules, found.fun < 1e-9)
         check=False,
     )
     assert done.returncode == 0, done.stderr
-    assert done.stdout.split() == ["False", "True", "True"]
+    assert done.stdout.split() == ["False", "True", "True", "False", "True", "True"]

@@ -6,14 +6,21 @@ import copy
 from collections.abc import Mapping
 from typing import Any
 
-import numpy as np
 from gymnasium import spaces
 from gymnasium.error import ResetNeeded
 from pettingzoo import ParallelEnv
 
+from acl_gym.envs.control.bookkeeping import checked_options
 from acl_gym.envs.swarm_aggregation.vector import SwarmAggregationVectorEnv
 from acl_gym.utils import validation
 from acl_gym.utils.typing import FloatArray
+
+_OF_VECTORS = {
+    "num_envs": "num_agents",
+    "max_episode_steps": "max_cycles",
+    "autoreset_mode": "reset(), since nothing starts anew by itself",
+}
+"""Parameters of the vector environment, and what is in their place here."""
 
 Each = dict[str, Any]
 """A value for each agent by its name."""
@@ -67,6 +74,11 @@ class SwarmAggregationParallelEnv(
         render_mode: str | None = None,
         **parameters: Any,
     ) -> None:
+        for name, instead in _OF_VECTORS.items():
+            if name in parameters:
+                raise TypeError(
+                    f"parallel_env has no parameter {name!r}; use {instead}."
+                )
         self._env = SwarmAggregationVectorEnv(
             validation.integer("num_agents", num_agents, at_least=1),
             max_episode_steps=validation.integer("max_cycles", max_cycles, at_least=1),
@@ -104,7 +116,13 @@ class SwarmAggregationParallelEnv(
 
         Returns:
             Observations and empty infos of all agents.
+
+        Raises:
+            ValueError: the seed or a state is not valid.
+            TypeError: the seed is not an integer, or `options` is no dict.
         """
+        if options is not None and not isinstance(options, dict):
+            checked_options(options, ())  # says so
         kept = {key: value for key, value in (options or {}).items() if key == "state"}
         observations, _ = self._env.reset(seed=seed, options=kept)
         self.agents = self.possible_agents[:]
@@ -134,13 +152,23 @@ class SwarmAggregationParallelEnv(
         """
         if not self.agents:
             raise ResetNeeded("no agents are in the world; call reset() first.")
+        if not isinstance(actions, Mapping):
+            raise TypeError(
+                "actions must be a dict with one for each agent, such as "
+                f"{{{self.agents[0]!r}: action}}, got {validation.shown(actions)}."
+            )
         if set(actions) != set(self.agents):
             raise ValueError(
                 f"actions must hold one for each of {len(self.agents)} agents, "
                 f"{self.agents[0]} to {self.agents[-1]}, got "
                 f"{validation.shown(sorted(map(str, actions)))}."
             )
-        rows = np.array([actions[agent] for agent in self.agents])
+        rows = validation.as_array([actions[agent] for agent in self.agents])
+        if rows is None:
+            raise TypeError(
+                "actions must be alike for all agents, elements of action_space(agent), "
+                f"got {validation.shown(dict(actions))}."
+            )
         observations, rewards, terminated, truncated, infos = self._env.step(rows)
         told = [
             {"distance": distance, "collisions": collisions}

@@ -26,21 +26,32 @@ OBSERVATIONS = ("neighbours", "potential")
 
 MOST_FOLLOWERS = 1_000_000
 
+MOST_WITHOUT_RADIUS = 20_000
+"""Agents of the potential rule that all hear each other: a step takes O(n^2) time."""
+
+LEAST, MOST = 1e-9, 1e9
+"""Limits of all numbers, so that costs and forces are finite."""
+
 _POSITIVE = ("max_speed", "time_step", "half_width", "spread", "mass", "max_force")
 _NOT_NEGATIVE = (
     *("damping", "attraction", "repulsion", "collision_distance"),
     *("distance_weight", "collision_weight", "profile_weight"),
 )
+_POSITIVE_RANGE = validation.Range(at_least=LEAST, at_most=MOST)
 
 
 @dataclass(frozen=True, kw_only=True)
 class SwarmAggregation:
     """A square world in which agents move, meet and avoid each other.
 
+    Numbers are the same for all agents, at most 1e9 in size, and at least 1e-9 where they
+    must be > 0.
+
     Attributes:
         followers: how many agents share the world that learn nothing and follow the
             potential rule, >= 0; None: 9 in the single environment, none in the vector
-            environment.
+            environment. More than 20,000 agents need a `sensing_radius` where there are
+            followers or `observe` is "potential", because all would hear each other.
         point_mass: whether agents have inertia and are moved by forces; otherwise they
             move at the velocity that they choose, (6.4).
         continuous: whether an action is a real velocity or force, in place of one of
@@ -115,12 +126,14 @@ class SwarmAggregation:
         for name in ("point_mass", "continuous"):
             values[name] = validation.boolean(name, getattr(self, name))
         for name in _POSITIVE:
-            values[name] = validation.number(name, getattr(self, name), above=0)
+            values[name] = validation.number(name, getattr(self, name), _POSITIVE_RANGE)
         for name in _NOT_NEGATIVE:
-            values[name] = validation.number(name, getattr(self, name), at_least=0)
+            values[name] = validation.number(
+                name, getattr(self, name), at_least=0, at_most=MOST
+            )
         if self.sensing_radius is not None:
             values["sensing_radius"] = validation.number(
-                "sensing_radius", self.sensing_radius, above=0
+                "sensing_radius", self.sensing_radius, _POSITIVE_RANGE
             )
         values["valleys"] = _rows("valleys", self.valleys, "(x, y, depth, width)")
         values["obstacles"] = _rows("obstacles", self.obstacles, "(x, y, radius)")
@@ -242,10 +255,11 @@ class SwarmAggregation:
 
     def _check_places(self) -> None:
         for x, y, radius in self.obstacles:
-            if not (radius > 0 and max(abs(x), abs(y)) + radius <= self.half_width):
+            fits = max(abs(x), abs(y)) + radius <= self.half_width
+            if not (radius >= LEAST and fits):
                 raise ValueError(
-                    "obstacles must be rows (x, y, radius) with radius > 0 that lie in "
-                    f"the world, whose half_width is {self.half_width:g}, got "
+                    f"obstacles must be rows (x, y, radius) with radius >= {LEAST:g} that "
+                    f"lie in the world, whose half_width is {self.half_width:g}, got "
                     f"{(x, y, radius)}."
                 )
         # A covered world would have no place to start.
@@ -256,8 +270,16 @@ class SwarmAggregation:
                 f"area {covered:.3g} in a world with {4 * self.half_width**2:.3g}."
             )
         for valley in self.valleys:
-            if not valley[3] > 0:
-                raise ValueError(f"widths of valleys must be > 0, got {valley[3]:g}.")
+            if valley[3] not in _POSITIVE_RANGE:
+                raise ValueError(
+                    f"widths of valleys must lie in {_POSITIVE_RANGE}, got "
+                    f"{valley[3]:g}."
+                )
+            if max(map(abs, valley)) > MOST:
+                raise ValueError(
+                    "valleys must be rows (x, y, depth, width) of numbers of at most "
+                    f"{MOST:g}, got {valley}."
+                )
 
 
 def _rows(name: str, given: Any, columns: str) -> tuple[tuple[float, ...], ...]:

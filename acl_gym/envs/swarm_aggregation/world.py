@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from acl_gym.envs.swarm_aggregation.kernels import look_around
-from acl_gym.envs.swarm_aggregation.system import SwarmAggregation
+from acl_gym.envs.swarm_aggregation.system import MOST_WITHOUT_RADIUS, SwarmAggregation
 from acl_gym.swarm.aggregation import forces_within
 from acl_gym.swarm.aggregation.particles import shortened
 from acl_gym.swarm.cells import sort_into_cells
@@ -82,7 +82,8 @@ class World:
         states: `(n, state_size)`; None before the first `start`.
 
     Raises:
-        ValueError: there is no memory for so many agents.
+        ValueError: there is no memory for so many agents, or a step would take too long
+            without a sensing radius.
     """
 
     def __init__(
@@ -99,6 +100,13 @@ class World:
         validation.check_memory(
             f"{self.n:,} agents", _BYTES_AN_AGENT * self.n, "use fewer"
         )
+        follows = self.n > learners or system.observe == "potential"
+        if follows and system.sensing_radius is None and self.n > MOST_WITHOUT_RADIUS:
+            raise ValueError(
+                f"there must be at most {MOST_WITHOUT_RADIUS:,} agents where each follows "
+                f"or observes what all others do to it, got {self.n:,}; set "
+                "sensing_radius, then the time of a step grows linearly with the agents."
+            )
         self.states: FloatArray | None = None
         self._space = system.observation_space
         self._moved = np.zeros((self.n, 2))
@@ -170,7 +178,11 @@ class World:
         states = system.particles.advance(before, u, system.time_step)
         if system.point_mass:
             states[:, 2:] = shortened(states[:, 2:], system.max_speed)
-        stopped = self._stay_inside(states)
+            # Rounding may lead beyond a limit by the last bit.
+            np.clip(
+                states[:, 2:], -system.max_speed, system.max_speed, out=states[:, 2:]
+            )
+        stopped = self._stay_inside(states, before[:, :2])
         self._moved = (states[:, :2] - before[:, :2]) / system.time_step
         if self._trail.maxlen:
             self._trail.append(before[:, :2].copy())
@@ -257,15 +269,23 @@ class World:
         side = math.sqrt(width * height * (self.system.nearest + 1) / (4.0 * self.n))
         return side if side > 0 else self.system.half_width
 
-    def _stay_inside(self, states: FloatArray) -> BoolArray:
-        """Stop agents at walls and obstacles, in place; which ones hit an obstacle."""
+    def _stay_inside(self, states: FloatArray, before: FloatArray) -> BoolArray:
+        """Stop agents at walls and obstacles, in place; which ones hit an obstacle.
+
+        Args:
+            states: where they would be, `(n, state_size)`.
+            before: where they were, `(n, 2)`.
+        """
         edge, places = self.system.half_width, states[:, :2]
         if self.system.point_mass:
             states[:, 2:][np.abs(places) > edge] = 0.0
         np.clip(places, -edge, edge, out=places)
         if self.system.walls is None:
             return np.zeros(self.n, np.bool_)
-        stopped = self.system.walls.stop(places)
+        stopped = self.system.walls.stop(places, before)
+        # No room between an obstacle and a wall of the world.
+        beyond = stopped & (np.abs(places) > edge).any(axis=1)
+        places[beyond] = before[beyond]
         states[stopped, 2:] = 0.0
         return stopped
 

@@ -8,10 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acl_gym.swarm.aggregation.forces import forces_over_links
-from acl_gym.swarm.aggregation.interaction import BoundedRepulsion, Interaction
+from acl_gym.swarm.aggregation.interaction import (
+    BoundedRepulsion,
+    Interaction,
+    check_interaction,
+)
 from acl_gym.swarm.inbox import Inbox
 from acl_gym.swarm.protocols import DynamicAgents
-from acl_gym.utils import validation
 from acl_gym.utils.typing import FloatArray
 
 
@@ -30,11 +33,7 @@ class AggregatingAgents(DynamicAgents):
 
     def __init__(self, interaction: Interaction | None = None) -> None:
         self.interaction = BoundedRepulsion() if interaction is None else interaction
-        if not isinstance(self.interaction, Interaction):
-            raise TypeError(
-                "interaction must be an Interaction, such as BoundedRepulsion(), got "
-                f"{validation.shown(interaction)}."
-            )
+        check_interaction(self.interaction)
         self._position: FloatArray = np.empty((0, 0))
         self._slope: FloatArray | None = None
         self._force: FloatArray = np.empty((0, 0))
@@ -51,8 +50,16 @@ class AggregatingAgents(DynamicAgents):
         Args:
             y: a dict with `"position"`, `(n, dim)`, and perhaps `"slope"`, as of a
                 `Field`; or the positions alone.
+
+        Raises:
+            ValueError: there are no positions.
         """
         seen = y if isinstance(y, dict) else {"position": y}
+        if "position" not in seen:
+            raise ValueError(
+                "observations must have a 'position', as those of a Field have, got "
+                f"{sorted(map(str, seen))}; use another environment."
+            )
         self._position = np.asarray(seen["position"], dtype=np.float64)
         self._slope = seen.get("slope")
 

@@ -33,6 +33,7 @@ def size_bound(
     """
     m, a, b = _checked(n_agents, attraction, repulsion)
     c = _positive("spread", spread)
+    _same_shape(n_agents=m, attraction=a, repulsion=b, spread=c)
     return np.asarray(b / a * np.sqrt(0.5 * c) * math.exp(-0.5) * (m - 1.0) / m)
 
 
@@ -46,6 +47,7 @@ def rms_bound(
     """
     m, a, b = _checked(n_agents, attraction, repulsion)
     c = _positive("spread", spread)
+    _same_shape(n_agents=m, attraction=a, repulsion=b, spread=c)
     return np.sqrt((m - 1.0) * b * c / (2.0 * a * math.e * m))
 
 
@@ -85,17 +87,34 @@ def sum_of_squares(
     end = resting_sum_of_squares(n_agents, attraction, repulsion)
     t = _at_least("time", time, 0.0)
     start = _at_least("initial", initial, 0.0)
+    _same_shape(time=t, initial=start, n_agents=m, attraction=a)
+    _same_shape(time=t, initial=start, repulsion=end)
     return np.asarray(end + (start - end) * np.exp(-2.0 * a * m * t))
+
+
+def _same_shape(**values: FloatArray) -> None:
+    """Check that arguments broadcast.
+
+    Raises:
+        ValueError: they do not.
+    """
+    try:
+        np.broadcast_shapes(*(each.shape for each in values.values()))
+    except ValueError:
+        shapes = ", ".join(f"{name} {each.shape}" for name, each in values.items())
+        raise ValueError(
+            f"arguments must be numbers or arrays of one shape, got {shapes}."
+        ) from None
 
 
 def _checked(
     n_agents: ArrayLike, attraction: ArrayLike, repulsion: ArrayLike
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    return (
-        _at_least("n_agents", n_agents, 1.0),
-        _positive("attraction", attraction),
-        _at_least("repulsion", repulsion, 0.0),
-    )
+    m = _at_least("n_agents", n_agents, 1.0)
+    a = _positive("attraction", attraction)
+    b = _at_least("repulsion", repulsion, 0.0)
+    _same_shape(n_agents=m, attraction=a, repulsion=b)
+    return m, a, b
 
 
 def _positive(name: str, values: ArrayLike) -> FloatArray:

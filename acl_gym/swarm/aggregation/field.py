@@ -12,12 +12,15 @@ from acl_gym.swarm.aggregation.obstacles import Obstacles
 from acl_gym.swarm.aggregation.particles import Kinematic, Particles
 from acl_gym.swarm.aggregation.profiles import Profile
 from acl_gym.swarm.protocols import Environment
-from acl_gym.swarm.rows import checked_positions
+from acl_gym.swarm.rows import FARTHEST, checked_positions
 from acl_gym.utils import validation
 from acl_gym.utils.typing import FloatArray
 
 MOST_DRAWS = 1_000
 """How often a start inside an obstacle is drawn anew."""
+
+_ARRAYS = 8
+"""Arrays of the size of the positions that a step makes, or keeps."""
 
 
 class Field(Environment):
@@ -76,25 +79,40 @@ class Field(Environment):
         self.time_step = validation.number("time_step", time_step, above=0)
         self.profile, self.obstacles = profile, obstacles
         self._start: FloatArray | None = None
-        if np.ndim(start) == 0:
+        if validation.as_array(start) is not None and np.ndim(start) == 0:
             self._count = validation.integer("start", start, at_least=1)
             self._dim = validation.integer("dim", dim, at_least=1)
             self._bounds = _checked_bounds(bounds)
         else:
-            self._start = checked_positions(start).copy()
+            self._start = _checked_start(start)
             self._count, self._dim = self._start.shape
-        self.slope(np.zeros((self._count, self._dim)))  # fits the field, or raises
+        validation.check_memory(
+            f"{self._count:,} agents with {self._dim:,} coordinates each",
+            _ARRAYS * 8 * self._count * self._dim,
+            "use fewer",
+        )
+        self.particles.check(self._count)
+        # Whether the field has as many coordinates as the positions.
+        self.slope(np.zeros((self._count, self._dim)), finite=False)
         self.time = 0.0
 
     @property
     def positions(self) -> FloatArray:
         """Where the agents are, `(n, dim)`."""
-        return self.x[:, : self._dim]
+        return self._known[:, : self._dim]
 
     @property
     def velocities(self) -> FloatArray | None:
         """How fast they move, `(n, dim)`; None where particles have no velocity."""
-        return self.x[:, self._dim :] if self.particles.variables == 2 else None
+        return self._known[:, self._dim :] if self.particles.variables == 2 else None
+
+    @property
+    def _known(self) -> FloatArray:
+        if not hasattr(self, "x"):
+            raise RuntimeError(
+                "a Field must be reset before agents have states; call reset(rng), or run."
+            )
+        return self.x
 
     def reset(self, rng: np.random.Generator) -> None:
         """Put all agents to their initial positions, at rest."""
@@ -135,19 +153,29 @@ class Field(Environment):
                 "may have come too close for b / r^2; take a smaller time_step, or the "
                 "bounded repulsion."
             )
+        before = self.positions
         self.x = self.particles.advance(self.x, inputs, self.time_step)
         if self.obstacles is not None:
-            stopped = self.obstacles.stop(self.positions)
+            checked_positions(self.positions, self._count)
+            stopped = self.obstacles.stop(self.positions, before)
             if self.velocities is not None:
                 self.velocities[stopped] = 0.0
         self.time += self.time_step
 
-    def slope(self, positions: FloatArray) -> FloatArray:
-        """The gradient of profile and obstacles together at `(m, dim)` positions."""
+    def slope(self, positions: FloatArray, *, finite: bool = True) -> FloatArray:
+        """The gradient of profile and obstacles together at `(m, dim)` positions.
+
+        Args:
+            positions: where.
+            finite: whether to refuse gradients that are NaN or infinite.
+
+        Raises:
+            ValueError: a gradient has another shape, or is not finite.
+        """
         total = np.zeros(np.shape(positions))
         for part in (self.profile, self.obstacles):
             if part is not None:
-                total += part.gradient(positions)
+                total += _checked_gradient(part, positions, finite)
         return total
 
     def _drawn(self, rng: np.random.Generator) -> FloatArray:
@@ -165,6 +193,36 @@ class Field(Environment):
             f"{validation.shown(self._bounds)}, where {MOST_DRAWS:,} draws found none "
             "for some agents; widen them, or give initial positions."
         )
+
+
+def _checked_start(start: Any) -> FloatArray:
+    array = validation.real_array("start", start, ndim=2)
+    if np.abs(array).max() > FARTHEST:
+        raise ValueError(
+            f"start must hold coordinates of at most {FARTHEST:g}, got "
+            f"{np.abs(array).max():g}; use another unit of length."
+        )
+    return array
+
+
+def _checked_gradient(
+    part: Profile | Obstacles, positions: FloatArray, finite: bool
+) -> FloatArray:
+    gradient = np.asarray(part.gradient(positions))
+    kind = type(part).__name__
+    if gradient.shape != np.shape(positions) or gradient.dtype.kind not in "biuf":
+        raise ValueError(
+            f"the gradient of {kind} must be real numbers of the shape of the positions, "
+            f"{np.shape(positions)}, got {gradient.dtype} of shape {gradient.shape}; let "
+            "it return a row for each position."
+        )
+    if finite and not np.isfinite(gradient).all():
+        row = int(np.flatnonzero(~np.isfinite(gradient).all(axis=-1))[0])
+        raise ValueError(
+            f"the gradient of {kind} must be finite, got {gradient[row]} at the position "
+            f"{positions[row]}; let it return finite numbers everywhere."
+        )
+    return gradient
 
 
 def _checked_bounds(bounds: Any) -> tuple[float, float]:

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from acl_gym.swarm.aggregation.forces import forces_over_links
-from acl_gym.swarm.aggregation.interaction import Interaction
+from acl_gym.swarm.aggregation.interaction import Interaction, check_interaction
 from acl_gym.swarm.aggregation.profiles import Profile
 from acl_gym.swarm.links import Links
 from acl_gym.swarm.rows import checked_positions
@@ -22,6 +22,7 @@ def flow(
     *,
     links: Links | None = None,
     tolerance: float = 1e-10,
+    most_evaluations: int = 100_000,
 ) -> FloatArray:
     """Solve dx_i/dt = sum_j g(x_i - x_j) - grad sigma(x_i) of kinematic particles.
 
@@ -35,13 +36,18 @@ def flow(
         profile: sigma; None: there is none.
         links: who hears whom, all the time; None: everyone.
         tolerance: of the solution, relative and absolute, > 0.
+        most_evaluations: how often the right-hand side may be computed, >= 1. It takes
+            about 11 a M T evaluations to reach the time T, because a swarm at rest is
+            stiff.
 
     Returns:
         The positions at these times, `(len(times), n, dim)`.
 
     Raises:
+        TypeError: an argument is of the wrong kind.
         ValueError: an argument is out of range, or no solution is found: two agents are
-            in one place or too close for `UnboundedRepulsion`.
+            in one place or too close for `UnboundedRepulsion`, or it would take more
+            evaluations than allowed.
     """
     from scipy.integrate import solve_ivp  # slow to import
 
@@ -52,9 +58,24 @@ def flow(
             f"times must be >= 0 and in ascending order, got {validation.shown(times)}."
         )
     tolerance = validation.number("tolerance", tolerance, above=0)
+    most = validation.integer("most_evaluations", most_evaluations, at_least=1)
     everyone = Links.everyone(len(x)) if links is None else links
+    check_interaction(interaction)
+    if profile is not None and not isinstance(profile, Profile):
+        raise TypeError(
+            f"profile must be of a subclass of Profile, got {validation.shown(profile)}."
+        )
+    calls = 0
 
-    def rate(_: float, flat: FloatArray) -> FloatArray:
+    def rate(time: float, flat: FloatArray) -> FloatArray:
+        nonlocal calls
+        calls += 1
+        if calls > most:
+            raise ValueError(
+                f"times must be reached with {most:,} evaluations, got to {time:g} of "
+                f"{at[-1]:g} s; shorten times, raise most_evaluations, or let `run` make "
+                "steps."
+            )
         here = flat.reshape(x.shape)
         u = forces_over_links(here, here, everyone, interaction)
         if profile is not None:

@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from acl_gym.swarm.aggregation import kernels
-from acl_gym.swarm.aggregation.interaction import Interaction
+from acl_gym.swarm.aggregation.interaction import Interaction, check_interaction
 from acl_gym.swarm.cells import MOST_AXES, sort_into_cells
 from acl_gym.swarm.links import Links
 from acl_gym.swarm.rows import checked_positions, per_agent
-from acl_gym.utils import threads
+from acl_gym.utils import threads, validation
 from acl_gym.utils.typing import FloatArray
 
 
@@ -34,11 +34,24 @@ def forces_over_links(
         `(n, dim)`; 0 for agents that hear nobody.
 
     Raises:
+        TypeError: `links` or `interaction` is of the wrong kind.
         ValueError: there is not one position for each agent of `links`, one is not a
-            finite number, or `interaction` is for another number of agents.
+            finite number, own positions and heard ones have different numbers of axes,
+            or `interaction` is for another number of agents.
     """
+    if not isinstance(links, Links):
+        raise TypeError(
+            "links must be Links, such as Links.everyone(n), got "
+            f"{validation.shown(links)}."
+        )
+    check_interaction(interaction)
     own = checked_positions(own, links.n)
     heard = checked_positions(heard, links.n)
+    if own.shape != heard.shape:
+        raise ValueError(
+            f"heard must have {own.shape[1]} coordinates for each agent, as own has, "
+            f"got {heard.shape[1]}; let all agents send positions in one space."
+        )
     law = tuple(interaction.coefficients(links.n))
     force = np.empty_like(own)
     shared = threads.worth_it(links.n)
@@ -71,9 +84,11 @@ def forces_within(
         `(n, dim)`.
 
     Raises:
+        TypeError: `interaction` is of the wrong kind.
         ValueError: a position is not a finite number, the radius is out of range, or
             parameters are for another number of agents.
     """
+    check_interaction(interaction)
     x = checked_positions(positions)
     n, dim = x.shape
     sigma = per_agent("radius", radius, n, infinite=True, above=0)

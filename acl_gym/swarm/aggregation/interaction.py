@@ -94,6 +94,17 @@ class Interaction(ABC):
         strength = np.where(distance > 0, self.net_attraction(distance), 0.0)
         return np.asarray(-y * strength[..., None])
 
+    def _distances(self, distance: ArrayLike) -> FloatArray:
+        """Distances as an array, whose last axis is that of the agents, if they differ."""
+        r = np.asarray(distance, dtype=np.float64)
+        n = max(np.size(each) for each in (self.attraction, self.repulsion, self._rate))
+        if n > 1 and r.shape[-1:] not in ((), (1,), (n,)):
+            raise ValueError(
+                f"distance must be a number or have shape (..., {n}), because the "
+                f"parameters have one value for each of {n} agents, got shape {r.shape}."
+            )
+        return r
+
     def coefficients(self, n: int) -> Coefficients:
         """The parameters of n agents, for kernels.
 
@@ -148,13 +159,13 @@ class BoundedRepulsion(Interaction):
 
     def net_attraction(self, distance: ArrayLike) -> FloatArray:
         """a - b exp(-r^2 / c); see `Interaction.net_attraction`."""
-        square = np.square(np.asarray(distance, dtype=np.float64))
+        square = np.square(self._distances(distance))
         decay = np.exp(-square / self.spread)
         return np.asarray(self.attraction - self.repulsion * decay)
 
     def potential(self, distance: ArrayLike) -> FloatArray:
         """a r^2 / 2 + (b c / 2) exp(-r^2 / c); see `Interaction.potential`."""
-        square = np.square(np.asarray(distance, dtype=np.float64))
+        square = np.square(self._distances(distance))
         height = 0.5 * self.repulsion * self.spread
         pull = 0.5 * self.attraction * square
         return np.asarray(pull + height * np.exp(-square / self.spread))
@@ -196,7 +207,7 @@ class UnboundedRepulsion(Interaction):
 
     def net_attraction(self, distance: ArrayLike) -> FloatArray:
         """a - b / r^2, -infinity where r = 0; see `Interaction.net_attraction`."""
-        square = np.square(np.asarray(distance, dtype=np.float64))
+        square = np.square(self._distances(distance))
         with np.errstate(divide="ignore", invalid="ignore"):
             # Without repulsion there is none in one place either, where b / r^2 is 0 / 0.
             repulsion = np.where(self.repulsion == 0.0, 0.0, self.repulsion / square)
@@ -204,7 +215,7 @@ class UnboundedRepulsion(Interaction):
 
     def potential(self, distance: ArrayLike) -> FloatArray:
         """a r^2 / 2 - b ln(r); see `Interaction.potential`."""
-        r = np.asarray(distance, dtype=np.float64)
+        r = self._distances(distance)
         pull = 0.5 * self.attraction * np.square(r)
         return np.asarray(pull - xlogy(self.repulsion, r))
 
@@ -218,6 +229,19 @@ class UnboundedRepulsion(Interaction):
     @property
     def _rate(self) -> Parameter:
         return 0.0
+
+
+def check_interaction(interaction: object) -> None:
+    """Check that something is an `Interaction`.
+
+    Raises:
+        TypeError: it is not.
+    """
+    if not isinstance(interaction, Interaction):
+        raise TypeError(
+            "interaction must be an Interaction, such as BoundedRepulsion(), got "
+            f"{validation.shown(interaction)}."
+        )
 
 
 def _set(interaction: Interaction, name: str, *, or_zero: bool = True) -> None:

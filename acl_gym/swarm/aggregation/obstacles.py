@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,6 +11,14 @@ from acl_gym.swarm.aggregation.profiles import for_each
 from acl_gym.utils import validation
 from acl_gym.utils.compiling import njit
 from acl_gym.utils.typing import BoolArray, FloatArray
+
+MOST_TURNS = 60
+"""How often an agent between obstacles that overlap is put outside one of them."""
+
+EPSILON = float(np.finfo(np.float64).eps)
+
+TOUCHING = 1.0 - 1e-9
+"""Ways whose distance from the middle is a larger share of the radius only touch."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,20 +75,56 @@ class Obstacles:
     def inside(self, positions: FloatArray) -> BoolArray:
         """Whether each of `(n, dim)` positions lies inside an obstacle, `(n,)`."""
         x = self._checked(positions)
-        distance = np.linalg.norm(x[:, None] - np.asarray(self.centres), axis=-1)
-        return np.asarray((distance < self.radii).any(axis=-1))
+        inside = np.empty(len(x), dtype=np.bool_)
+        _any_inside(x, self.centres, np.asarray(self.radii), inside)
+        return inside
 
-    def stop(self, positions: FloatArray) -> BoolArray:
+    def stop(
+        self, positions: FloatArray, before: FloatArray | None = None
+    ) -> BoolArray:
         """Put agents that have entered an obstacle back to its edge, in place.
 
+        With the positions before a motion, which is along a straight line, nobody jumps
+        through an obstacle that is smaller than a step. An agent that ends inside an
+        obstacle slides along its edge: it is put to the point of the edge that is nearest
+        to where it would be. One whose way leads through an obstacle, or beyond its
+        middle, stops where it would enter. One that finds no place between obstacles that
+        overlap stays where it was before.
+
         Args:
-            positions: `(n, dim)`, float64.
+            positions: `(n, dim)`, a float64 array that can be written to.
+            before: where they were, `(n, dim)`, outside all obstacles; None: not known.
 
         Returns:
-            Which agents are stopped, `(n,)`.
+            Which agents are stopped, `(n,)`; no agent is inside any more.
+
+        Raises:
+            TypeError: `positions` cannot be changed in place.
+            ValueError: an array does not have the axes of the obstacles.
         """
+        if (
+            not isinstance(positions, np.ndarray)
+            or positions.dtype != np.float64
+            or not positions.flags.writeable
+        ):
+            raise TypeError(
+                "positions must be a float64 array that can be written to, because agents "
+                f"are moved in place, got {validation.shown(positions)}; pass "
+                "np.array(positions, dtype=float)."
+            )
+        self._checked(positions)
+        radii = np.asarray(self.radii)
         stopped = np.zeros(len(positions), dtype=np.bool_)
-        stop_at_edges(positions, self.centres, np.asarray(self.radii), stopped)
+        if before is None:
+            put_outside(positions, self.centres, radii, stopped)
+            return stopped
+        earlier = self._checked(before)
+        if earlier.shape != positions.shape:
+            raise ValueError(
+                f"before must have the shape of positions, {positions.shape}, got "
+                f"{earlier.shape}."
+            )
+        stop_on_the_way(earlier, positions, self.centres, radii, stopped)
         return stopped
 
     def _checked(self, positions: FloatArray) -> FloatArray:
@@ -116,28 +161,139 @@ def _slope(
 
 
 @njit
-def stop_at_edges(
-    positions: FloatArray, centres: FloatArray, radii: FloatArray, stopped: BoolArray
+def _any_inside(
+    positions: FloatArray, centres: FloatArray, radii: FloatArray, inside: BoolArray
 ) -> None:
-    """Put positions `(n, dim)` inside circles to their edges; mark them in `stopped`.
-
-    The circles take turns, so that an agent may be left inside one of several that
-    overlap.
-    """
-    n, dim = positions.shape
-    for i in range(n):
+    for i in range(positions.shape[0]):
+        inside[i] = False
         for k in range(radii.size):
-            distance = _distance(positions[i], centres[k])
-            if distance >= radii[k]:
-                continue
+            inside[i] |= _distance(positions[i], centres[k]) < radii[k]
+
+
+@njit
+def put_outside(
+    positions: FloatArray, centres: FloatArray, radii: FloatArray, moved: BoolArray
+) -> None:
+    """Put positions `(n, dim)` inside circles to their edges; mark them in `moved`.
+
+    Where circles overlap this is repeated, a little farther from the edge each time.
+    """
+    for i in range(positions.shape[0]):
+        for turn in range(MOST_TURNS):
+            inside = False
+            for k in range(radii.size):
+                if _distance(positions[i], centres[k]) < radii[k]:
+                    inside = moved[i] = True
+                    _put_to_edge(positions[i], centres[k], radii[k], turn)
+            if not inside:
+                break
+
+
+@njit
+def stop_on_the_way(
+    before: FloatArray,
+    positions: FloatArray,
+    centres: FloatArray,
+    radii: FloatArray,
+    stopped: BoolArray,
+) -> None:
+    """Stop agents on their way from `before` to `positions`; see `Obstacles.stop`."""
+    n, dim = positions.shape
+    slid = np.empty(radii.size, np.bool_)  # along which circles an agent has slid
+    entry = np.empty(dim)
+    for i in range(n):
+        slid[:] = False
+        for turn in range(MOST_TURNS + 1):
+            first, hit = np.inf, -1
+            for k in range(radii.size):
+                share = _entry(before[i], positions[i], centres[k], radii[k], slid[k])
+                if share < first:
+                    first, hit = share, k
+            if hit < 0:
+                break
             stopped[i] = True
+            if turn == MOST_TURNS:
+                positions[i] = before[i]
+                break
+            in_front = 0.0
             for axis in range(dim):
-                y = positions[i, axis] - centres[k, axis]
-                if distance > 0.0:
-                    y *= radii[k] / distance
-                else:  # in the middle any direction is as good
-                    y = radii[k] if axis == 0 else 0.0
-                positions[i, axis] = centres[k, axis] + y
+                start = before[i, axis]
+                entry[axis] = start + first * (positions[i, axis] - start)
+                in_front += (entry[axis] - centres[hit, axis]) * (
+                    positions[i, axis] - centres[hit, axis]
+                )
+            within = _distance(positions[i], centres[hit]) < radii[hit]
+            if within and (slid[hit] or in_front > 0.0):
+                slid[hit] = True
+            else:
+                positions[i] = entry
+            if _distance(positions[i], centres[hit]) < radii[hit]:
+                _put_to_edge(positions[i], centres[hit], radii[hit], turn)
+
+
+@njit
+def _entry(
+    before: FloatArray,
+    after: FloatArray,
+    centre: FloatArray,
+    radius: float,
+    only_the_end: bool,
+) -> float:
+    """At which share of the way a circle is entered, in [0, 1]; infinity: nowhere.
+
+    A way that only touches the edge enters nothing, whatever rounding makes of it.
+    """
+    ahead = length = 0.0
+    for axis in range(before.size):
+        d = after[axis] - before[axis]
+        ahead -= (before[axis] - centre[axis]) * d
+        length += d * d
+    nearest_share = 0.0
+    if length > 0.0 and ahead > 0.0:
+        nearest_share = min(1.0, ahead / length)
+    square = 0.0  # of the distance of the line from the middle
+    if length > 0.0:
+        for axis in range(before.size):
+            d = after[axis] - before[axis]
+            y = before[axis] + ahead / length * d - centre[axis]
+            square += y * y
+    inside = _distance(after, centre) < radius
+    if not inside:
+        passes = 0.0 < nearest_share < 1.0 and np.sqrt(square) < radius * TOUCHING
+        if only_the_end or not passes:
+            return np.inf
+    if length == 0.0 or ahead <= 0.0 or np.sqrt(square) >= radius:
+        return 1.0
+    back = np.sqrt(max(0.0, radius * radius - square) / length)
+    return float(max(0.0, min(1.0, ahead / length - back)))
+
+
+@njit
+def _put_to_edge(
+    position: FloatArray, centre: FloatArray, radius: float, turn: int
+) -> None:
+    """Put a position inside a circle to its edge, never inside by rounding.
+
+    Args:
+        position: is changed.
+        centre: of the circle.
+        radius: of the circle.
+        turn: how often this was tried; each time the distance kept from the edge doubles,
+            so that a gap between circles is found in the end.
+    """
+    distance = _distance(position, centre)
+    direction = np.zeros(position.size)
+    direction[0] = 1.0  # in the middle any one is as good
+    if distance > 0.0:
+        for axis in range(position.size):
+            direction[axis] = (position[axis] - centre[axis]) / distance
+    margin = 0.0 if turn == 0 else EPSILON * 2.0**turn
+    while True:
+        for axis in range(position.size):
+            position[axis] = centre[axis] + direction[axis] * (radius * (1.0 + margin))
+        if not _distance(position, centre) < radius:
+            break
+        margin = max(EPSILON, 2.0 * margin)
 
 
 @njit
@@ -146,4 +302,4 @@ def _distance(one: FloatArray, other: FloatArray) -> float:
     for axis in range(one.size):
         y = one[axis] - other[axis]
         square += y * y
-    return float(np.sqrt(square))
+    return math.sqrt(square)

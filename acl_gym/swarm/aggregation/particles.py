@@ -25,6 +25,16 @@ class Particles(ABC):
 
     variables: int
 
+    def check(self, n: int) -> None:  # noqa: B027
+        """Check that the parameters are those of n agents; by default nothing.
+
+        Args:
+            n: the number of agents, >= 1.
+
+        Raises:
+            ValueError: a parameter has values for another number of agents.
+        """
+
     @abstractmethod
     def advance(self, x: FloatArray, u: FloatArray, time_step: float) -> FloatArray:
         """The states after a step in which the inputs are held constant.
@@ -36,6 +46,9 @@ class Particles(ABC):
 
         Returns:
             A new array of the shape of `x`.
+
+        Raises:
+            ValueError: states, inputs and parameters are not those of as many agents.
         """
 
 
@@ -60,8 +73,13 @@ class Kinematic(Particles):
     def __post_init__(self) -> None:
         _set(self, "max_speed", infinite=True)
 
+    def check(self, n: int) -> None:
+        """See `Particles.check`."""
+        _check_sizes(self, ("max_speed",), n)
+
     def advance(self, x: FloatArray, u: FloatArray, time_step: float) -> FloatArray:
         """See `Particles.advance`."""
+        x, u = _checked(self, x, u)
         return np.asarray(x + time_step * shortened(u, self.max_speed))
 
 
@@ -92,15 +110,20 @@ class PointMass(Particles):
         _set(self, "damping", or_zero=True)
         _set(self, "max_force", infinite=True)
 
+    def check(self, n: int) -> None:
+        """See `Particles.check`."""
+        _check_sizes(self, ("mass", "damping", "max_force"), n)
+
     def advance(self, x: FloatArray, u: FloatArray, time_step: float) -> FloatArray:
         """See `Particles.advance`."""
+        x, u = _checked(self, x, u)
         n, dim = u.shape
         force = shortened(u, self.max_force)
         moved = np.empty((n, 2 * dim))
         mass, damping = (
             np.array(np.broadcast_to(each, n)) for each in (self.mass, self.damping)
         )
-        move_masses(np.ascontiguousarray(x), force, mass, damping, time_step, moved)
+        move_masses(x, force, mass, damping, time_step, moved)
         return moved
 
 
@@ -110,8 +133,12 @@ def shortened(vectors: FloatArray, longest: Parameter) -> FloatArray:
     Args:
         vectors: finite.
         longest: the largest norm, > 0, one for all or one for each.
+
+    Raises:
+        ValueError: there are others than one or n of these.
     """
     limit = np.asarray(longest)
+    _check_size("longest", limit, len(vectors))
     if limit.ndim == 0 and limit == math.inf:
         return vectors
     short = np.empty(vectors.shape)
@@ -124,7 +151,7 @@ def _shorten(vectors: FloatArray, limits: FloatArray, short: FloatArray) -> None
     """Write vectors of at most the norm `limits[i]`, or `limits[0]`, into `short`."""
     n, dim = vectors.shape
     for i in range(n):
-        limit = limits[i] if limits.size > 1 else limits[0]
+        limit = limits[i] if limits.size == n else limits[0]
         largest = 0.0
         for k in range(dim):
             largest = max(largest, abs(vectors[i, k]))
@@ -181,6 +208,39 @@ def move_masses(
                 of_speed * speed + of_force * push * force[i, k]
             )
             moved[i, dim + k] = decay * speed + of_speed * push * force[i, k]
+
+
+def _check_size(name: str, array: FloatArray, n: int) -> None:
+    """Check that there is one number for all of n agents, or one for each."""
+    if array.shape not in ((), (n,)):
+        raise ValueError(
+            f"{name} must be a number, or one for each of the {n} agents, got an array "
+            f"of shape {array.shape}."
+        )
+
+
+def _check_sizes(particles: Particles, names: tuple[str, ...], n: int) -> None:
+    for name in names:
+        _check_size(name, np.asarray(getattr(particles, name)), n)
+
+
+def _checked(
+    particles: Particles, x: FloatArray, u: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """States and inputs of as many agents as the parameters, in C order."""
+    states, inputs = (np.ascontiguousarray(each, dtype=np.float64) for each in (x, u))
+    if inputs.ndim != 2:
+        raise ValueError(
+            f"u must have shape (n, dim), a row for each agent, got {inputs.shape}."
+        )
+    n, dim = inputs.shape
+    if states.shape != (n, particles.variables * dim):
+        raise ValueError(
+            f"x must have shape ({n}, {particles.variables * dim}), {particles.variables} "
+            f"for each input, got {states.shape}."
+        )
+    particles.check(n)
+    return states, inputs
 
 
 def _set(

@@ -81,6 +81,21 @@ def test_states_and_actions() -> None:
         parallel_env(2, max_cycles=0)
 
 
+def test_what_is_of_the_wrong_kind() -> None:
+    view = parallel_env(3)
+    with pytest.raises(TypeError, match="reset options must be a dict, got 3"):
+        view.reset(options=3)
+    view.reset(seed=0)
+    with pytest.raises(TypeError, match="actions must be a dict with one for each"):
+        view.step(None)
+    with pytest.raises(TypeError, match="actions must be alike for all agents"):
+        view.step({"agent_0": 0, "agent_1": [0, 1], "agent_2": 0})
+    with pytest.raises(TypeError, match="no parameter 'num_envs'; use num_agents"):
+        parallel_env(3, num_envs=3)
+    with pytest.raises(TypeError, match="no parameter 'autoreset_mode'; use reset"):
+        parallel_env(3, autoreset_mode="NextStep")
+
+
 def test_a_picture() -> None:
     pytest.importorskip("pygame")
     view = parallel_env(3, render_mode="rgb_array")

@@ -13,6 +13,7 @@ from hypothesis.extra.numpy import arrays
 
 from acl_gym.envs.swarm_aggregation import SwarmAggregation
 from acl_gym.envs.swarm_aggregation.kernels import look_around
+from acl_gym.envs.swarm_aggregation.system import LEAST, MOST, MOST_WITHOUT_RADIUS
 from acl_gym.envs.swarm_aggregation.world import World
 from acl_gym.swarm.cells import sort_into_cells
 from tests.envs.swarm_aggregation import reference_world as reference
@@ -200,12 +201,25 @@ def test_agents_put_elsewhere_leave_the_others_as_they_are() -> None:
         ({"directions": 1}, ValueError, "directions must be at least 2"),
         ({"observe": "all"}, ValueError, "observe must be one of 'neighbours'"),
         ({"nearest": 0.5}, TypeError, "nearest must be an integer"),
-        ({"sensing_radius": 0}, ValueError, r"sensing_radius must lie in \(0, inf\)"),
+        ({"sensing_radius": 0}, ValueError, r"sensing_radius must lie in \[1e-09"),
         ({"max_speed": 0}, ValueError, "max_speed must lie in"),
         ({"half_width": math.inf}, ValueError, "half_width must lie in"),
         ({"collision_weight": -1}, ValueError, "collision_weight must lie in"),
         ({"valleys": [(0, 0, 1)]}, ValueError, "valleys must be rows"),
-        ({"valleys": [(0, 0, 1, 0)]}, ValueError, "widths of valleys must be > 0"),
+        ({"valleys": [(0, 0, 1, 0)]}, ValueError, "widths of valleys must lie in"),
+        (
+            {"valleys": [(0, 0, 1e308, 1)]},
+            ValueError,
+            "valleys must be rows .* at most",
+        ),
+        ({"half_width": 1e308}, ValueError, r"half_width must lie in \[1e-09, 1e9\]"),
+        ({"half_width": 1e-310}, ValueError, "half_width must lie in"),
+        ({"point_mass": True, "mass": 1e-320}, ValueError, "mass must lie in"),
+        ({"attraction": 1e308}, ValueError, r"attraction must lie in \[0, 1e9\]"),
+        ({"distance_weight": 1e308}, ValueError, "distance_weight must lie in"),
+        ({"time_step": 1e-320}, ValueError, "time_step must lie in"),
+        ({"valleys": [(0, 0, 1, 1e-320)]}, ValueError, "widths of valleys must lie in"),
+        ({"obstacles": [(0, 0, 1e-320)]}, ValueError, "radius >= 1e-09 that lie in"),
         ({"valleys": 3.0}, ValueError, "valleys must be an array of 2 axes"),
         ({"obstacles": [(0, 0, -1)]}, ValueError, "obstacles must be rows"),
         (
@@ -250,3 +264,98 @@ def test_directions() -> None:
 def test_no_memory_for_so_many() -> None:
     with pytest.raises(ValueError, match="agents must fit into"):
         World(SwarmAggregation(), 10**12, 0)
+
+
+SMALL = dict.fromkeys(("mass", "time_step", "spread", "max_speed", "max_force"), LEAST)
+LARGE = dict.fromkeys(
+    (
+        *("attraction", "repulsion", "damping", "distance_weight", "max_speed"),
+        *("collision_weight", "profile_weight", "half_width", "max_force", "time_step"),
+    ),
+    MOST,
+)
+
+
+@pytest.mark.parametrize("point_mass", [False, True])
+@pytest.mark.parametrize(
+    "values",
+    [
+        SMALL,
+        LARGE,
+        {**LARGE, "mass": LEAST},
+        {**SMALL, **LARGE},
+        {**SMALL, "half_width": LEAST, "sensing_radius": LEAST},
+        {**LARGE, "valleys": [(0, 0, MOST, LEAST), (1, 1, -MOST, MOST)]},
+        {"time_step": LEAST, "obstacles": [(0, 0, LEAST), (1, 1, 1)]},
+    ],
+    ids=str,
+)
+def test_the_limits_of_the_parameters_give_finite_numbers(
+    values: dict[str, Any], point_mass: bool
+) -> None:
+    for observe in ("neighbours", "potential"):
+        system = SwarmAggregation(
+            **{**values, "observe": observe, "point_mass": point_mass}
+        )
+        world = World(system, 4, 2)
+        world.start(RNG(0))
+        for _ in range(5):
+            inputs = system.inputs[RNG(1).integers(0, 5, 4)]
+            outcome = world.step(inputs)
+            assert np.isfinite(outcome.rewards).all()
+            assert np.isfinite(world.states).all()
+            assert system.observation_space.contains(world.observe()[0])
+
+
+def test_nobody_jumps_through_an_obstacle() -> None:
+    world = worlds({"obstacles": [(0.0, 0.0, 0.05)]}, 2, 0)
+    world.start(RNG(0), np.array([[-0.1, 0.0], [4.0, 4.0]]))
+    outcome = world.step(np.array([[1.0, 0.0], [0.0, 0.0]]))
+    np.testing.assert_allclose(world.positions[0], [-0.05, 0.0], atol=1e-15)
+    assert outcome.collisions.tolist() == [1, 0]
+
+
+@pytest.mark.parametrize("point_mass", [False, True])
+@pytest.mark.parametrize(
+    "obstacles",
+    [
+        [(0, 0, 1.3)],
+        [(0, 0, 1.3), (1.0, 0.3, 1.1), (0.2, -1.0, 0.9), (0.1, 0.1, 0.2)],
+        [(4.0, 0.0, 1.0), (0.0, -4.1, 0.9), (4.3, -4.3, 0.7)],  # touch the walls
+        [(3.9, 0.0, 1.0), (3.9, 1.9, 1.05)],  # a gap that becomes narrow
+    ],
+    ids=str,
+)
+def test_states_of_the_world_can_be_set_again(
+    obstacles: list[tuple[float, ...]], point_mass: bool
+) -> None:
+    system = SwarmAggregation(
+        obstacles=obstacles, point_mass=point_mass, max_speed=1.3, time_step=0.3
+    )
+    world, rng = World(system, 60, 0), RNG(0)
+    world.start(rng)
+    goals = np.array(obstacles)[rng.integers(0, len(obstacles), 60), :2]
+    for step in range(60):
+        if step % 20 == 0:
+            goals = (
+                rng.uniform(-6, 6, (60, 2)) if step == 40 else rng.permutation(goals)
+            )
+        world.step(3.0 * (goals - world.positions))
+        assert world.states is not None
+        again = system.checked_states(world.states)
+        np.testing.assert_array_equal(again, world.states)
+
+
+def test_many_agents_that_hear_all_others_are_refused() -> None:
+    many = MOST_WITHOUT_RADIUS
+    World(SwarmAggregation(), many + 1, 0)  # nobody follows the rule
+    World(SwarmAggregation(sensing_radius=1.0), 1, many)
+    for system, learners, followers in (
+        (SwarmAggregation(), 1, many),
+        (SwarmAggregation(followers=many), 1, 9),
+        (SwarmAggregation(observe="potential"), many + 1, 0),
+    ):
+        with pytest.raises(
+            ValueError, match=r"at most 20,000 agents where .* set sensing"
+        ):
+            World(system, learners, followers)

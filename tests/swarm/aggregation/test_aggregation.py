@@ -339,3 +339,43 @@ def test_the_flow_refuses() -> None:
         with pytest.raises(ValueError, match="times must be"):
             flow(x, BoundedRepulsion(), times)
     assert flow(x, BoundedRepulsion(), [0.0, 0.0]).shape == (2, 2, 2)
+    with pytest.raises(TypeError, match="interaction must be an Interaction"):
+        flow(x, "x", [1.0])
+    with pytest.raises(TypeError, match="profile must be of a subclass of Profile"):
+        flow(x, BoundedRepulsion(), [1.0], BoundedRepulsion())
+
+
+def test_a_flow_does_not_run_for_ever() -> None:
+    with pytest.raises(ValueError, match=r"1,000 evaluations, got to .* of 1e\+09 s"):
+        flow(STARTS[3], BoundedRepulsion(), [1e9], most_evaluations=1_000)
+    with pytest.raises(ValueError, match="most_evaluations must be at least 1"):
+        flow(STARTS[3], BoundedRepulsion(), [1.0], most_evaluations=0)
+
+
+def test_observations_without_positions_are_refused() -> None:
+    with pytest.raises(ValueError, match="observations must have a 'position'"):
+        AggregatingAgents().observe({"value": np.zeros(3)})
+
+
+def test_arrays_that_do_not_fit_each_other() -> None:
+    law = BoundedRepulsion(spread=[0.1, 0.2])
+    other = UnboundedRepulsion(attraction=[0.1, 0.2])
+    for call in (
+        law.net_attraction,
+        law.potential,
+        other.potential,
+        other.net_attraction,
+    ):
+        with pytest.raises(
+            ValueError, match=r"distance must be a number or have shape"
+        ):
+            call([1.0, 2.0, 3.0])
+    assert law.potential([[1.0], [2.0], [3.0]]).shape == (3, 2)
+    for call in (
+        lambda: size_bound([1, 2, 3], [1, 2], 1, 1),
+        lambda: rms_bound(3, [1, 2], 1, [1, 2, 3]),
+        lambda: bounds.sum_of_squares([1, 2], 1.0, 3, [1, 1, 1], 1),
+        lambda: bounds.sum_of_squares([1, 2], 1.0, 3, 1, [1, 1, 1]),
+    ):
+        with pytest.raises(ValueError, match="must be numbers or arrays of one shape"):
+            call()

@@ -236,7 +236,30 @@ def test_starts_are_drawn_beside_obstacles_and_from_the_seed() -> None:
         (lambda: Field(3, profile=Kinematic()), TypeError, "a subclass of Profile"),
         (lambda: Field(3, Quadratic([0, 0])), TypeError, "a subclass of Particles"),
         (lambda: Field(3, profile=Plane([1.0])), ValueError, "must have 1 coordinates"),
-        (lambda: Field([[math.inf, 0.0]]), ValueError, "positions must be numbers of"),
+        (lambda: Field([[math.inf, 0.0]]), ValueError, "start must be an array of 2"),
+        (lambda: Field([[math.nan, 0.0]]), ValueError, "start must be an array of 2"),
+        (
+            lambda: Field([[1e200, 0.0]]),
+            ValueError,
+            "start must hold coordinates of at",
+        ),
+        (lambda: Field(10**12), ValueError, "agents with 2 coordinates each must fit"),
+        (lambda: Field(3, dim=10**12), ValueError, "3 agents with 1,000,000,000,000"),
+        (
+            lambda: Field(8, Kinematic(max_speed=[1.0, 2.0, 3.0])),
+            ValueError,
+            "max_speed must be a number, or one for each of the 8 agents",
+        ),
+        (
+            lambda: Field(8, PointMass(mass=np.ones(3))),
+            ValueError,
+            "mass must be a number, or one for each of the 8 agents",
+        ),
+        (
+            lambda: Field(8, PointMass(max_force=np.ones(7))),
+            ValueError,
+            "max_force must be a number, or one for each of the 8 agents",
+        ),
     ],
 )
 def test_what_makes_no_field(make: Any, error: type[Exception], message: str) -> None:
@@ -276,3 +299,134 @@ def test_a_profile_of_ones_own() -> None:
     field = Field([[1.0, 0.0], [-1.0, 0.0]], profile=Cliff())
     field.reset(RNG(0))
     np.testing.assert_array_equal(field.observe()["slope"], [[1.0, 0.0], [0.0, 0.0]])
+
+
+class Own(Profile):
+    """A profile with any gradient."""
+
+    def __init__(self, gradient: Any) -> None:
+        self.given = gradient
+
+    def value(self, positions: np.ndarray) -> np.ndarray:
+        return positions[..., 0]
+
+    def gradient(self, positions: np.ndarray) -> np.ndarray:
+        return self.given(positions)
+
+
+@pytest.mark.parametrize("given", [lambda x: 1.0, lambda x: x[:, 0], lambda x: x + 1j])
+def test_a_gradient_of_another_shape_is_refused(given: Any) -> None:
+    with pytest.raises(ValueError, match="the gradient of Own must be real numbers of"):
+        Field(3, profile=Own(given))
+
+
+def test_a_gradient_that_is_nan_is_not_the_agents_fault() -> None:
+    field = Field(3, profile=Own(lambda x: x * np.nan))
+    field.reset(RNG(0))
+    with pytest.raises(ValueError, match="the gradient of Own must be finite, got"):
+        field.observe()
+
+
+def test_there_are_no_states_before_a_reset() -> None:
+    field = Field(3, PointMass())
+    for name in ("positions", "velocities"):
+        with pytest.raises(RuntimeError, match="a Field must be reset before"):
+            getattr(field, name)
+
+
+@pytest.mark.parametrize(
+    ("body", "x", "u", "message"),
+    [
+        (Kinematic(max_speed=[1, 2]), (3, 2), (3, 2), "max_speed must be a number, or"),
+        (PointMass(damping=[1, 2]), (3, 4), (3, 2), "damping must be a number, or one"),
+        (PointMass(), (3, 2), (3, 2), r"x must have shape \(3, 4\)"),
+        (PointMass(), (2, 4), (3, 2), r"x must have shape \(3, 4\)"),
+        (Kinematic(), (1, 2), (3, 2), r"x must have shape \(3, 2\)"),
+        (Kinematic(), (3, 2), (3,), r"u must have shape \(n, dim\)"),
+    ],
+)
+def test_bodies_of_others_are_not_moved(
+    body: Any, x: Any, u: Any, message: str
+) -> None:
+    with pytest.raises(ValueError, match=message):
+        body.advance(np.zeros(x), np.ones(u), 0.1)
+
+
+# --- obstacles on the way ---------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("positions", "before", "error", "message"),
+    [
+        (
+            [[0.0, 0.0]],
+            None,
+            TypeError,
+            "positions must be a float64 array that can be",
+        ),
+        (np.zeros((3, 2), int), None, TypeError, "positions must be a float64 array"),
+        (np.broadcast_to(0.0, (3, 2)), None, TypeError, "that can be written to"),
+        (np.zeros((3, 3)), None, ValueError, "positions must have 2 coordinates each"),
+        (np.zeros((3, 2)), np.zeros((2, 2)), ValueError, "before must have the shape"),
+        (np.zeros((3, 2)), np.zeros((3, 3)), ValueError, "positions must have 2 coord"),
+    ],
+)
+def test_what_cannot_be_stopped(
+    positions: Any, before: Any, error: type[Exception], message: str
+) -> None:
+    with pytest.raises(error, match=message):
+        ROCKS.stop(positions, before)
+
+
+def test_nobody_jumps_through_an_obstacle() -> None:
+    rock = Obstacles([[0.0, 0.0]], 0.5)
+    before = np.array(
+        [[-2.0, 0.0], [-2.0, 0.3], [-2.0, 0.5], [-2.0, 0.6], [-0.5, 0.0], [-2.0, 0.0]]
+    )
+    after = before + np.array([4.0, 0.0])
+    after[5] = [0.2, 0.0]  # beyond the middle
+    stopped = rock.stop(after, before)
+    assert stopped.tolist() == [True, True, False, False, True, True]
+    np.testing.assert_allclose(
+        after,
+        [[-0.5, 0.0], [-0.4, 0.3], [2.0, 0.5], [2.0, 0.6], [-0.5, 0.0], [-0.5, 0.0]],
+        atol=1e-14,
+    )
+
+
+def test_agents_slide_along_an_edge() -> None:
+    rock = Obstacles([[0.0, 0.0]], 1.0)
+    before = np.array([[-1.0, 0.0]])
+    after = np.array([[-0.9, 0.2]])
+    assert rock.stop(after, before).tolist() == [True]
+    np.testing.assert_allclose(after, np.array([[-0.9, 0.2]]) / math.hypot(0.9, 0.2))
+
+
+circles = st.lists(
+    st.tuples(st.floats(-2, 2), st.floats(-2, 2), st.floats(0.05, 1.5)),
+    min_size=1,
+    max_size=5,
+)
+
+
+@given(circles, st.integers(0, 2**32 - 1))
+def test_nobody_is_left_inside_obstacles_that_overlap(
+    rows: list[tuple[float, float, float]], seed: int
+) -> None:
+    table = np.array(rows)
+    rocks = Obstacles(table[:, :2], table[:, 2])
+    before = RNG(seed).uniform(-4, 4, (40, 2))
+    inside = rocks.inside(before)
+    assert rocks.stop(before).tolist() == inside.tolist()
+    assert not rocks.inside(before).any()
+    after = before + RNG(seed + 1).normal(0, 1.0, (40, 2))
+    wanted = after.copy()
+    stopped = rocks.stop(after, before)
+    assert not rocks.inside(after).any()
+    np.testing.assert_array_equal(after[~stopped], wanted[~stopped])
+    # The ways of the others lead through nothing.
+    for share in np.linspace(0, 1, 21):
+        on_the_way = before + share * (wanted - before)
+        between = on_the_way[~stopped]
+        distance = np.linalg.norm(between[:, None] - table[:, :2], axis=2)
+        assert (distance >= table[:, 2] * (1 - 1e-8)).all()

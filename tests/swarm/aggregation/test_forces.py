@@ -218,3 +218,32 @@ def test_bad_input() -> None:
         forces_within(x, law, [1.0, 2.0])
     with pytest.raises(ValueError, match="1 to 3 coordinates where there is a radius"):
         forces_within(np.zeros((3, 4)), law, 1.0)
+    with pytest.raises(
+        ValueError, match="heard must have 2 coordinates for each agent"
+    ):
+        forces_over_links(x, np.zeros((3, 1)), Links.everyone(3), law)
+    with pytest.raises(TypeError, match="links must be Links, such as"):
+        forces_over_links(x, x, [[0], [1], [2]], law)
+    for call in (
+        lambda: forces_over_links(x, x, Links.everyone(3), None),
+        lambda: forces_within(x, None),
+        lambda: forces_within(x, 20.0, 1.0),
+    ):
+        with pytest.raises(TypeError, match="interaction must be an Interaction"):
+            call()
+
+
+@pytest.mark.parametrize("distance", [5e-324, 1e-320, 1e-310])
+def test_agents_that_no_cell_can_tell_apart(distance: float) -> None:
+    """Where the inverse of a distance is infinite all agents are in one cell."""
+    n = 2_000
+    x = np.zeros((n, 2))
+    x[:, 0] = np.arange(n) * distance
+    for kernel in (sort_into_cells, sort_into_cells.py_func):
+        with np.errstate(over="ignore"):
+            cells = Cells(*kernel(x, distance))
+        assert sorted(cells.agent) == list(range(n))
+        assert (cells.cell >= 0).all()
+        assert (cells.cell < cells.shape.prod()).all()
+    assert np.isfinite(forces_within(x, BoundedRepulsion(), distance)).all()
+    assert Radius(distance).links(x[:50]).n == 50

@@ -5,8 +5,11 @@ a row of an `Environment`; its mind is a row of `DynamicAgents`; a `Channel` car
 messages between minds. `run` lets them run. docs/moving-agents.md has the framework in
 words, and an example to begin with.
 
-`acl_gym.swarm.pso` has particle swarm optimization; `minimize` and its parts, which are
-imported when they are first used, are names of this package as well.
+Two methods of chapter 6 have packages of their own, `acl_gym.swarm.pso`, particle swarm
+optimization (§6.3.2), and `acl_gym.swarm.aggregation`, swarms that aggregate and forage
+(§6.3.3). What one begins with is imported when it is first used, and is here by name as
+well: `minimize`, `Landscape` and `ParticleSwarm`; `AggregatingAgents`, `Field` and `flow`.
+Ant Colony Learning (§6.3.1) in this framework is `acl_gym.agents.moving_ants`.
 
 Nothing in this package needs Gymnasium.
 """
@@ -24,21 +27,29 @@ from acl_gym.swarm.run import History, run
 from acl_gym.swarm.topologies import Everyone, Nearest, Radius, Ring, VonNeumann
 
 if TYPE_CHECKING:
+    from acl_gym.swarm import aggregation, pso
+    from acl_gym.swarm.aggregation import AggregatingAgents, Field, flow
     from acl_gym.swarm.pso import Landscape, ParticleSwarm, minimize
 
 # Name -> module, imported on first use.
 _LAZY = {
+    "AggregatingAgents": "acl_gym.swarm.aggregation",
+    "Field": "acl_gym.swarm.aggregation",
     "Landscape": "acl_gym.swarm.pso",
     "ParticleSwarm": "acl_gym.swarm.pso",
+    "flow": "acl_gym.swarm.aggregation",
     "minimize": "acl_gym.swarm.pso",
 }
+_PACKAGES = ("aggregation", "pso")
 
 __all__ = [
+    "AggregatingAgents",
     "Channel",
     "Delayed",
     "DynamicAgents",
     "Environment",
     "Everyone",
+    "Field",
     "History",
     "Inbox",
     "Landscape",
@@ -50,16 +61,21 @@ __all__ = [
     "Ring",
     "Topology",
     "VonNeumann",
+    "aggregation",
+    "flow",
     "minimize",
+    "pso",
     "run",
 ]
 
 
 def __getattr__(name: str) -> Any:
+    if name in _PACKAGES:
+        return import_module(f"{__name__}.{name}")
     if name in _LAZY:
         return getattr(import_module(_LAZY[name]), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *_LAZY})
+    return sorted({*globals(), *_LAZY, *_PACKAGES})

@@ -272,7 +272,7 @@ def test_ants_and_environments_of_different_colonies_are_refused() -> None:
         (large, small, "with other cells; make both from the same colony"),
         (small, large, "with other cells"),
         (shifted, small, "with other cells"),
-        (colony(GRID, n=4), small, "got 5 and 3 actions"),
+        (colony(GRID, n=4), small, "got 4 and 3 actions"),
     ):
         with pytest.raises(ValueError, match=words):
             run(Ants(ants), StigmergyEnvironment(there, 1), 3, 0)

@@ -77,7 +77,7 @@ class Inbox:
                 NaN; infinity is allowed.
         """
         values = self.message(key)
-        if values.ndim != 1 or values.dtype.kind not in "biuf":
+        if values.shape != (self.links.n,) or values.dtype.kind not in "biuf":
             raise ValueError(
                 f"message {key!r} must be one real number for each agent, got an array "
                 f"of {values.dtype} and shape {values.shape}."
@@ -197,18 +197,16 @@ def checked_inbox(delivered: Any, channel: Any, n: int) -> Inbox:
         TypeError: it is no `Inbox`.
         ValueError: it is that of another number of agents.
     """
-    name = f"{type(channel).__name__}.deliver"
     if not isinstance(delivered, Inbox):
         raise TypeError(
-            f"{name} must return an Inbox, got {validation.shown(delivered)}; return "
+            f"{type(channel).__name__}.deliver must return an Inbox, got {validation.shown(delivered)}; return "
             "Inbox(links, sent)."
         )
     if delivered.links.n != n:
         raise ValueError(
-            f"{name} must return links of the {n} agents that there are, got links of "
-            f"{delivered.links.n}; make them for len(x) agents."
+            f"{type(channel).__name__}.deliver must return links of the {n} agents that "
+            f"there are, got links of {delivered.links.n}; make them for len(x) agents."
         )
-    check_messages(delivered.messages, n)  # they may have been replaced
     return delivered
 
 

@@ -181,3 +181,10 @@ def test_the_default_of_a_mean_must_fit(default) -> None:
 def test_an_inbox_needs_links() -> None:
     with pytest.raises(TypeError, match=r"links must be Links, .* got 3"):
         Inbox(3, {})
+
+
+def test_messages_that_were_replaced_are_not_read_past_their_end() -> None:
+    inbox = Inbox(Links.from_lists([[0], [1]]), {"cost": np.ones(2)})
+    inbox.messages["cost"] = np.ones(1)
+    with pytest.raises(ValueError, match="one real number for each agent"):
+        inbox.best("cost")

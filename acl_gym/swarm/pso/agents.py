@@ -148,21 +148,17 @@ class ParticleSwarm(DynamicAgents):
         Raises:
             ValueError: the arrays do not have these shapes.
         """
-        shape = self.best_positions[rows].shape
+        shape = position.shape
+        n, d = self.best_positions.shape
         if (
-            position.shape != shape
+            self.best_positions[rows].shape != shape
             or u.shape != shape
-            or uniforms[rows].shape
-            != (
-                *shape[:1],
-                2,
-                *shape[1:],
-            )
+            or uniforms.shape != (n, 2, d)
         ):
             raise ValueError(
-                f"position and u must have the shape {shape}, and uniforms two such rows "
-                f"for each particle, got {position.shape}, {u.shape} and "
-                f"{uniforms.shape}."
+                "position and u must have the shape "
+                f"{self.best_positions[rows].shape}, and uniforms {(n, 2, d)}, got "
+                f"{shape}, {u.shape} and {uniforms.shape}."
             )
         kernels.attract(
             position,
@@ -188,7 +184,7 @@ def _observed(y: Any, n: int, d: int | None) -> tuple[FloatArray, FloatArray]:
         TypeError: it is no dict.
         ValueError: it does not hold such arrays.
     """
-    if not isinstance(y, dict) or not {"value", "position"} <= y.keys():
+    if not isinstance(y, dict) or "value" not in y or "position" not in y:
         got = sorted(map(str, y)) if isinstance(y, dict) else validation.shown(y)
         kind = ValueError if isinstance(y, dict) else TypeError
         raise kind(
@@ -209,6 +205,8 @@ def _observed(y: Any, n: int, d: int | None) -> tuple[FloatArray, FloatArray]:
 
 def _rows(name: str, rows: Any) -> FloatArray:
     """An array of numbers as kernels take it, not copied if it is one already."""
+    if type(rows) is np.ndarray and rows.dtype == np.float64 and rows.ndim:
+        return rows if rows.flags.c_contiguous else np.ascontiguousarray(rows)
     array = validation.as_array(rows)
     if array is None or array.dtype.kind not in "biuf" or array.ndim == 0:
         raise ValueError(

@@ -78,26 +78,26 @@ TOPOLOGIES = (*COLOURS, "global, 30% lost", "global, 10 steps late")
 
 
 def explosion(seeds: int) -> dict[str, Any]:
-    """The spread of swarms, iteration by iteration, `(seeds, ITERATIONS + 1)` each."""
+    """The spread of swarms, iteration by iteration, `(seeds, ITERATIONS + 1)` each.
+
+    Infinite from where a search has ended because its swarm has exploded.
+    """
     sphere = BENCHMARK_FUNCTIONS["sphere"]
     found = {}
     for name, settings in ORDERS.items():
-        with np.errstate(over="ignore"):  # in Sphere, beyond 1e154
-            found[name] = np.array(
-                [
-                    minimize(
-                        sphere.function,
-                        sphere.bounds(VARIABLES),
-                        max_iterations=ITERATIONS,
-                        seed=seed,
-                        topology="global",
-                        boundary="none",
-                        history=True,
-                        **settings,
-                    ).history["spread"]
-                    for seed in range(seeds)
-                ]
-            )
+        found[name] = np.full((seeds, ITERATIONS + 1), np.inf)
+        for seed in range(seeds):
+            spread = minimize(
+                sphere.function,
+                sphere.bounds(VARIABLES),
+                max_iterations=ITERATIONS,
+                seed=seed,
+                topology="global",
+                boundary="none",
+                history=True,
+                **settings,
+            ).history["spread"]
+            found[name][seed, : spread.size] = spread
     return found
 
 

@@ -21,6 +21,11 @@ inputs and messages only. `acl_gym.swarm.run` then learns the same pheromone, to
 | local pheromone update (4.12) by the process | `StigmergyEnvironment.step`, after a move |
 | cost of the final solution, from the process | `StigmergyEnvironment.costs` |
 | global pheromone update (4.15) by the process | `StigmergyEnvironment.step`, once all ants ask for it |
+
+One thing passes between the two by another way. The probabilities that follow from levels,
+alpha and beta are kept with the levels, computed once for all ants, so that `Ants.decide`
+sets the exponents alpha and beta of the pheromone that it has observed. It changes no
+level, and the process reads neither exponent.
 """
 
 from __future__ import annotations
@@ -39,7 +44,7 @@ from acl_gym.colony.solutions import Solutions
 from acl_gym.colony.update_rule import TrialResult, UpdateRule
 from acl_gym.colony.update_rules import as_update, watched
 from acl_gym.evaluation.rollout import Rollout
-from acl_gym.partitions import locate_checked
+from acl_gym.partitions import Partition, locate_checked
 from acl_gym.swarm import DynamicAgents, Environment, Inbox
 from acl_gym.utils import validation
 from acl_gym.utils.typing import BoolArray, CellArray, FloatArray, IntArray
@@ -56,8 +61,10 @@ class Observations(NamedTuple):
             goal, or the environment has ended their walk.
         allowed: U(x_c) of those, `(m, n_actions)`; None: all actions.
         pheromone: tau_u(x_c) for all u. Ants share the table, and each of them reads the
-            levels of the cells that it is in, so that nothing is copied.
+            levels of the cells that it is in, so that nothing is copied. Ants change
+            nothing of it but the exponents alpha and beta, which are theirs.
         trial: k, how many trials have ended.
+        partition: to whose cells the levels belong.
     """
 
     state: NDArray[Any]
@@ -65,6 +72,7 @@ class Observations(NamedTuple):
     allowed: BoolArray | None
     pheromone: Pheromone
     trial: int
+    partition: Partition
 
 
 class Inputs(NamedTuple):
@@ -127,7 +135,14 @@ class Ants(DynamicAgents):
         self._all_done = np.zeros(n, np.bool_)
 
     def observe(self, y: Observations) -> None:
-        """Take in what the ants observe; a new trial begins with an empty solution."""
+        """Take in what the ants observe; a new trial begins with an empty solution.
+
+        Raises:
+            TypeError: it is not what a `StigmergyEnvironment` shows.
+            ValueError: the environment has other cells or actions than these ants.
+        """
+        if self._trial < 0:
+            self._check_environment(y)
         if y.trial != self._trial:
             self._trial, self._clock = y.trial, 0
             self.solutions.clear()
@@ -135,13 +150,32 @@ class Ants(DynamicAgents):
         self._finished = np.full(self.solutions.n_ants, y.trial + 1)
         self._finished[y.walking] = y.trial
 
+    def _check_environment(self, y: Any) -> None:
+        """Kernels take the ants' cells and actions for those of the pheromone."""
+        if not isinstance(y, Observations):
+            raise TypeError(
+                "ants must observe the Observations of a StigmergyEnvironment, got "
+                f"{validation.shown(y)}; run them in one."
+            )
+        own, there = self.partition, y.partition
+        if y.pheromone.n_actions != self.n_actions:
+            ours, theirs = f"{self.n_actions}", f"{y.pheromone.n_actions} actions"
+        elif len(y.pheromone.levels) != own.n_cells or not _same_cells(own, there):
+            ours, theirs = f"{own!r}", f"{there!r} with other cells"
+        else:
+            return
+        raise ValueError(
+            "ants and environment must have the same cells and actions, got "
+            f"{ours} and {theirs}; make both from the same colony."
+        )
+
     def send(self) -> dict[str, NDArray[Any]]:
         """How many trials each ant has finished."""
         return {"finished": self._finished}
 
     def hear(self, inbox: Inbox) -> None:
         """Note which ants have heard from all ants that they are done."""
-        done = inbox.messages["finished"] > self._trial
+        done = inbox.message("finished") > self._trial
         self._all_done = inbox.sum(done) == self.solutions.n_ants
 
     def decide(self, rng: np.random.Generator) -> Inputs:
@@ -229,6 +263,7 @@ class StigmergyEnvironment(Environment):
         self.trials = validation.integer("trials", trials, at_least=1)
         self._rollout = Rollout(colony.rollout.env, colony.max_steps)
         self._levels = colony.table.copy()
+        self._partition = colony.partition
         self._tau0, self._heuristic = colony.tau0, colony.heuristic
         self._first_trial = colony.trials
         self._update = as_update(colony.update)
@@ -261,14 +296,21 @@ class StigmergyEnvironment(Environment):
             self._rollout.allowed(),
             self.pheromone,
             self._trial,
+            self._partition,
         )
 
     def step(self, u: Inputs, rng: np.random.Generator) -> None:
         """Move the particles and decay the pheromone, or end the trial.
 
         Raises:
+            TypeError: `u` are not the inputs of ants.
             ValueError: a solution's cost is not positive and finite.
         """
+        if not isinstance(u, Inputs):
+            raise TypeError(
+                f"u must be the Inputs of Ants, got {validation.shown(u)}; run Ants in "
+                "this environment."
+            )
         if u.asks.all():
             self._end_trial(u.solutions)
             if not self.done:
@@ -315,6 +357,14 @@ class StigmergyEnvironment(Environment):
     def _take_in(self, observation: NDArray[Any]) -> None:
         self._observation = observation
         self.x = observation.reshape(len(observation), -1).astype(np.float64)
+
+
+def _same_cells(one: Partition, other: Partition) -> bool:
+    return one is other or (
+        type(one) is type(other)
+        and one.n_cells == other.n_cells
+        and np.array_equal(one.cell_states(), other.cell_states())
+    )
 
 
 def _check_colony(colony: Any) -> None:

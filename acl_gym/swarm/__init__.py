@@ -5,10 +5,11 @@ a row of an `Environment`; its mind is a row of `DynamicAgents`; a `Channel` car
 messages between minds. `run` lets them run. docs/moving-agents.md has the framework in
 words, and an example to begin with.
 
-`acl_gym.swarm.pso` has particle swarm optimization, and `acl_gym.swarm.aggregation` has
-swarms that aggregate and forage. `minimize` and its parts, `AggregatingAgents`, `Field`
-and `flow` are names of this package as well. All of these are imported when they are
-first used.
+Two methods of chapter 6 have packages of their own, `acl_gym.swarm.pso`, particle swarm
+optimization (§6.3.2), and `acl_gym.swarm.aggregation`, swarms that aggregate and forage
+(§6.3.3). What one begins with is imported when it is first used, and is here by name as
+well: `minimize`, `Landscape` and `ParticleSwarm`; `AggregatingAgents`, `Field` and `flow`.
+Ant Colony Learning (§6.3.1) in this framework is `acl_gym.agents.moving_ants`.
 
 Nothing in this package needs Gymnasium.
 """
@@ -39,7 +40,6 @@ _LAZY = {
     "flow": "acl_gym.swarm.aggregation",
     "minimize": "acl_gym.swarm.pso",
 }
-
 _PACKAGES = ("aggregation", "pso")
 
 __all__ = [
@@ -70,10 +70,10 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
+    if name in _PACKAGES:
+        return import_module(f"{__name__}.{name}")
     if name in _LAZY:
         return getattr(import_module(_LAZY[name]), name)
-    if name in _PACKAGES:
-        return import_module(f"acl_gym.swarm.{name}")
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 

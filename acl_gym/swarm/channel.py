@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from acl_gym.swarm.inbox import Inbox
+from acl_gym.swarm.inbox import Inbox, checked_inbox
 from acl_gym.swarm.links import Links, link_of
 from acl_gym.utils import validation
 from acl_gym.utils.compiling import njit
@@ -41,7 +41,7 @@ class Channel(ABC):
             rng: the generator of the run.
 
         Returns:
-            w_i of all agents.
+            w_i of all agents; of as many as there are positions.
         """
 
 
@@ -99,7 +99,8 @@ class Lossy(Channel):
         rng: np.random.Generator,
     ) -> Inbox:
         """See `Channel.deliver`."""
-        inbox = self.channel.deliver(sent, x, rng)
+        delivered = self.channel.deliver(sent, x, rng)
+        inbox = checked_inbox(delivered, self.channel, len(x))
         links = inbox.links
         senders, offsets = links.csr()  # says so if there are too many
         drawn = rng.random(links.n_links)

@@ -30,7 +30,7 @@ class Inbox:
         messages: see above.
 
     Raises:
-        TypeError: `messages` is no dict of arrays.
+        TypeError: `links` are none, or `messages` is no dict of arrays.
         ValueError: an array does not have a row for each agent.
 
     Example:
@@ -48,6 +48,11 @@ class Inbox:
     __slots__ = ("links", "messages")
 
     def __init__(self, links: Links, messages: dict[str, NDArray[Any]]) -> None:
+        if not isinstance(links, Links):
+            raise TypeError(
+                "links must be Links, such as Links.everyone(n), got "
+                f"{validation.shown(links)}."
+            )
         check_messages(messages, links.n)
         self.links = links
         self.messages = messages
@@ -71,8 +76,8 @@ class Inbox:
             ValueError: there is no such message, it is not one number, or a value is
                 NaN; infinity is allowed.
         """
-        values = self._message(key)
-        if values.ndim != 1 or values.dtype.kind not in "biuf":
+        values = self.message(key)
+        if values.shape != (self.links.n,) or values.dtype.kind not in "biuf":
             raise ValueError(
                 f"message {key!r} must be one real number for each agent, got an array "
                 f"of {values.dtype} and shape {values.shape}."
@@ -139,11 +144,18 @@ class Inbox:
             float64 of the shape of `rows`.
 
         Raises:
-            ValueError: `rows` are not real numbers with a row for each agent.
+            ValueError: `rows` are not real numbers with a row for each agent, or
+                `default` does not fit them.
         """
         sums, count = self.sum(rows), self.count
+        array = validation.as_array(default)
+        if array is None or array.dtype.kind not in "biuf" or not _fits(array, sums):
+            raise ValueError(
+                "default must be a number, or real numbers that can be broadcast to the "
+                f"shape {sums.shape} of rows, got {validation.shown(default)}."
+            )
         count = count.reshape(count.shape + (1,) * (sums.ndim - 1))
-        return np.where(count > 0, sums / np.maximum(count, 1), default)
+        return np.where(count > 0, sums / np.maximum(count, 1), array)
 
     def pairs(self, name: str) -> NDArray[Any]:
         """Return a message link by link, `(n_links, ...)`: that of `links.sender`.
@@ -151,10 +163,15 @@ class Inbox:
         Raises:
             ValueError: there is no such message.
         """
-        rows: NDArray[Any] = self._message(name)[self.links.sender]
+        rows: NDArray[Any] = self.message(name)[self.links.sender]
         return rows
 
-    def _message(self, name: str) -> NDArray[Any]:
+    def message(self, name: str) -> NDArray[Any]:
+        """Return a message as it was sent, `(n, ...)`: a row for each sender.
+
+        Raises:
+            ValueError: there is no such message.
+        """
         try:
             return self.messages[name]
         except KeyError:
@@ -166,6 +183,39 @@ class Inbox:
     def __repr__(self) -> str:
         """What was sent, to how many."""
         return f"Inbox({self.links!r}, messages={sorted(self.messages)})"
+
+
+def checked_inbox(delivered: Any, channel: Any, n: int) -> Inbox:
+    """Return what a channel has delivered, which may be one of the user's own.
+
+    Args:
+        delivered: what `Channel.deliver` has returned.
+        channel: that channel.
+        n: how many agents there are.
+
+    Raises:
+        TypeError: it is no `Inbox`.
+        ValueError: it is that of another number of agents.
+    """
+    if not isinstance(delivered, Inbox):
+        raise TypeError(
+            f"{type(channel).__name__}.deliver must return an Inbox, got {validation.shown(delivered)}; return "
+            "Inbox(links, sent)."
+        )
+    if delivered.links.n != n:
+        raise ValueError(
+            f"{type(channel).__name__}.deliver must return links of the {n} agents that "
+            f"there are, got links of {delivered.links.n}; make them for len(x) agents."
+        )
+    return delivered
+
+
+def _fits(array: NDArray[Any], target: NDArray[Any]) -> bool:
+    """Whether an array can be broadcast to the shape of another one."""
+    try:
+        return np.broadcast_shapes(array.shape, target.shape) == target.shape
+    except ValueError:
+        return False
 
 
 def _least_but(values: NDArray[Any], best: int) -> int:

@@ -10,9 +10,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from acl_gym.utils import validation
 from acl_gym.utils.compiling import njit
-from acl_gym.utils.typing import BoolArray, IntArray
+from acl_gym.utils.typing import IntArray
 
 _NOTHING: IntArray = np.empty(0, np.int64)
+
+_MOST_AGENTS = 3_000_000_000
+"""The number of a pair of agents fits into an int64."""
 
 
 class Links:
@@ -109,9 +112,9 @@ class Links:
 
         Raises:
             TypeError: `n` is not an integer.
-            ValueError: it is < 1.
+            ValueError: it is < 1, or no memory is large enough for so many agents.
         """
-        n = validation.integer("n", n, at_least=1)
+        n = _checked_number(n)
         include_self = validation.boolean("include_self", include_self)
         links = cls.__new__(cls)
         links._set(n, complete=include_self, all_others=not include_self)
@@ -128,9 +131,10 @@ class Links:
 
         Raises:
             TypeError: `n` is not an integer.
-            ValueError: the arrays are not such numbers, or not equally long.
+            ValueError: the arrays are not such numbers, or not equally long; or no
+                memory is large enough for so many agents.
         """
-        n = validation.integer("n", n, at_least=1)
+        n = _checked_number(n)
         to, by = _agents("receiver", receiver, n), _agents("sender", sender, n)
         if to.shape != by.shape:
             raise ValueError(
@@ -150,9 +154,17 @@ class Links:
                 lists.
 
         Raises:
+            TypeError: `lists` is no sequence.
             ValueError: there is no list, or a list has other elements.
         """
-        n = validation.integer("the number of lists", len(lists), at_least=1)
+        try:
+            count = len(lists)
+        except TypeError:
+            raise TypeError(
+                "lists must be a sequence with a list for each agent, such as "
+                f"[[1], [0]], got {validation.shown(lists)}."
+            ) from None
+        n = validation.integer("the number of lists", count, at_least=1)
         rows = [_agents(f"lists[{i}]", each, n) for i, each in enumerate(lists)]
         receiver = np.repeat(np.arange(n), [row.size for row in rows])
         return cls.from_pairs(n, receiver, np.concatenate(rows))
@@ -228,7 +240,7 @@ class Links:
             return self.sender.copy(), self.offsets.copy()
         return self._sender, self._offsets
 
-    def subset(self, kept: BoolArray) -> Links:
+    def subset(self, kept: ArrayLike) -> Links:
         """Return some of these links.
 
         Args:
@@ -237,13 +249,14 @@ class Links:
         Raises:
             ValueError: it is not such an array.
         """
-        if kept.shape != (self.n_links,) or kept.dtype != np.bool_:
+        flags = validation.as_array(kept)
+        if flags is None or flags.shape != (self.n_links,) or flags.dtype != np.bool_:
             raise ValueError(
-                f"kept must be {self.n_links} flags, one for each link, got an array of "
-                f"{kept.dtype} and shape {kept.shape}."
+                f"kept must be {self.n_links} flags, one for each link, got "
+                f"{validation.shown(kept)}; flags are True and False."
             )
-        counts = np.bincount(self.receiver[kept], minlength=self.n)
-        return Links(self.n, self.sender[kept], _offsets_of(counts))
+        counts = np.bincount(self.receiver[flags], minlength=self.n)
+        return Links(self.n, self.sender[flags], _offsets_of(counts))
 
     def __repr__(self) -> str:
         """How many agents and links there are."""
@@ -253,6 +266,15 @@ class Links:
 def _everyone(n: int, include_self: bool) -> Links:
     """What `pickle` makes such links with."""
     return Links.everyone(n, include_self)
+
+
+def _checked_number(n: Any) -> int:
+    """The number of agents, whose links have some rows of numbers at least."""
+    count = validation.integer("n", n, at_least=1, at_most=_MOST_AGENTS)
+    validation.check_memory(
+        f"links of {count:,} agents", 24 * count, "use fewer agents"
+    )
+    return count
 
 
 def _agents(name: str, numbers: ArrayLike, n: int) -> IntArray:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +27,15 @@ class Environment(ABC):
     """
 
     x: FloatArray
+
+    if not TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> Any:
+            kind = type(self).__name__
+            message = f"{kind!r} object has no attribute {name!r}"
+            if ("x" not in self.__dict__ and hasattr(type(self), name)) or name == "x":
+                message += "; agents have states after the first reset, or in a run"
+            raise AttributeError(message, name=name, obj=self)
 
     @property
     def n(self) -> int:

@@ -12,7 +12,8 @@ from acl_gym.utils.compiling import njit
 from acl_gym.utils.typing import FloatArray
 
 FARTHEST = 1e150
-"""Squares of distances between positions up to this are finite."""
+"""Squares of distances between positions up to this are finite. A run ends with an error
+beyond it, and so does a search, as one that has exploded."""
 
 
 def checked_positions(positions: Any, n: int | None = None) -> FloatArray:

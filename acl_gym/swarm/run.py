@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acl_gym.swarm.channel import Channel
+from acl_gym.swarm.inbox import checked_inbox
 from acl_gym.swarm.protocols import DynamicAgents, Environment
 from acl_gym.swarm.rows import checked_positions
 from acl_gym.swarm.topologies import Everyone
@@ -17,7 +18,8 @@ from acl_gym.utils import validation
 
 Callback = Callable[[int, DynamicAgents, Environment], Any]
 """What `run` calls after each step: `(steps made, agents, environment)`. A function that
-returns False ends the run."""
+returns False, Python's or NumPy's, ends the run; with anything else, None as well, it goes
+on. The callback of `minimize` is the other way round, as in SciPy: there True is the end."""
 
 
 @dataclass
@@ -62,20 +64,25 @@ def run(
         steps: the most steps to make, >= 0; the environment may be done before.
         rng: the generator of all random numbers of the run, or its seed; None draws one.
         channel: the channel C; None takes `Everyone()`.
-        stale: follow Definition 6.2 to the letter: z_i(k + 1) = h_i(z_i(k), y_i(k),
-            w_i(k)), where w_i(k) comes from v_j(k) = phi_j(z_j(k)). Agents then send
-            before they observe, and so hear what others knew in the step before. In the
-            first step, in which they know nothing before, they observe first.
-        record: names of arrays to record, which are attributes of the environment, such
-            as `("x",)`.
-        callback: called after each step, see `Callback`.
+        stale: let messages be as old as in Definition 6.2: z_i(k + 1) = h_i(z_i(k),
+            y_i(k), w_i(k)), where w_i(k) comes from v_j(k) = phi_j(z_j(k)). Agents then
+            send before they observe, and so hear what others knew in the step before. In
+            the first step, in which they know nothing before, they observe first. The
+            rest of the definition is left out: it draws u_i(k) from pi_i(z_i(k), y_i(k)),
+            so that an input, too, cannot depend on what was heard in its step. Here
+            agents always decide last, by z_i(k + 1).
+        record: names of arrays or numbers to record, which are attributes of the
+            environment and keep their shape, such as `("x",)`.
+        callback: called after each step; the run ends if it returns False, see
+            `Callback`.
 
     Returns:
         How many steps were made, and what was recorded.
 
     Raises:
         TypeError: an argument is of the wrong kind.
-        ValueError: an argument is out of range, or a position is NaN or infinite.
+        ValueError: an argument is out of range; a position is NaN, infinite or farther
+            away than 1e150; or the channel delivers to another number of agents.
     """
     steps = validation.integer("steps", steps, at_least=0)
     channel = Everyone() if channel is None else channel
@@ -99,7 +106,8 @@ def run(
         else:
             agents.observe(environment.observe())
             sent = agents.send()
-        agents.hear(channel.deliver(sent, environment.positions, rng))
+        delivered = channel.deliver(sent, environment.positions, rng)
+        agents.hear(checked_inbox(delivered, channel, n))
         environment.step(agents.decide(rng), rng)
         checked_positions(environment.positions, n)
         history.steps += 1
@@ -140,13 +148,27 @@ def _check_kinds(
 
 def _record(environment: Environment, series: dict[str, list[NDArray[Any]]]) -> None:
     for name, rows in series.items():
+        kind = type(environment).__name__
         try:
-            rows.append(np.array(getattr(environment, name)))
+            value = getattr(environment, name)
         except AttributeError:
             raise ValueError(
-                f"record must name attributes of {type(environment).__name__}, such as "
-                f"'x', got {name!r}; use callback to look at anything else."
+                f"record must name attributes of {kind}, such as 'x', got {name!r}; use "
+                "callback to look at anything else."
             ) from None
+        array = validation.as_array(value)
+        if array is None or array.dtype.kind == "O":
+            raise ValueError(
+                f"record must name arrays or numbers, such as 'x', got {name!r}, which is "
+                f"{validation.shown(value)}; use callback to look at anything else."
+            )
+        if rows and array.shape != rows[0].shape:
+            raise ValueError(
+                f"record must name arrays that keep their shape, got {name!r}, whose "
+                f"shape was {rows[0].shape} and is now {array.shape}; use callback to "
+                "look at it."
+            )
+        rows.append(array.copy())
 
 
 def _copied(messages: dict[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:

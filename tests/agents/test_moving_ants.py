@@ -13,6 +13,7 @@ from acl_gym.agents.moving_ants import Ants, Inputs, Observations, StigmergyEnvi
 from acl_gym.swarm import (
     Channel,
     Delayed,
+    Environment,
     Everyone,
     History,
     Links,
@@ -244,3 +245,62 @@ def test_colonies_that_the_framework_does_not_have_are_refused() -> None:
             make(3)
         with pytest.raises(ValueError, match="has no environment"):
             make(without)
+
+
+def test_ants_and_environments_of_different_colonies_are_refused() -> None:
+    """Kernels would address cells and actions that are not there."""
+    small, large = (
+        colony(PENDULUM, n=4),
+        ACL(
+            gym.make_vec(PENDULUM, num_envs=4),
+            Fuzzy.from_box(
+                gym.make_vec(PENDULUM, num_envs=1).single_observation_space,
+                (80, 90),
+                circular=[0],
+            ),
+        ),
+    )
+    shifted = ACL(
+        gym.make_vec(PENDULUM, num_envs=4),
+        Fuzzy.from_box(
+            gym.make_vec(PENDULUM, num_envs=1).single_observation_space,
+            (9, 8),
+            circular=[0],
+        ),
+    )
+    for ants, there, words in (
+        (large, small, "with other cells; make both from the same colony"),
+        (small, large, "with other cells"),
+        (shifted, small, "with other cells"),
+        (colony(GRID, n=4), small, "got 4 and 3 actions"),
+    ):
+        with pytest.raises(ValueError, match=words):
+            run(Ants(ants), StigmergyEnvironment(there, 1), 3, 0)
+
+
+def test_colonies_with_equal_cells_may_be_mixed() -> None:
+    one, other = colony(PENDULUM, n=4, max_steps=5), colony(PENDULUM, n=4, max_steps=5)
+    assert run(Ants(one), StigmergyEnvironment(other, 1), 99, 0).done
+
+
+class Elsewhere(Environment):
+    """No environment of ants."""
+
+    def reset(self, rng: np.random.Generator) -> None:
+        self.x = np.zeros((4, 2))
+
+    def observe(self) -> Any:
+        return self.x
+
+    def step(self, u: Any, rng: np.random.Generator) -> None:
+        raise AssertionError
+
+
+def test_halves_of_other_kinds_are_refused() -> None:
+    source = colony(GRID, n=4)
+    with pytest.raises(TypeError, match="Observations of a StigmergyEnvironment, got"):
+        run(Ants(source), Elsewhere(), 3, 0)
+    environment = StigmergyEnvironment(source, 1)
+    environment.reset(np.random.default_rng(0))
+    with pytest.raises(TypeError, match=r"u must be the Inputs of Ants, got None"):
+        environment.step(None, np.random.default_rng(0))

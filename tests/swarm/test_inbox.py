@@ -168,3 +168,23 @@ def test_errors_name_the_messages_there_are() -> None:
 def test_sums_need_numbers_with_a_row_for_each_agent(rows) -> None:
     with pytest.raises(ValueError, match="rows must be real numbers"):
         Inbox(Links.everyone(2), {}).sum(rows)
+
+
+@pytest.mark.parametrize("default", [np.ones(5), "a", None, 1j, [[1], []]])
+def test_the_default_of_a_mean_must_fit(default) -> None:
+    inbox = Inbox(Links.from_lists([[0], []]), {})
+    with pytest.raises(ValueError, match=r"default must be .* shape \(2, 3\) of rows"):
+        inbox.mean(np.ones((2, 3)), default=default)
+    assert inbox.mean(np.ones((2, 3)), default=[2, 3, 4])[1].tolist() == [2, 3, 4]
+
+
+def test_an_inbox_needs_links() -> None:
+    with pytest.raises(TypeError, match=r"links must be Links, .* got 3"):
+        Inbox(3, {})
+
+
+def test_messages_that_were_replaced_are_not_read_past_their_end() -> None:
+    inbox = Inbox(Links.from_lists([[0], [1]]), {"cost": np.ones(2)})
+    inbox.messages["cost"] = np.ones(1)
+    with pytest.raises(ValueError, match="one real number for each agent"):
+        inbox.best("cost")

@@ -85,7 +85,21 @@ def test_pairs_must_be_numbers_of_agents(arguments, words) -> None:
         Links.from_pairs(*arguments)
 
 
+def test_more_agents_than_memory_holds_are_refused() -> None:
+    for make in (
+        lambda n: Links.from_pairs(n, [0], [1]),
+        Links.everyone,
+        lambda n: Links.everyone(n, include_self=False),
+    ):
+        with pytest.raises(
+            ValueError, match=r"fit into .* use fewer|n must be at most"
+        ):
+            make(10**12)
+
+
 def test_lists_must_be_numbers_of_agents() -> None:
+    with pytest.raises(TypeError, match=r"a list for each agent.*got 3"):
+        Links.from_lists(3)
     with pytest.raises(ValueError, match=r"lists\[1\] must hold .*from 0 to 1, got 5"):
         Links.from_lists([[0], [5]])
     with pytest.raises(ValueError, match="the number of lists must be at least 1"):
@@ -101,11 +115,17 @@ def test_too_many_links_are_not_written_out() -> None:
 
 
 @pytest.mark.parametrize(
-    "kept", [np.ones(3, np.bool_), np.ones(2), np.ones((2, 1), bool)]
+    "kept",
+    [np.ones(3, np.bool_), np.ones(2), np.ones((2, 1), bool), [True], None, [1, 0]],
 )
 def test_a_subset_needs_a_flag_for_each_link(kept) -> None:
     with pytest.raises(ValueError, match="kept must be 2 flags"):
         Links.from_lists([[1], [0]]).subset(kept)
+
+
+def test_flags_of_a_subset_may_be_a_list() -> None:
+    links = Links.from_lists([[1], [0]]).subset([True, False])
+    assert as_lists(links) == [[1], []]
 
 
 def test_repr_says_how_many_there_are() -> None:

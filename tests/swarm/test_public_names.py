@@ -4,21 +4,29 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from importlib import import_module
 
 import pytest
 
 from acl_gym import swarm
-from acl_gym.swarm import aggregation, pso
 
 
 def test_every_public_name_is_there() -> None:
     for name in swarm.__all__:
         assert hasattr(swarm, name)
     assert set(swarm.__all__) <= set(dir(swarm))
-    for name in swarm._LAZY:
-        source = pso if hasattr(pso, name) else aggregation
-        assert getattr(swarm, name) is getattr(source, name)
-    assert {"AggregatingAgents", "Field", "flow", "minimize"} <= set(swarm._LAZY)
+    for name, module in swarm._LAZY.items():
+        assert getattr(swarm, name) is getattr(import_module(module), name)
+
+
+def test_the_packages_are_attributes() -> None:
+    code = """
+import acl_gym.swarm as s
+assert s.pso.minimize is s.minimize
+assert s.aggregation.Field is s.Field
+"""
+    assert "aggregation" in swarm.__doc__
+    subprocess.run([sys.executable, "-c", code], check=True)
 
 
 def test_an_unknown_name_is_an_attribute_error() -> None:

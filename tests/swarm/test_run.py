@@ -18,6 +18,7 @@ from acl_gym.swarm import (
     Environment,
     Everyone,
     Inbox,
+    Links,
     Lossy,
     Radius,
     Ring,
@@ -203,6 +204,64 @@ def test_a_callback_sees_each_step_and_may_end_the_run(no: Any) -> None:
 def test_nothing_is_recorded_unless_asked_for() -> None:
     history = run(Averaging(), Plane(), 0, 0)
     assert (history.steps, history.done, history.recorded) == (0, False, {})
+
+
+class Passing(Channel):
+    """Delivers what it is told, whatever it is sent."""
+
+    def __init__(self, delivered: Any) -> None:
+        self.delivered = delivered
+
+    def deliver(self, sent: Any, x: Any, rng: Any) -> Any:
+        return self.delivered(sent)
+
+
+@pytest.mark.parametrize("wrapper", [None, lambda each: Lossy(each, 0.0)])
+@pytest.mark.parametrize(
+    ("delivered", "error", "words"),
+    [
+        (
+            lambda sent: None,
+            TypeError,
+            "Passing.deliver must return an Inbox, got None",
+        ),
+        (lambda sent: sent, TypeError, "return Inbox"),
+        (
+            lambda sent: Inbox(Links.everyone(3_000_000), {}),
+            ValueError,
+            r"links of the 6 agents .* got links of 3000000",
+        ),
+    ],
+)
+def test_what_a_channel_delivers_is_checked(delivered, error, words, wrapper) -> None:
+    channel = Passing(delivered)
+    with pytest.raises(error, match=words):
+        run(Averaging(), Plane(), 2, 0, wrapper(channel) if wrapper else channel)
+
+
+def test_what_cannot_be_recorded_is_refused() -> None:
+    class Growing(Plane):
+        @property
+        def trail(self) -> list[float]:
+            return [1.0] * (self.time + 1)
+
+    for name, words in (
+        ("observe", r"arrays or numbers, .* got 'observe', which is <bound method"),
+        ("trail", r"keep their shape, got 'trail', whose shape was \(1,\) and is now"),
+    ):
+        with pytest.raises(ValueError, match=words):
+            run(Averaging(), Growing(), 3, 0, record=(name,))
+
+
+def test_states_are_there_after_the_first_reset() -> None:
+    class Late(Plane):
+        pass
+
+    for name in ("x", "n", "positions"):
+        with pytest.raises(AttributeError, match=f"attribute '{name}'; .*first reset"):
+            getattr(Late(), name)
+    with pytest.raises(AttributeError, match=r"attribute 'speed'$"):
+        Late().speed  # noqa: B018
 
 
 class Vehicles(Plane):

@@ -11,6 +11,7 @@ from acl_gym.swarm.inbox import Inbox
 from acl_gym.swarm.protocols import DynamicAgents
 from acl_gym.swarm.pso import kernels
 from acl_gym.swarm.pso.coefficients import ACCELERATION, of_each_particle
+from acl_gym.utils import validation
 from acl_gym.utils.typing import FloatArray
 
 
@@ -61,6 +62,8 @@ class ParticleSwarm(DynamicAgents):
         self._c2 = of_each_particle("social", self.social, n, at_least=0)
         self.best_values = np.full(n, np.inf)
         self.best_positions = np.empty((n, 0))
+        self._position = self._heard = self.best_positions
+        self._uniforms = np.empty((n, 2, 0))
         self._chosen = np.full(n, -1)
 
     def observe(self, y: dict[str, FloatArray]) -> None:
@@ -68,14 +71,19 @@ class ParticleSwarm(DynamicAgents):
 
         Args:
             y: see `Landscape.observe`.
+
+        Raises:
+            TypeError: it is no dict.
+            ValueError: it does not hold a value and a position of each particle.
         """
-        self._position = y["position"]
-        if self.best_positions.shape != self._position.shape:  # the first observation
-            self.best_positions = self._position.copy()
+        n, d = self.best_positions.shape
+        value, position = _observed(y, n, d or None)
+        self._position = position
+        if d == 0:  # the first observation
+            self.best_positions = position.copy()
             self._heard = self.best_positions
-            n, d = self._position.shape
-            self._uniforms = np.empty((n, 2, d))
-        self.remember(slice(None), y)
+            self._uniforms = np.empty((n, 2, position.shape[1]))
+        kernels.remember_best(value, position, self.best_values, self.best_positions)
 
     def remember(self, rows: slice, y: dict[str, FloatArray]) -> None:
         """Replace the personal bests of some particles, see `observe`.
@@ -83,21 +91,37 @@ class ParticleSwarm(DynamicAgents):
         Args:
             rows: which.
             y: what they observe, a row for each.
+
+        Raises:
+            TypeError: it is no dict.
+            ValueError: it does not hold a value and a position of each of them.
         """
-        kernels.remember_best(
-            y["value"], y["position"], self.best_values[rows], self.best_positions[rows]
-        )
+        values, positions = self.best_values[rows], self.best_positions[rows]
+        kernels.remember_best(*_observed(y, *positions.shape), values, positions)
 
     def send(self) -> dict[str, NDArray[Any]]:
         """The personal bests: `value`, `(n,)`, and `position`, `(n, d)`."""
         return {"value": self.best_values, "position": self.best_positions}
 
     def hear(self, inbox: Inbox) -> None:
-        """Find the local bests."""
-        kernels.choose_local_best(
-            inbox.best("value"), inbox.messages["value"], self._chosen
-        )
-        self._heard = inbox.messages["position"]
+        """Find the local bests.
+
+        Raises:
+            ValueError: the messages are not those of `send` of as many particles.
+        """
+        best = inbox.best("value")
+        position = _rows("message 'position'", inbox.message("position"))
+        if position.shape != self.best_positions.shape or best.shape != (
+            len(position),
+        ):
+            raise ValueError(
+                "message 'position' must have the shape "
+                f"{self.best_positions.shape}, a point from each particle, got "
+                f"{position.shape} from {inbox.links.n}; let the channel deliver what "
+                "was sent."
+            )
+        kernels.choose_local_best(best, inbox.messages["value"], self._chosen)
+        self._heard = position
 
     def decide(self, rng: np.random.Generator) -> FloatArray:
         """Draw r1 and r2, and return u, `(n, d)`."""
@@ -120,7 +144,22 @@ class ParticleSwarm(DynamicAgents):
             position: where they are, a row for each.
             uniforms: r1 and r2 of all particles, `(n, 2, d)`.
             u: a row for each.
+
+        Raises:
+            ValueError: the arrays do not have these shapes.
         """
+        shape = position.shape
+        n, d = self.best_positions.shape
+        if (
+            self.best_positions[rows].shape != shape
+            or u.shape != shape
+            or uniforms.shape != (n, 2, d)
+        ):
+            raise ValueError(
+                "position and u must have the shape "
+                f"{self.best_positions[rows].shape}, and uniforms {(n, 2, d)}, got "
+                f"{shape}, {u.shape} and {uniforms.shape}."
+            )
         kernels.attract(
             position,
             self.best_positions[rows],
@@ -131,3 +170,47 @@ class ParticleSwarm(DynamicAgents):
             uniforms[rows],
             u,
         )
+
+
+def _observed(y: Any, n: int, d: int | None) -> tuple[FloatArray, FloatArray]:
+    """The values and positions that n particles observe, checked, for kernels.
+
+    Args:
+        y: see `Landscape.observe`.
+        n: how many particles.
+        d: how many variables; None: any number >= 1.
+
+    Raises:
+        TypeError: it is no dict.
+        ValueError: it does not hold such arrays.
+    """
+    if not isinstance(y, dict) or "value" not in y or "position" not in y:
+        got = sorted(map(str, y)) if isinstance(y, dict) else validation.shown(y)
+        kind = ValueError if isinstance(y, dict) else TypeError
+        raise kind(
+            "particles must observe a dict with 'value' and 'position', as of a "
+            f"Landscape, got {got}; use a Landscape as environment, or let yours return "
+            "both."
+        )
+    value, position = _rows("'value'", y["value"]), _rows("'position'", y["position"])
+    columns = position.shape[-1] if d is None else d
+    if value.shape != (n,) or position.shape != (n, columns) or columns == 0:
+        raise ValueError(
+            f"particles must observe 'value' of shape ({n},) and 'position' of shape "
+            f"({n}, {'d' if d is None else d}), a row for each, got shapes {value.shape} and "
+            f"{position.shape}."
+        )
+    return value, position
+
+
+def _rows(name: str, rows: Any) -> FloatArray:
+    """An array of numbers as kernels take it, not copied if it is one already."""
+    if type(rows) is np.ndarray and rows.dtype == np.float64 and rows.ndim:
+        return rows if rows.flags.c_contiguous else np.ascontiguousarray(rows)
+    array = validation.as_array(rows)
+    if array is None or array.dtype.kind not in "biuf" or array.ndim == 0:
+        raise ValueError(
+            f"{name} must be real numbers with a row for each particle, got "
+            f"{validation.shown(rows)}."
+        )
+    return np.ascontiguousarray(array, np.float64)

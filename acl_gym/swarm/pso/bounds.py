@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 from scipy.optimize import Bounds
 
 from acl_gym.swarm.pso import kernels
+from acl_gym.swarm.rows import FARTHEST
 from acl_gym.utils import validation
 from acl_gym.utils.typing import FloatArray
 
@@ -99,6 +100,11 @@ class SearchSpace:
                 f"x0 must be a point of {self.d} variables, or at most {n} of them as "
                 f"an array of shape (m, {self.d}), got shape {np.shape(x0)}."
             )
+        if np.abs(points).max() > FARTHEST:
+            raise ValueError(
+                f"x0 must lie within {FARTHEST:g} of 0, got "
+                f"{np.abs(points).max():g}; choose other units."
+            )
         outside = (points < self.lower) | (points > self.upper)
         if outside.any():
             row, k = (int(each) for each in np.argwhere(outside)[0])
@@ -117,8 +123,8 @@ def search_space(bounds: Any) -> SearchSpace:
         bounds: a pair (lower, upper) for each variable, or `scipy.optimize.Bounds`.
 
     Raises:
-        ValueError: they are neither, a lower bound exceeds its upper bound, or a float
-            cannot hold the difference of two finite ones.
+        ValueError: they are neither, a lower bound exceeds its upper bound, or a finite
+            one is farther away than `FARTHEST`.
     """
     if isinstance(bounds, Bounds):
         bounds = np.column_stack(np.broadcast_arrays(bounds.lb, bounds.ub))
@@ -130,13 +136,13 @@ def search_space(bounds: Any) -> SearchSpace:
         )
     lower, upper = array.T.copy()
     ordered = (lower <= upper) & (lower < np.inf) & (upper > -np.inf)  # NaN neither
-    with np.errstate(over="ignore", invalid="ignore"):
-        ordered &= np.isfinite(upper - lower) | np.isinf(lower) | np.isinf(upper)
+    for bound in (lower, upper):
+        ordered &= (np.abs(bound) <= FARTHEST) | np.isinf(bound)
     if not ordered.all():
         k = int(np.flatnonzero(~ordered)[0])
         raise ValueError(
-            "bounds must have lower <= upper, neither of them NaN, and a finite "
-            f"difference if both are finite, got ({lower[k]:g}, {upper[k]:g}) for "
+            "bounds must have lower <= upper, neither of them NaN, and those that are "
+            f"finite within {FARTHEST:g} of 0, got ({lower[k]:g}, {upper[k]:g}) for "
             f"variable {k}."
         )
     return SearchSpace(lower, upper)

@@ -25,7 +25,7 @@ def constriction_coefficients(phi: float = 4.1) -> tuple[float, float]:
     c1 = c2 = chi phi / 2.
 
     Args:
-        phi: > 4; the larger, the sooner the swarm contracts.
+        phi: in (4, 1e6]; the larger, the sooner the swarm contracts.
 
     Returns:
         w and c1 = c2; for phi = 4.1 they are 0.729844 and 1.496180.
@@ -34,7 +34,7 @@ def constriction_coefficients(phi: float = 4.1) -> tuple[float, float]:
         TypeError: phi is no number.
         ValueError: it is out of range.
     """
-    phi = validation.number("phi", phi, above=4)
+    phi = validation.number("phi", phi, above=4, at_most=1e6)
     chi = 2.0 / (phi - 2.0 + math.sqrt(phi * phi - 4.0 * phi))
     return chi, chi * phi / 2.0
 
@@ -60,5 +60,11 @@ def of_each_particle(
     Raises:
         ValueError: `values` are neither, or out of range.
     """
+    shape = np.shape(validation.real_array(name, values, finite=False))
+    if shape not in ((), (n,)):
+        raise ValueError(
+            f"{name} must be a number, or one for each of the {n} particles, got an "
+            f"array of shape {shape}."
+        )
     array = per_agent(name, values, n, at_least=at_least, below=math.inf)
     return np.full(n, array)

@@ -117,6 +117,7 @@ def move(
     boundary: int,
     limit: FloatArray,
     literal: bool,
+    farthest: float = math.inf,
 ) -> bool:
     """Move every particle by (6.1) and (6.2), in place.
 
@@ -132,9 +133,10 @@ def move(
         boundary: `NONE`, `CLIP`, `ABSORB` or `REFLECT`.
         limit: largest absolute velocity, may be inf, `(d,)`.
         literal: move with the old velocity.
+        farthest: how far from 0 a position may be.
 
     Returns:
-        Whether all states are finite. Where they are not, no particle is to be used any
+        Whether all states are finite, and no position is farther away. Where they are not, no particle is to be used any
         more.
     """
     n, d = u.shape
@@ -151,6 +153,9 @@ def move(
             x[i, k] += old if literal else new
         for k in range(d):
             finite &= math.isfinite(x[i, k]) and math.isfinite(x[i, d + k])
+        if boundary == NONE:
+            for k in range(d):
+                finite &= abs(x[i, k]) <= farthest
         if boundary == NONE or not finite:
             continue
         for k in range(d):

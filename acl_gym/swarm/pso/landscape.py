@@ -13,12 +13,13 @@ from acl_gym.swarm.pso import kernels
 from acl_gym.swarm.pso.bounds import BOUNDARIES, search_space
 from acl_gym.swarm.pso.coefficients import INERTIA, ORDERS, Inertia, of_each_particle
 from acl_gym.swarm.pso.objective import Objective
+from acl_gym.swarm.rows import FARTHEST
 from acl_gym.utils import validation
 from acl_gym.utils.typing import FloatArray
 
 
 class ExplosionError(OverflowError):
-    """A position or velocity of a swarm is larger than a float can hold."""
+    """A position of a swarm is beyond `FARTHEST`, or a velocity beyond all floats."""
 
 
 class Landscape(Environment):
@@ -60,12 +61,15 @@ class Landscape(Environment):
             `"clip"`: the position becomes the bound, and the velocity stays as it is, so
             that the particle stays there until it is attracted back;
             `"none"`: nothing. Bounds then only say where particles begin, and F is
-            evaluated outside as well.
+            evaluated outside as well, up to 1e150: squares of such numbers are finite.
         velocity_limit: the largest absolute velocity, > 0, a number or `(d,)`; None: no
             limit.
         order: which velocity a particle moves with, see above.
         vectorized: whether `function` takes many points at once. If not, it is called
-            with one point `(d,)` at a time and returns a number.
+            with one point `(d,)` at a time and returns a number. Where there are as many
+            particles as variables, a function of one point can be mistaken for one of
+            many: such a function is given one point more in its first call, which is not
+            counted.
 
     Attributes:
         x: [theta, nu], `(n, 2 d)`.
@@ -152,14 +156,25 @@ class Landscape(Environment):
             rng: not used, because the motion is deterministic.
 
         Raises:
-            ValueError: `u` is of another shape.
-            ExplosionError: a position or a velocity is no longer finite.
+            ValueError: `u` are not numbers of this shape.
+            ExplosionError: a position is farther away than 1e150, or a velocity larger
+                than a float can hold.
         """
-        if u.shape != (self.n_particles, self.space.d):
+        shape = (self.n_particles, self.space.d)
+        given = validation.as_array(u)
+        if given is None or given.dtype.kind not in "biuf":
             raise ValueError(
-                f"u must have the shape {(self.n_particles, self.space.d)}, a row for "
-                f"each particle, got {u.shape}."
+                f"u must be real numbers of the shape {shape}, a row for each particle, "
+                f"got {validation.shown(u)}."
             )
+        u = np.ascontiguousarray(given, np.float64)
+        if u.shape == shape and np.isnan(u).any():
+            particle = int(np.flatnonzero(np.isnan(u).any(axis=1))[0])
+            raise ValueError(
+                f"u must be numbers, got NaN for particle {particle}; look at what the "
+                "agents decide, such as accelerations that are too large."
+            )
+        _check_shape(u, shape)
         self.begin_iteration()
         self.move(slice(None), u)
 
@@ -174,32 +189,48 @@ class Landscape(Environment):
 
         Args:
             rows: which.
-            u: their inputs, one row for each, C order.
+            u: their inputs, one row for each.
 
         Raises:
-            ExplosionError: a position or a velocity is no longer finite.
+            ValueError: `u` or `x` is of another shape.
+            ExplosionError: see `step`.
         """
+        w, d = self._w[rows], self.space.d
+        _check_shape(u, (w.size, d))
+        x = self.x[rows]
+        if x.shape != (w.size, 2 * d):
+            raise ValueError(
+                f"x must have {2 * d} columns and a row for each of the "
+                f"{self.n_particles} particles, got shape {self.x.shape}."
+            )
         finite = kernels.move(
-            self.x[rows],
+            x,
             u,
-            self._w[rows],
+            w,
             self.space.lower,
             self.space.upper,
             BOUNDARIES[self.boundary],
             self.velocity_limit,
             self.order == "literal",
+            FARTHEST,
         )
         if not finite:
             raise ExplosionError(
-                "positions and velocities must stay finite, but the swarm has exploded: "
-                f"in iteration {self.iteration} one of them is larger than a float can "
-                "hold; use order='standard', a smaller inertia or acceleration "
+                f"positions must stay within {FARTHEST:g} and velocities finite, but the "
+                f"swarm has exploded in iteration {self.iteration}; use order='standard', a smaller inertia or acceleration "
                 "(acl_gym.swarm.pso.is_stable tells which), bounds or a velocity_limit."
             )
 
     def _inertia_at(self, k: int) -> FloatArray:
         value = self.inertia(k) if callable(self.inertia) else self.inertia
         return of_each_particle("inertia", value, self.n_particles)
+
+
+def _check_shape(u: FloatArray, shape: tuple[int, int]) -> None:
+    if u.shape != shape:
+        raise ValueError(
+            f"u must have the shape {shape}, a row for each particle, got {u.shape}."
+        )
 
 
 def _limits(limit: ArrayLike | None, d: int) -> FloatArray:

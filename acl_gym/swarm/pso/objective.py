@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import sys
 import warnings
 from collections.abc import Callable
+from pathlib import Path
+from types import FrameType
 from typing import Any
 
 import numpy as np
@@ -12,11 +15,17 @@ from acl_gym.swarm.pso import kernels
 from acl_gym.utils import validation
 from acl_gym.utils.typing import FloatArray
 
+_PACKAGE = str(Path(__file__).parents[2] / "_")[:-1]
+
 
 class Objective:
     """A function of points, whose values are checked and counted.
 
     NaN counts as infinity, which is worse than every number, with one warning.
+
+    A function of one point that is taken for one of many points is found by the shape of
+    what it returns, unless there are as many points as variables. In that case the first
+    call has one point more, which is not counted.
 
     Args:
         function: of `(n, d)`, returns `(n,)`; if not `vectorized`, of `(d,)`, returns a
@@ -40,6 +49,7 @@ class Objective:
         self.vectorized = validation.boolean("vectorized", vectorized)
         self.evaluations = 0
         self._warned = False
+        self._unlike = False  # whether a call had not as many points as variables
 
     def __call__(self, points: FloatArray) -> FloatArray:
         """The values at some points.
@@ -55,7 +65,11 @@ class Objective:
         """
         self.evaluations += len(points)
         if self.vectorized:
-            values = self._checked(self.function(points.copy()), len(points))
+            n, d = points.shape
+            extra = n == d > 1 and not self._unlike
+            batch = np.vstack([points, points[:1]]) if extra else points.copy()
+            values = self._checked(self.function(batch), n + extra)[:n]
+            self._unlike = True
         else:
             values = np.array([self._of_one(row.copy()) for row in points])
         first = kernels.replace_nan(values)
@@ -65,7 +79,7 @@ class Objective:
                 f"the function returned NaN at {validation.shown(points[first].tolist())}"
                 "; NaN counts as infinity, worse than every number, here and from now on.",
                 RuntimeWarning,
-                stacklevel=2,
+                stacklevel=_level_of_caller(),
             )
         return values
 
@@ -100,3 +114,12 @@ class Objective:
                 "array of points."
             )
         return float(array.reshape(()))
+
+
+def _level_of_caller() -> int:
+    """The `stacklevel` at which `warnings.warn` names a line outside of this package."""
+    level, frame = 1, sys._getframe(1)
+    above: FrameType | None = frame
+    while above is not None and above.f_code.co_filename.startswith(_PACKAGE):
+        level, above = level + 1, above.f_back
+    return level

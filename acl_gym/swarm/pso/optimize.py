@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from scipy.optimize import OptimizeResult
 
 from acl_gym.swarm.channel import Channel
-from acl_gym.swarm.inbox import Inbox
+from acl_gym.swarm.inbox import Inbox, checked_inbox
 from acl_gym.swarm.pso.agents import ParticleSwarm
 from acl_gym.swarm.pso.coefficients import ACCELERATION, INERTIA, Inertia
 from acl_gym.swarm.pso.landscape import ExplosionError, Landscape
@@ -65,7 +65,8 @@ def minimize(
     see `constriction_coefficients`.
 
     `run(ParticleSwarm(..), Landscape(..), steps, seed, channel)` makes the same moves with
-    the same bits, iteration by iteration.
+    the same bits, iteration by iteration. Where a position gets farther away than 1e150,
+    `run` ends with an error, and a search as one that has exploded.
 
     Args:
         function: of an array of points `(n, d)`; returns their values, `(n,)`. Infinity is
@@ -76,10 +77,13 @@ def minimize(
         max_iterations: how often the particles move, >= 0; `ITERATIONS` if neither this
             nor `max_evaluations` is given.
         max_evaluations: how many points are evaluated at most, >= `n_particles`. Whole
-            iterations are made only, with `n_particles` evaluations each.
+            iterations are made only, with `n_particles` evaluations each. Where there are
+            as many particles as variables, the first call of a vectorized function has
+            one point more, which is not counted, see `Landscape`.
         target: a value to reach, with which the search ends.
         tolerance: >= 0. The search ends when the values of all personal bests lie within
-            so much of each other: the swarm has agreed. None: it goes on.
+            so much of each other: the swarm has agreed. Infinite values agree about
+            nothing. None: it goes on.
         seed: of the random numbers, or a generator; None draws one.
         x0: where the first particle or the first m particles begin, `(d,)` or `(m, d)`.
         inertia: w: a number, one for each particle, or a function of the iteration, see
@@ -101,8 +105,9 @@ def minimize(
         vectorized: whether `function` takes many points at once. If not, it is called
             with one point `(d,)` at a time and returns a number.
         callback: called after each iteration with an `OptimizeResult` of `x`, `fun`,
-            `nfev` and `nit` so far; the search ends if it returns True or raises
-            StopIteration.
+            `nfev` and `nit` so far; the search ends if it returns True, Python's or
+            NumPy's, or raises StopIteration, as in SciPy. (The callback of `run` is the
+            other way round: that ends on False.)
         history: whether the result has a history.
 
     Returns:
@@ -200,12 +205,14 @@ class _Search:
     def iterate(self, rng: np.random.Generator) -> None:
         """Move all particles, and evaluate where they are."""
         agents, landscape = self.agents, self.landscape
-        inbox = self.channel.deliver(agents.send(), landscape.positions, rng)
+        delivered = self.channel.deliver(agents.send(), landscape.positions, rng)
+        inbox = checked_inbox(delivered, self.channel, landscape.n)
         if self.asynchronous:
             self._move_in_turn(inbox, rng)
         else:
             agents.hear(inbox)
-            landscape.step(agents.decide(rng), rng)
+            landscape.begin_iteration()
+            landscape.move(slice(None), agents.decide(rng))
             agents.observe(landscape.observe())
         self.nit += 1
 
@@ -235,6 +242,7 @@ class _Search:
             return "The target was reached."
         if (
             tolerance is not None
+            and math.isfinite(values.min())
             and values.max() <= values.min() + tolerance < math.inf
         ):
             return "All personal bests lie within the tolerance."
@@ -304,6 +312,7 @@ def _iterations(
 
 def _stops(callback: Callback, result: OptimizeResult) -> bool:
     try:
-        return callback(result) is True
+        answer = callback(result)
     except StopIteration:
         return True
+    return isinstance(answer, (bool, np.bool_)) and bool(answer)

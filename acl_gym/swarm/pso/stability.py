@@ -27,12 +27,14 @@ Common arguments:
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from numbers import Real
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.optimize import brentq
 
 from acl_gym.swarm.pso.coefficients import ORDERS
 from acl_gym.utils import validation
@@ -127,7 +129,18 @@ def is_stable(
     moment: int = 2,
     order: str = "standard",
 ) -> bool:
-    """Whether the moments converge, see `acl_gym.swarm.pso.stability`."""
+    """Whether the moments converge, see `acl_gym.swarm.pso.stability`.
+
+    Raises:
+        TypeError: a coefficient is not a number; `spectral_radius` takes arrays.
+        ValueError: an argument is out of range.
+    """
+    for name, value in (
+        ("inertia", inertia),
+        ("cognitive", cognitive),
+        ("social", social),
+    ):
+        validation.number(name, value)
     return bool(
         spectral_radius(inertia, cognitive, social, moment=moment, order=order) < 1.0
     )
@@ -145,25 +158,30 @@ def largest_acceleration(
         share: c1 / (c1 + c2), in [0, 1].
 
     Returns:
-        The bound; 0 where no swarm of this inertia is stable.
+        The bound, > 0. It holds for any share of c1, in closed form; for c1 = c2 it is
+        Poli's in the standard order.
 
     Raises:
         ValueError: an argument is out of range.
     """
     inertia = validation.number("inertia", inertia, above=-1, below=1)
     share = validation.number("share", share, at_least=0, at_most=1)
-    make = _matrix_of(moment)
-
-    def excess(total: float) -> float:
-        matrix = make(inertia, share * total, (1 - share) * total, order)
-        return float(np.abs(np.linalg.eigvals(matrix)).max()) - 1.0
-
-    # Stable values of c1 + c2 form an interval that begins at 0, where the radius is 1:
-    # a particle that nothing attracts stays where it has come to rest.
-    least, most = 1e-6, 10.0  # the largest bound of all, 8, is that of the means
-    if excess(least) >= 0.0:
-        return 0.0
-    return float(brentq(excess, least, most, xtol=1e-12))
+    literal = validation.one_of("order", order, ORDERS) == "literal"
+    if _checked_moment(moment) == 1:
+        # Both roots of the characteristic polynomial lie within the circle (Jury).
+        return 2.0 * (1.0 - inertia) if literal else 4.0 * (1.0 + inertia)
+    # The matrix of the second moments maps covariances to covariances, so that its
+    # spectral radius is an eigenvalue, and the bound a root of det(I - M) = 0. With
+    # t = c1 + c2, E[C] = t / 2 and E[C^2] = square t^2 that is, after division by t,
+    #     1 - w^2 + (w / 2) t = square (1 + w) t                        standard,
+    #     1 - w^2 - (w / 2) t = square t (1 + w + t / 2)                literal.
+    square = VARIANCE * (share**2 + (1.0 - share) ** 2) + MEAN**2
+    rest = (1.0 - inertia) * (1.0 + inertia)
+    if not literal:
+        return rest / (square * (1.0 + inertia) - inertia / 2.0)
+    half = (square * (1.0 + inertia) + inertia / 2.0) / 2.0
+    root = math.sqrt(half * half + square * rest / 2.0)
+    return rest / (half + root) if half > 0.0 else 2.0 * (root - half) / square
 
 
 @dataclass(frozen=True)
@@ -271,9 +289,13 @@ def _moments_of_c(cognitive: float, social: float) -> tuple[float, float]:
 
 
 def _matrix_of(moment: int) -> Callable[[float, float, float, str], FloatArray]:
-    if moment not in (1, 2):
+    return mean_matrix if _checked_moment(moment) == 1 else second_moment_matrix
+
+
+def _checked_moment(moment: Any) -> int:
+    if not isinstance(moment, Real) or moment not in (1, 2):
         raise ValueError(
             f"moment must be 1, the means, or 2, the means of products, got "
             f"{validation.shown(moment)}."
         )
-    return mean_matrix if moment == 1 else second_moment_matrix
+    return 1 if moment == 1 else 2

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from scipy.optimize import Bounds
 
-from acl_gym.swarm import Inbox, Links, run
-from acl_gym.swarm.pso import Landscape, ParticleSwarm
+from acl_gym.swarm import Field, Inbox, Links, run
+from acl_gym.swarm.pso import Landscape, ParticleSwarm, minimize
 from acl_gym.swarm.pso.benchmark_functions import sphere
 from acl_gym.swarm.pso.landscape import ExplosionError
 
@@ -162,9 +162,24 @@ def test_an_explosion_is_one_clear_error() -> None:
     rng = np.random.default_rng(0)
     landscape.reset(rng)
     landscape.step(np.ones((3, 1)), rng)
-    for _ in range(154):
+    for _ in range(74):
         landscape.step(np.zeros((3, 1)), rng)
-    with pytest.raises(ExplosionError, match=r"stay finite.*in iteration 156 one"):
+    assert 1e148 < np.abs(landscape.positions).max() <= 1e150
+    words = r"stay within 1e\+150 .* exploded in iteration 76; use"
+    with pytest.raises(ExplosionError, match=words):
+        landscape.step(np.zeros((3, 1)), rng)
+
+
+def test_velocities_explode_where_bounds_hold_positions() -> None:
+    landscape = Landscape(
+        sphere, [(1, 2)], n_particles=3, boundary="clip", inertia=100.0
+    )
+    rng = np.random.default_rng(0)
+    landscape.reset(rng)
+    for _ in range(140):
+        landscape.step(np.zeros((3, 1)), rng)
+    landscape.velocities[:] = 1e307
+    with pytest.raises(ExplosionError, match="velocities finite"):
         landscape.step(np.zeros((3, 1)), rng)
 
 
@@ -236,7 +251,13 @@ def test_agents_can_be_used_again_with_another_swarm() -> None:
         ({"bounds": [(0, 1), (2, 1)]}, ValueError, r"lower <= upper.*\(2, 1\).* 1\."),
         ({"bounds": [(0, math.nan)]}, ValueError, "neither of them NaN"),
         ({"bounds": [(math.inf, math.inf)]}, ValueError, "lower <= upper"),
-        ({"bounds": [(-1e308, 1e308)]}, ValueError, "finite difference"),
+        ({"bounds": [(-1e308, 1e308)]}, ValueError, r"finite within 1e\+150"),
+        ({"bounds": [(0, 1e151)]}, ValueError, r"finite within 1e\+150"),
+        (
+            {"bounds": [(0, math.inf)], "x0": np.full((40, 1), 1e151)},
+            ValueError,
+            r"x0 must lie within 1e\+150",
+        ),
         ({"bounds": [(0, math.inf)]}, ValueError, "finite where positions are drawn"),
         (
             {"bounds": [(0, math.inf)], "x0": [3.0]},
@@ -251,7 +272,7 @@ def test_agents_can_be_used_again_with_another_swarm() -> None:
         ({"x0": np.zeros((1, 1, 2))}, ValueError, "x0"),
         ({"x0": [0, 2]}, ValueError, "within the bounds, got 2 for variable 1"),
         ({"x0": [0, math.nan]}, ValueError, "x0 must be an array of finite"),
-        ({"inertia": [0.1, 0.2]}, ValueError, "one for each of the 40 agents"),
+        ({"inertia": [0.1, 0.2]}, ValueError, "one for each of the 40 particles"),
         ({"inertia": math.inf}, ValueError, "inertia must lie in"),
         ({"inertia": lambda k: "much"}, ValueError, "inertia must be an array"),
         ({"boundary": "bounce"}, ValueError, "boundary must be one of"),
@@ -331,3 +352,146 @@ def test_inputs_of_another_shape_are_refused() -> None:
     landscape = begun(Landscape(sphere, UNIT, n_particles=4))
     with pytest.raises(ValueError, match=r"u must have the shape \(4, 2\).*\(2, 4\)"):
         landscape.step(np.zeros((2, 4)), np.random.default_rng(0))
+
+
+@pytest.mark.parametrize(
+    ("u", "words"),
+    [
+        ([[1j, 0], [0, 0]], "real numbers"),
+        ([["a", "b"], ["c", "d"]], "real numbers"),
+        (None, "real numbers"),
+        ([[0.0, 0.0], [0.0, math.nan]], "got NaN for particle 1"),
+        ([[0.0, 0.0]], "have the shape"),
+    ],
+)
+def test_inputs_that_are_no_numbers_are_refused(u: Any, words: str) -> None:
+    landscape = begun(Landscape(sphere, UNIT, n_particles=2))
+    with pytest.raises(ValueError, match=f"u must .*{words}"):
+        landscape.step(u, np.random.default_rng(0))
+    before = landscape.positions.copy()
+    landscape.velocities[:] = 0.0
+    landscape.step([[0, 0], [0, 0]], np.random.default_rng(0))
+    assert np.array_equal(landscape.positions, before)
+
+
+def test_some_particles_move_by_as_many_inputs_only() -> None:
+    landscape = begun(Landscape(sphere, UNIT, n_particles=4))
+    for u in (np.ones((3_000_000, 3)), np.ones((2, 2)), np.ones((1, 3))):
+        with pytest.raises(ValueError, match=r"u must have the shape \(1, 2\)"):
+            landscape.move(slice(0, 1), u)
+    landscape.x = landscape.x[:, :3]
+    with pytest.raises(ValueError, match="x must have 4 columns"):
+        landscape.move(slice(0, 1), np.ones((1, 2)))
+
+
+# What is wrong is found before compiled code sees it.
+
+GOOD = {"value": np.zeros(2), "position": np.zeros((2, 3))}
+
+
+@pytest.mark.parametrize(
+    ("y", "error", "words"),
+    [
+        (3, TypeError, "a dict with 'value' and 'position'.*got 3"),
+        ({"position": np.zeros((2, 3))}, ValueError, r"got \['position'\]; use a Land"),
+        (
+            {**GOOD, "value": np.zeros(5_000_000)},
+            ValueError,
+            r"got shapes \(5000000,\)",
+        ),
+        ({**GOOD, "position": np.zeros((3, 3))}, ValueError, "got shapes"),
+        ({**GOOD, "position": np.zeros((2, 0))}, ValueError, "got shapes"),
+        ({**GOOD, "position": np.zeros(2)}, ValueError, "got shapes"),
+        ({**GOOD, "value": ["a", "b"]}, ValueError, "'value' must be real numbers"),
+        ({**GOOD, "value": 1.0}, ValueError, "'value' must be real numbers"),
+    ],
+)
+def test_observations_are_checked(y: Any, error: Any, words: str) -> None:
+    agents = ParticleSwarm()
+    agents.reset(2, np.random.default_rng(0))
+    with pytest.raises(error, match=words):
+        agents.remember(slice(None), y)
+    with pytest.raises(error, match=words):
+        agents.observe(y)
+    agents.observe({"value": [1, 2], "position": [[1, 2, 3], [4, 5, 6]]})
+    assert agents.best_positions.tolist() == [[1, 2, 3], [4, 5, 6]]
+    with pytest.raises(error, match=words):
+        agents.remember(slice(None), y)
+    with pytest.raises(error, match=words):
+        agents.observe(y)
+    with pytest.raises(ValueError, match="got shapes"):
+        agents.observe({**GOOD, "position": np.zeros((2, 4))})
+
+
+def test_nothing_is_remembered_before_the_first_observation() -> None:
+    agents = ParticleSwarm()
+    agents.reset(2, np.random.default_rng(0))
+    with pytest.raises(ValueError, match="got shapes"):
+        agents.remember(slice(None), GOOD)
+
+
+def test_a_swarm_in_an_environment_of_another_kind() -> None:
+    with pytest.raises(ValueError, match="use a Landscape as environment"):
+        run(ParticleSwarm(), Field(3), 3, 0)
+
+
+def test_messages_are_checked() -> None:
+    agents = ParticleSwarm()
+    agents.reset(2, np.random.default_rng(0))
+    agents.observe(GOOD)
+    for links, position in (
+        (Links.everyone(2), np.zeros((2, 2))),
+        (Links.everyone(3), np.zeros((3, 3))),
+    ):
+        inbox = Inbox(links, {"value": np.zeros(links.n), "position": position})
+        with pytest.raises(
+            ValueError, match=r"'position' must have the shape \(2, 3\)"
+        ):
+            agents.hear(inbox)
+    with pytest.raises(ValueError, match="there must be a message 'position'"):
+        agents.hear(Inbox(Links.everyone(2), {"value": np.zeros(2)}))
+    words = r"must have the shape \(2, 3\)"
+    with pytest.raises(ValueError, match=words):
+        agents.attract(
+            slice(None), np.zeros((2, 2)), np.zeros((2, 2, 3)), np.zeros((2, 3))
+        )
+
+
+def of_one(x: np.ndarray) -> Any:
+    """A function of one point, where a function of many is expected."""
+    return sum((x[k] - 0.5) ** 2 for k in range(3))
+
+
+def test_a_function_of_one_point_is_found_out() -> None:
+    """Also where there are as many particles as variables."""
+    for n in (2, 3, 4):
+        landscape = begun(Landscape(of_one, UNIT[:1] * 3, n_particles=max(n, 3)))
+        with pytest.raises(ValueError, match=r"shape .*vectorized=False"):
+            landscape.observe()
+
+
+def test_a_function_of_many_points_sees_one_more_once() -> None:
+    shapes = []
+
+    def function(points: np.ndarray) -> np.ndarray:
+        shapes.append(points.shape)
+        return sphere(points)
+
+    landscape = begun(Landscape(function, UNIT, n_particles=2))
+    for _ in range(2):
+        assert np.array_equal(landscape.observe()["value"], sphere(landscape.positions))
+    assert shapes == [(3, 2), (2, 2)]
+    assert landscape.objective.evaluations == 4
+
+
+def test_the_warning_of_nan_names_the_line_of_the_caller() -> None:
+    def function(points: np.ndarray) -> np.ndarray:
+        return np.full(len(points), math.nan)
+
+    for search in (
+        lambda: run(ParticleSwarm(), Landscape(function, UNIT), 1, 0),
+        lambda: minimize(function, UNIT, max_iterations=1),
+    ):
+        with pytest.warns(RuntimeWarning, match="returned NaN") as caught:
+            search()
+        assert caught[0].filename == __file__

@@ -16,6 +16,8 @@ from acl_gym.swarm import (
     Channel,
     Delayed,
     Everyone,
+    Inbox,
+    Links,
     Lossy,
     Nearest,
     Radius,
@@ -29,6 +31,7 @@ from acl_gym.swarm.pso import (
     minimize,
 )
 from acl_gym.swarm.pso.benchmark_functions import BENCHMARK_FUNCTIONS, rastrigin, sphere
+from acl_gym.swarm.pso.landscape import ExplosionError
 from tests.swarm.pso import reference
 
 
@@ -119,8 +122,18 @@ CHANNELS: list[Channel] = [
 
 
 @pytest.mark.parametrize("channel", CHANNELS, ids=repr)
-@pytest.mark.parametrize("boundary", ["reflect", "absorb", "clip"])
-def test_run_makes_the_same_bits(channel: Channel, boundary: str) -> None:
+@pytest.mark.parametrize(
+    ("boundary", "order"),
+    [
+        ("reflect", "standard"),
+        ("absorb", "standard"),
+        ("clip", "standard"),
+        ("none", "standard"),
+        ("reflect", "literal"),
+        ("none", "literal"),
+    ],
+)
+def test_run_makes_the_same_bits(channel: Channel, boundary: str, order: str) -> None:
     """With every channel, and with an inertia that falls."""
 
     def inertia(k: int) -> float:
@@ -128,7 +141,12 @@ def test_run_makes_the_same_bits(channel: Channel, boundary: str) -> None:
 
     bounds = [(-5.0, 5.0)] * 4
     landscape = Landscape(
-        rastrigin, bounds, n_particles=12, inertia=inertia, boundary=boundary
+        rastrigin,
+        bounds,
+        n_particles=12,
+        inertia=inertia,
+        boundary=boundary,
+        order=order,
     )
     swarm = ParticleSwarm(1.2, 1.7)
     run(swarm, landscape, 31, 8, channel)
@@ -143,6 +161,7 @@ def test_run_makes_the_same_bits(channel: Channel, boundary: str) -> None:
         social=1.7,
         topology=channel,
         boundary=boundary,
+        order=order,
     )
     best = swarm.best_values.argmin()
     assert found.fun == swarm.best_values[best]
@@ -191,19 +210,18 @@ def test_it_finds_minima(
 
 def test_the_literal_order_explodes() -> None:
     """As the theory says, with the usual coefficients; not with small accelerations."""
-    with np.errstate(over="ignore"):  # in the function, beyond 1e154
-        found = minimize(
-            sphere,
-            [(-5, 5)] * 3,
-            order="literal",
-            boundary="none",
-            seed=0,
-            max_iterations=10_000,
-            history=True,
-        )
+    found = minimize(
+        sphere,
+        [(-5, 5)] * 3,
+        order="literal",
+        boundary="none",
+        seed=0,
+        max_iterations=10_000,
+        history=True,
+    )
     assert not found.success
     assert "the swarm has exploded" in found.message
-    assert 1e300 < found.history["spread"][-1] < math.inf
+    assert 1e145 < found.history["spread"][-1] < 1e151
     assert found.nit == len(found.history["spread"]) - 1 < 10_000
     assert math.isfinite(found.fun)
     small = minimize(
@@ -218,6 +236,48 @@ def test_the_literal_order_explodes() -> None:
     )
     assert small.success
     assert small.history["spread"][-1] < 1e-3
+
+
+@pytest.mark.parametrize("channel", CHANNELS, ids=repr)
+def test_run_and_minimize_explode_in_the_same_iteration(channel: Channel) -> None:
+    """Whether or not the channel looks at positions."""
+    found = minimize(
+        sphere,
+        [(-5, 5)] * 2,
+        n_particles=12,
+        order="literal",
+        boundary="none",
+        topology=channel,
+        max_iterations=3_000,
+        seed=0,
+        social=3.0,
+    )
+    assert "the swarm has exploded" in found.message
+    assert not found.success
+    landscape = Landscape(
+        sphere, [(-5, 5)] * 2, n_particles=12, order="literal", boundary="none"
+    )
+    with pytest.raises(ExplosionError):
+        run(ParticleSwarm(social=3.0), landscape, 3_000, 0, channel)
+    assert landscape.iteration == found.nit + 1
+
+
+@pytest.mark.parametrize("update", ["synchronous", "asynchronous"])
+def test_a_channel_of_ones_own_is_checked(update: str) -> None:
+    class Own(Channel):
+        def deliver(self, sent: Any, x: Any, rng: Any) -> Any:
+            n = 3_000_000
+            values = {"value": np.zeros(n), "position": np.zeros((n, 1))}
+            return Inbox(Links.everyone(n), values)
+
+    class Nothing(Channel):
+        def deliver(self, sent: Any, x: Any, rng: Any) -> Any:
+            return None
+
+    with pytest.raises(ValueError, match=r"the 40 agents .* got links of 3000000"):
+        quickly(topology=Own(), update=update)
+    with pytest.raises(TypeError, match=r"Nothing.deliver must return an Inbox"):
+        quickly(topology=Nothing(), update=update)
 
 
 @pytest.mark.parametrize("update", ["synchronous", "asynchronous"])
@@ -309,6 +369,9 @@ def test_it_ends_when_the_swarm_agrees() -> None:
     assert ranges[-1] <= 1e-6 < ranges[:-1].min()
     flat = quickly(function=lambda x: np.full(len(x), math.inf), tolerance=1.0)
     assert flat.nit == 1_000, "infinite values agree about nothing"
+    deep = quickly(function=lambda x: np.full(len(x), -math.inf), tolerance=1.0)
+    assert deep.nit == 1_000
+    assert "fun is -inf" in deep.message
 
 
 def test_the_callback_sees_each_iteration_and_may_end_the_search() -> None:
@@ -326,7 +389,10 @@ def test_the_callback_sees_each_iteration_and_may_end_the_search() -> None:
         if result.nit == 3:
             raise StopIteration
 
-    for callback in (stop, raise_stop):
+    def stop_by_numpy(result: OptimizeResult) -> Any:
+        return np.bool_(result.nit == 3)
+
+    for callback in (stop, stop_by_numpy, raise_stop):
         found = quickly(callback=callback)
         assert found.nit == 3
         assert found.success
@@ -446,7 +512,7 @@ def test_errors_of_the_function_are_its_own() -> None:
         ({"history": "yes"}, TypeError, "history must be"),
         ({"vectorized": 2}, TypeError, "vectorized must be"),
         ({"update": "never"}, ValueError, "update must be one of"),
-        ({"cognitive": [1.0, 2.0]}, ValueError, "one for each of the 40 agents"),
+        ({"cognitive": [1.0, 2.0]}, ValueError, "one for each of the 40 particles"),
     ],
 )
 def test_bad_arguments_are_refused(

@@ -37,6 +37,19 @@ def test_the_closed_formulas_of_c1_equal_to_c2(w: float) -> None:
     assert literal == pytest.approx(2 * (1 - w), rel=1e-8)
 
 
+@pytest.mark.parametrize("gap", [1e-6, 1e-9, 1e-12, 2.0**-53])
+def test_an_inertia_next_to_one_has_a_bound(gap: float) -> None:
+    w = 1 - gap
+    poli = 24 * (1 - w) * (1 + w) / (7 - 5 * w)
+    assert largest_acceleration(w) == pytest.approx(poli, rel=1e-12)
+    assert largest_acceleration(-w) == pytest.approx(48 * gap / 12, rel=1e-5)
+    means = largest_acceleration(w, moment=1, order="literal")
+    assert means == pytest.approx(2 * (1 - w), rel=1e-12)
+    # To first order: 1 - w^2 = (w / 2 + square (1 + w)) t.
+    literal = largest_acceleration(w, order="literal")
+    assert literal == pytest.approx(2 * (1 - w) / (1 / 2 + 7 / 12), rel=1e-5)
+
+
 @pytest.mark.parametrize(
     ("moment", "order", "expected"),
     [
@@ -216,6 +229,12 @@ def test_moments_do_not_depend_on_where_zero_is() -> None:
         (lambda: largest_acceleration(1.0), ValueError, "inertia must lie in"),
         (lambda: largest_acceleration(0.5, moment=3), ValueError, "moment must be 1"),
         (
+            lambda: is_stable(0.7, 1, 1, moment=np.array([1, 2])),
+            ValueError,
+            "moment must be 1",
+        ),
+        (lambda: is_stable([0.7, 0.8], 1, 1), TypeError, "inertia must be a real"),
+        (
             lambda: largest_acceleration(0.5, order="new"),
             ValueError,
             "order must be one",
@@ -256,6 +275,6 @@ def test_constriction() -> None:
     w, c = constriction_coefficients(5.0)
     assert w == pytest.approx(2 / abs(2 - 5 - math.sqrt(5)))
     assert c == pytest.approx(2.5 * w)
-    for bad in (4.0, math.nan):
-        with pytest.raises(ValueError, match=r"phi must lie in \(4, inf\)"):
+    for bad in (4.0, math.nan, 1e200):
+        with pytest.raises(ValueError, match=r"phi must lie in \(4, 1e6\]"):
             constriction_coefficients(bad)

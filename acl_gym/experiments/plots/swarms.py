@@ -71,7 +71,7 @@ def delays(experiment: Experiment[SwarmStudy], results: Results) -> Figure:
         ax.set_xscale("log")
         if limit is not None:
             ax.axvline(limit, **style.BOUND)
-    style.plain_log(axes[1].xaxis)
+    axes[1].xaxis.set_major_locator(LogLocator(numticks=4))
     style.plain_log(axes[2].xaxis)
     return figure
 
@@ -88,7 +88,8 @@ def foraging(experiment: Experiment[SwarmStudy], results: Results) -> Figure:
             centre_miss = results.last(study, "centre_miss")
             _row(ax, place + 0.2, centre_miss, ORANGE, hollow=True)
         ax.set_xscale("log")
-        style.plain_log(ax.xaxis)
+        ax.xaxis.set_major_locator(LogLocator(numticks=4))
+        style.plain_numbers(ax.xaxis)
         ax.set_title(profile)
         ax.set_xlabel("distance from the goal")
     handles = [
@@ -123,7 +124,7 @@ def optimum(experiment: Experiment[SwarmStudy], results: Results) -> Figure:
         ax.set_xscale("log")
         ax.set_title(function)
         ax.minorticks_off()
-        ax.xaxis.set_major_locator(LogLocator(numticks=4))
+        ax.xaxis.set_major_locator(LogLocator(numticks=3))
     return figure
 
 

@@ -35,10 +35,10 @@ extensions = [
     "docstrings",
     "environment_pages",
     "mathml",
+    "public_names",
     "repository_links",
 ]
-exclude_patterns = ["_build", "_extensions", "_templates"]
-templates_path = ["_templates"]
+exclude_patterns = ["_build", "_extensions", "environments/generated/table.txt"]
 
 # A name in single backquotes becomes a link where it is a public name.
 default_role = "py:obj"
@@ -54,23 +54,20 @@ nitpick_ignore_regex = [
 ]
 
 # Pages
-myst_enable_extensions = ["deflist", "dollarmath", "fieldlist"]
+myst_enable_extensions = ["colon_fence", "deflist", "dollarmath"]
 myst_heading_anchors = 4
 html_math_renderer = "mathml"
 repository_url = "https://github.com/acl-gym/acl-gym"
 
 # API pages
-autosummary_generate = True
-autosummary_ignore_module_all = False
-# Two names that differ only in case would be one file on some systems.
-autosummary_filename_map = {"acl_gym.design.design": "acl_gym.design.design_function"}
+autosummary_generate = False
 autodoc_default_options = {
     "members": True,
     "member-order": "bysource",
     # What agents and environments have from classes of this package, and no further.
     "inherited-members": ", ".join(
         ["Env", "VectorEnv", "Wrapper", "VectorWrapper", "VectorObservationWrapper"]
-        + ["VecEnv", "tuple", "Exception", "Warning", "object"]
+        + ["VecEnv", "int64", "tuple", "Exception", "Warning", "object"]
     ),
 }
 autodoc_typehints_format = "short"
@@ -78,7 +75,7 @@ autodoc_preserve_defaults = True
 autoclass_content = "class"
 python_use_unqualified_type_names = True
 python_maximum_signature_line_length = 80
-napoleon_numpy_docstring = False
+napoleon_google_docstring = napoleon_numpy_docstring = False  # `docstrings` calls it
 napoleon_use_ivar = True
 napoleon_use_rtype = False
 

@@ -4,6 +4,7 @@ The docstrings of this package are read in editors and by `help()`. They hold pl
 code in single backquotes, lists and examples, which Markdown and reStructuredText write
 alike. What differs is translated here: headings, tables and blocks of code; and the signs
 that have a meaning in reStructuredText alone, such as the bars of |x|, are protected.
+Napoleon then translates the sections of Google's style (Args, Returns, Raises).
 """
 
 from __future__ import annotations
@@ -13,10 +14,8 @@ from collections.abc import Iterator
 from typing import Any
 
 from sphinx.application import Sphinx
+from sphinx.ext.napoleon import GoogleDocstring
 from sphinx.util.typing import ExtensionMetadata
-
-BEFORE_NAPOLEON = 100
-"""Priority of the translation; napoleon has 500 and finds reStructuredText."""
 
 CODE = re.compile(r"(``.*?``|`[^`]*`_*)", re.DOTALL)
 SPECIAL = re.compile(r"\*(?=\S)|\||(?<=\w)_(?!\w)")
@@ -24,20 +23,21 @@ SPECIAL = re.compile(r"\*(?=\S)|\||(?<=\w)_(?!\w)")
 
 def setup(app: Sphinx) -> ExtensionMetadata:
     """Translate each docstring, and leave out what a class only inherits from tuple."""
-    app.connect("autodoc-process-docstring", _translate, priority=BEFORE_NAPOLEON)
+    app.connect("autodoc-process-docstring", _translate)
     app.connect("autodoc-skip-member", _skip)
     return {"version": "1", "parallel_read_safe": True, "parallel_write_safe": True}
 
 
 def _translate(
-    app: Sphinx, what: str, name: str, obj: object, options: object, lines: list[str]
+    app: Sphinx, what: str, name: str, obj: object, options: Any, lines: list[str]
 ) -> None:
     if what == "class" and any(line == "## Action Space" for line in lines):
         lines[:] = _summary_of_environment(app, name, lines)
-    lines[:] = list(to_restructuredtext(lines))
-    if what in ("attribute", "data", "property"):
-        # Napoleon would take what stands before a colon in the first line for a type.
-        lines.insert(0, "")
+    # Of an attribute, napoleon would take what stands before a colon for its type; the
+    # annotation has that.
+    kind = "object" if what in ("attribute", "data", "property") else what
+    text = list(to_restructuredtext(lines))
+    lines[:] = GoogleDocstring(text, app.config, app, kind, name, obj, options).lines()
 
 
 def _summary_of_environment(app: Sphinx, name: str, lines: list[str]) -> list[str]:

@@ -44,17 +44,22 @@ exclude_patterns = ["_build", "_extensions", "environments/generated/table.txt"]
 default_role = "py:obj"
 nitpicky = True
 nitpick_ignore_regex = [
-    ("py:obj", ".*"),  # any code may stand in single backquotes
+    ("py:obj", "(?s).*"),  # any code may stand in single backquotes
     ("py:exc", r"\w+"),  # named in words, often those of Gymnasium
     ("py:class", r"acl_gym\..*"),  # in signatures: types that are not public
+    ("py:class", r"\w+Array|ArrayLike|Axes|Controller|Heuristic|Inertia|Setting"),
+    ("py:class", r"(list\[)?dict\[str"),
     # Other packages: their inventories would have to come from the network.
-    ("py:.*", r"(gym|gymnasium|spaces|matplotlib|np|npt|numpy|pd|pandas|numba|control)\..*"),
+    (
+        "py:.*",
+        r"(gym|gymnasium|spaces|matplotlib|np|npt|numpy|pd|pandas|numba|control)\..*",
+    ),
     ("py:.*", r"(stable_baselines3|collections|typing|pathlib|concurrent|enum|os)\..*"),
     ("py:.*", r"(scipy|torch|networkx|pettingzoo|minari|ray|PIL|IPython)\..*"),
 ]
 
 # Pages
-myst_enable_extensions = ["colon_fence", "deflist", "dollarmath"]
+myst_enable_extensions = ["attrs_inline", "colon_fence", "deflist", "dollarmath"]
 myst_heading_anchors = 4
 html_math_renderer = "mathml"
 repository_url = "https://github.com/acl-gym/acl-gym"
@@ -65,12 +70,28 @@ autodoc_default_options = {
     "members": True,
     "member-order": "bysource",
     # What agents and environments have from classes of this package, and no further.
-    "inherited-members": ", ".join(
-        ["Env", "VectorEnv", "Wrapper", "VectorWrapper", "VectorObservationWrapper"]
-        + ["VecEnv", "int64", "tuple", "Exception", "Warning", "object"]
+    "inherited-members": (
+        "ActionWrapper, Env, Exception, ObservationWrapper, VecEnv, VectorActionWrapper, "
+        "VectorEnv, VectorObservationWrapper, VectorWrapper, Warning, Wrapper, ndarray, "
+        "object, tuple"
     ),
 }
 autodoc_typehints_format = "short"
+# Their names say more than what they stand for.
+autodoc_type_aliases = {
+    name: name
+    for name in (
+        *(
+            "ArrayLike",
+            "ActionArray",
+            "BoolArray",
+            "CellArray",
+            "FloatArray",
+            "IntArray",
+        ),
+        *("Controller", "Heuristic", "Inertia", "Setting"),
+    )
+}
 autodoc_preserve_defaults = True
 autoclass_content = "class"
 python_use_unqualified_type_names = True

@@ -61,12 +61,12 @@ def to_restructuredtext(lines: list[str]) -> Iterator[str]:
             text = []
             indent = line[: len(line) - len(line.lstrip())]
             end = next(
-                i
-                for i in range(position + 1, len(lines))
-                if lines[i].strip() == "```"
+                i for i in range(position + 1, len(lines)) if lines[i].strip() == "```"
             )
             yield from [f"{indent}.. code-block:: {bare[3:] or 'text'}", ""]
-            yield from ["   " + inner if inner else "" for inner in lines[position + 1 : end]]
+            yield from [
+                "   " + inner if inner else "" for inner in lines[position + 1 : end]
+            ]
             yield ""
             position = end
         elif bare.startswith(">>> "):
@@ -103,7 +103,9 @@ def _protected(text: list[str]) -> list[str]:
 
 def _table(lines: list[str]) -> Iterator[str]:
     indent = lines[0][: len(lines[0]) - len(lines[0].lstrip())]
-    rows = [[cell.strip() for cell in line.strip().strip("|").split("|")] for line in lines]
+    rows = [
+        [cell.strip() for cell in line.strip().strip("|").split("|")] for line in lines
+    ]
     yield from [f"{indent}.. list-table::", f"{indent}   :header-rows: 1", ""]
     for row in [rows[0], *rows[2:]]:
         for number, cell in enumerate(row):

@@ -11,20 +11,22 @@ import inspect
 from pathlib import Path
 from typing import Any
 
-import acl_gym
 import gymnasium as gym
-from acl_gym.cli.envs import describe, parameters
-from acl_gym.envs import ENVIRONMENTS
 from sphinx.application import Sphinx
 from sphinx.util.typing import ExtensionMetadata
 
+from acl_gym.cli.envs import describe, parameters
+from acl_gym.envs import ENVIRONMENTS
+
 PICTURES = "figures/environments"
-SYSTEMS = "acl_gym/envs"
 
 
 def setup(app: Sphinx) -> ExtensionMetadata:
     """Write the pages when the site is built."""
-    names = {entry.single.partition(":")[2]: page_name(i) for i, entry in ENVIRONMENTS.items()}
+    names = {
+        entry.single.partition(":")[2]: page_name(env_id)
+        for env_id, entry in ENVIRONMENTS.items()
+    }
     app.add_config_value("environment_pages", names, "env")
     app.connect("builder-inited", _write_pages)
     return {"version": "1", "parallel_read_safe": True, "parallel_write_safe": True}
@@ -51,12 +53,14 @@ def _write_pages(app: Sphinx) -> None:
 
 def table() -> str:
     """All environments in a table, with the toctree of their pages."""
-    rows = ["| Id | What is to be done | Observations | Actions |", "| --- | --- | --- | --- |"]
+    rows = ["| | | Observations | Actions |", "| --- | --- | --- | --- |"]
     for env_id in ENVIRONMENTS:
         row = describe(env_id)
-        link = f"[{env_id}](generated/{page_name(env_id)}.md)"
+        name = page_name(env_id)
         rows.append(
-            f"| {link} | {row['description']} | {row['observation']} | {row['actions']} |"
+            f"| ![A picture of {env_id}](../{PICTURES}/{name}.png){{width=8em}} "
+            f"| [`{env_id}`](generated/{name}.md)<br>{row['description']} "
+            f"| {row['observation']} | {row['actions']} |"
         )
     names = [f"generated/{page_name(env_id)}" for env_id in ENVIRONMENTS]
     return "\n".join([*rows, "", "```{toctree}", ":hidden:", "", *names, "```", ""])
@@ -73,13 +77,13 @@ def page(env_id: str) -> str:
         [
             f"# {name.rpartition('-')[0]}",
             "",
-            f"![{summary}](../../{PICTURES}/{picture}.png)",
+            f"![{summary}](../../{PICTURES}/{picture}.png){{width=20em}}",
             "",
             summary,
             "",
             *_facts(env_id),
             "",
-            _with_anchors_of_code(body.strip()),
+            _with_fenced_examples(body.strip()),
             "",
             *_parameters(env_id),
             "",
@@ -100,15 +104,19 @@ def _facts(env_id: str) -> list[str]:
         "Many, in one kernel": f'`gym.make_vec("{env_id}", num_envs=100)`',
     }
     env.close()
-    return ["| | |", "| --- | --- |", *(f"| {key} | {value} |" for key, value in facts.items())]
+    return [
+        "| | |",
+        "| --- | --- |",
+        *(f"| {key} | {value} |" for key, value in facts.items()),
+    ]
 
 
 def _one_line(space: object) -> str:
     return " ".join(str(space).split())
 
 
-def _with_anchors_of_code(body: str) -> str:
-    """Examples of a docstring as blocks of code, which Markdown has no mark for."""
+def _with_fenced_examples(body: str) -> str:
+    """The examples of a docstring as blocks of code, which Markdown writes with fences."""
     lines: list[str] = []
     inside = False
     for line in body.split("\n"):
@@ -129,7 +137,12 @@ def _parameters(env_id: str) -> list[str]:
     rows = parameters(system)
     if not rows:
         return []
-    lines = ["## Parameters", "", "| Keyword | Default | Meaning |", "| --- | --- | --- |"]
+    lines = [
+        "## Parameters",
+        "",
+        "| Keyword | Default | Meaning |",
+        "| --- | --- | --- |",
+    ]
     for row in rows:
         meaning = " ".join(row["meaning"].split()).replace("|", "\\|")
         lines.append(f"| `{row['name']}` | `{row['default']!r}` | {meaning} |")
@@ -146,12 +159,10 @@ def _classes(single: type, vector: type) -> list[str]:
     return [
         "## Classes",
         "",
-        *(f"- {{py:obj}}`{name}`" for name in names),
+        *(f"- {{py:class}}`{name}`" for name in names),
     ]
 
 
 def _load(path: str) -> Any:
     module, _, name = path.partition(":")
     return getattr(importlib.import_module(module), name)
-
-

@@ -25,9 +25,11 @@ def _inline(translator: HTML5Translator, node: nodes.math) -> None:
 
 
 def _block(translator: HTML5Translator, node: nodes.math_block) -> None:
-    number = translator.builder.env.domains["math"].get_equation_number_for(
-        node["label"]
-    ) if node.get("label") else None
+    number = (
+        translator.builder.env.domains["math"].get_equation_number_for(node["label"])
+        if node.get("label")
+        else None
+    )
     translator.body.append(translator.starttag(node, "div", CLASS="math-block"))
     translator.body.append(_mathml(node, as_block=True))
     if number is not None:

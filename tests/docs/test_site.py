@@ -202,8 +202,9 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The site, built with warnings as errors."""
     pytest.importorskip("furo")
     out = tmp_path_factory.mktemp("site")
+    options = ["-b", "html", "-W", "--keep-going", "-q"]
     done = subprocess.run(
-        [sys.executable, *"-m sphinx -b html -W --keep-going -q".split(), DOCS, out],
+        [sys.executable, "-m", "sphinx", *options, DOCS, out],
         env={**os.environ, "PYTHONPATH": str(DOCS.parent)},
         capture_output=True,
         text=True,

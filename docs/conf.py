@@ -37,6 +37,7 @@ extensions = [
     "mathml",
     "public_names",
     "repository_links",
+    "signatures",
 ]
 exclude_patterns = ["_build", "_extensions", "environments/generated/table.txt"]
 
@@ -46,9 +47,8 @@ nitpicky = True
 nitpick_ignore_regex = [
     ("py:obj", "(?s).*"),  # any code may stand in single backquotes
     ("py:exc", r"\w+"),  # named in words, often those of Gymnasium
-    ("py:class", r"acl_gym\..*"),  # in signatures: types that are not public
-    ("py:class", r"\w+Array|ArrayLike|Axes|Controller|Heuristic|Inertia|Setting"),
-    ("py:class", r"(list\[)?dict\[str"),
+    ("py:class", r"acl_gym\..*"),  # bases that are not public
+    ("py:class", r"\w+|archives\.Target|(list\[)?dict\[str"),  # in signatures, as the source has them
     # Other packages: their inventories would have to come from the network.
     (
         "py:.*",
@@ -77,21 +77,6 @@ autodoc_default_options = {
     ),
 }
 autodoc_typehints_format = "short"
-# Their names say more than what they stand for.
-autodoc_type_aliases = {
-    name: name
-    for name in (
-        *(
-            "ArrayLike",
-            "ActionArray",
-            "BoolArray",
-            "CellArray",
-            "FloatArray",
-            "IntArray",
-        ),
-        *("Controller", "Heuristic", "Inertia", "Setting"),
-    )
-}
 autodoc_preserve_defaults = True
 autoclass_content = "class"
 python_use_unqualified_type_names = True

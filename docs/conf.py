@@ -48,7 +48,10 @@ nitpick_ignore_regex = [
     ("py:obj", "(?s).*"),  # any code may stand in single backquotes
     ("py:exc", r"\w+"),  # named in words, often those of Gymnasium
     ("py:class", r"acl_gym\..*"),  # bases that are not public
-    ("py:class", r"\w+|archives\.Target|(list\[)?dict\[str"),  # in signatures, as the source has them
+    (
+        "py:class",
+        r"\w+|archives\.Target|(list\[)?dict\[str",
+    ),  # in signatures, as the source has them
     # Other packages: their inventories would have to come from the network.
     (
         "py:.*",
@@ -92,11 +95,5 @@ html_static_path = ["_static"]
 html_css_files = ["site.css"]
 html_copy_source = False
 html_show_sourcelink = False
-html_theme_options = {
-    "source_repository": repository_url,
-    "source_branch": "main",
-    "source_directory": "docs/",
-    "footer_icons": [],
-}
 copybutton_prompt_text = r">>> |\.\.\. |\$ "
 copybutton_prompt_is_regexp = True

@@ -17,6 +17,7 @@ import sys
 
 from docutils import nodes
 from sphinx.application import Sphinx
+from sphinx.ext import autosummary
 from sphinx.pycode import ModuleAnalyzer
 from sphinx.util.docutils import SphinxDirective
 from sphinx.util.parsing import nested_parse_to_nodes
@@ -74,6 +75,11 @@ def _documentation_of_data(
 
 def setup(app: Sphinx) -> ExtensionMetadata:
     """Register the directive."""
+    # Or the sentence in the table would end at "eq. (3.28)".
+    autosummary.WELL_KNOWN_ABBREVIATIONS = (
+        *autosummary.WELL_KNOWN_ABBREVIATIONS,
+        "eq.",
+    )
     app.add_directive("public-names", PublicNames)
     app.connect("autodoc-process-docstring", _documentation_of_data, priority=50)
     return {"version": "1", "parallel_read_safe": True, "parallel_write_safe": True}

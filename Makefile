@@ -3,11 +3,12 @@
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help install compare bench bench-peers peers-mushroom peers-pets peers-swarms peers-mpe2 test lint format build check-wheel clean distclean
+.PHONY: help install compare bench bench-peers peers-mushroom peers-pets peers-swarms peers-mpe2 test lint format build check-wheel docs docs-serve clean distclean
 
 VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
+SITE := docs/_build/html
 WHEEL_VENV := build/wheel-venv
 PEERS_VENV := .venv-peers
 PEERS_STAMP := $(PEERS_VENV)/.installed
@@ -30,6 +31,7 @@ PIP_INSTALL := -m pip install -qq --disable-pip-version-check
 PRESET ?= quick
 ENV_ID ?= acl_gym/Pendulum-v0
 OUT ?=
+PORT ?= 8000
 WORKERS ?= 2
 
 help: ## Show this list
@@ -37,7 +39,8 @@ help: ## Show this list
 		$(firstword $(MAKEFILE_LIST))
 	@echo
 	@echo "  Variables: ARGS (added to the command of compare, bench and test),"
-	@echo "  ENV_ID, PRESET and OUT (compare), WORKERS (test), PYTHON (makes .venv)."
+	@echo "  ENV_ID, PRESET and OUT (compare), WORKERS (test), PORT (docs-serve),"
+	@echo "  PYTHON (makes .venv)."
 
 # pip runs again only when one of these two files has changed.
 install: $(STAMP) ## Make .venv with the locked dependencies and this package
@@ -131,6 +134,14 @@ format: $(STAMP) ## Repair style and format
 	$(BIN)/python -m ruff check --fix-only .
 	$(BIN)/python -m ruff format .
 
+docs: $(STAMP) ## Build the documentation site into docs/_build/html
+	$(BIN)/python -m sphinx -b html -W --keep-going -q $(ARGS) \
+		docs $(SITE)
+	@echo "The site is in $(SITE)/index.html"
+
+docs-serve: docs ## Serve the site on http://localhost:$(PORT)
+	$(BIN)/python -m http.server --bind localhost --directory $(SITE) $(PORT)
+
 build: $(STAMP) ## Build the sdist, and from it the wheel, into dist/
 	@rm -rf dist
 	$(BIN)/python -m build --no-isolation
@@ -145,7 +156,7 @@ check-wheel: build ## Test the wheel in an empty environment
 	@rm -rf $(WHEEL_VENV)
 
 clean: ## Remove builds and caches, including compiled kernels
-	rm -rf build dist .grimp_cache .hypothesis .mypy_cache .numba_cache .pytest_cache .ruff_cache
+	rm -rf build dist docs/_build docs/environments/generated .grimp_cache .hypothesis .mypy_cache .numba_cache .pytest_cache .ruff_cache
 	find . -name '$(VENV)*' -prune -o -name __pycache__ -type d -prune \
 		-exec rm -rf {} +
 

@@ -102,8 +102,8 @@ class Harmonic(Schedule):
         trials: after how many the value has halved, >= 1.
 
     Example:
-        >>> [Harmonic(0.6, 10)(trial) for trial in (0, 10, 20)]
-        [0.6, 0.3, 0.2]
+        >>> [Harmonic(0.6, 10)(trial) for trial in (0, 10, 30)]
+        [0.6, 0.3, 0.15]
     """
 
     start: float

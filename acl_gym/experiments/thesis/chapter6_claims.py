@@ -244,7 +244,19 @@ def _ranks(results: Results) -> Tried:
     return Tried(what, listed(found))
 
 
-@claim(_ranks)
+def _losses(results: Results) -> Tried:
+    found = {}
+    for function in ("rosenbrock", "rastrigin", "griewank"):
+        row = chapter6.SWARMS[function]
+        full = least_values(results, row["everyone"])
+        for loss in chapter6.PSO_LOSSES:
+            values = least_values(results, row[f"{loss:.0%} lost"])
+            found[f"{function}, {loss:.0%}"] = str(ratio(values, full))
+    what = "the ratio of the least value with losses to that without"
+    return Tried(what, listed(found, "; "))
+
+
+@claim(_ranks, _losses)
 def _c33(results: Results) -> Iterator[Part]:
     sphere, rastrigin = chapter6.SWARMS["sphere"], chapter6.SWARMS["rastrigin"]
     limited = [each for each in sphere if each not in ("everyone", "nobody")]

@@ -1,4 +1,4 @@
-"""Make the figures of docs/returning.md, and print what they show.
+"""Make the figures of docs/returning.md and docs/returning-measured.md, and print what they show.
 
 - growing.png: one colony on the pendulum after some numbers of interactions, its policy
   and the cost to go that its levels promise, on cells that become finer.

@@ -146,7 +146,10 @@ build: $(STAMP) ## Build the sdist, and from it the wheel, into dist/
 	@rm -rf dist
 	$(BIN)/python -m build --no-isolation
 
-check-wheel: build ## Test the wheel in an empty environment
+check-wheel: build ## Check sdist and wheel, and try the wheel in an empty environment
+	$(BIN)/python -m twine check --strict dist/*
+	$(BIN)/check-wheel-contents dist
+	$(BIN)/python .ci/check_sdist.py dist
 	@rm -rf $(WHEEL_VENV)
 	@$(BIN)/python -m venv $(WHEEL_VENV)
 	@echo "Installing the wheel and its dependencies into $(WHEEL_VENV)"

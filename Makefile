@@ -32,6 +32,7 @@ PRESET ?= quick
 ENV_ID ?= acl_gym/Pendulum-v0
 OUT ?=
 PORT ?= 8000
+REPORT ?=
 WORKERS ?= 2
 
 help: ## Show this list
@@ -40,7 +41,7 @@ help: ## Show this list
 	@echo
 	@echo "  Variables: ARGS (added to the command of compare, bench and test),"
 	@echo "  ENV_ID, PRESET and OUT (compare), WORKERS (test), PORT (docs-serve),"
-	@echo "  PYTHON (makes .venv)."
+	@echo "  REPORT (docs: a folder of acl-gym reproduce), PYTHON (makes .venv)."
 
 # pip runs again only when one of these two files has changed.
 install: $(STAMP) ## Make .venv with the locked dependencies and this package
@@ -137,7 +138,16 @@ format: $(STAMP) ## Repair style and format
 docs: $(STAMP) ## Build the documentation site into docs/_build/html
 	$(BIN)/python -m sphinx -b html -W --keep-going -q $(ARGS) \
 		docs $(SITE)
+	$(if $(REPORT),$(call add_report,$(SITE)/reproduction/report))
 	@echo "The site is in $(SITE)/index.html"
+
+# The page of `acl-gym reproduce`, and what it loads.
+define add_report
+	@mkdir -p $(1)/figures
+	@cp -r $(REPORT)/report.html $(REPORT)/curves $(1)
+	@cp $(wildcard $(REPORT)/figures/*.png $(REPORT)/figures/*.gif) $(1)/figures
+	@echo "The report of the reproduction is in $(1)/report.html"
+endef
 
 docs-serve: docs ## Serve the site on http://localhost:$(PORT)
 	$(BIN)/python -m http.server --bind localhost --directory $(SITE) $(PORT)
@@ -146,7 +156,10 @@ build: $(STAMP) ## Build the sdist, and from it the wheel, into dist/
 	@rm -rf dist
 	$(BIN)/python -m build --no-isolation
 
-check-wheel: build ## Test the wheel in an empty environment
+check-wheel: build ## Check sdist and wheel, and try the wheel in an empty environment
+	$(BIN)/python -m twine check --strict dist/*
+	$(BIN)/check-wheel-contents dist
+	$(BIN)/python .ci/check_sdist.py dist
 	@rm -rf $(WHEEL_VENV)
 	@$(BIN)/python -m venv $(WHEEL_VENV)
 	@echo "Installing the wheel and its dependencies into $(WHEEL_VENV)"

@@ -66,7 +66,7 @@ if TYPE_CHECKING:
     from acl_gym.schedules import Exponential, Harmonic, Linear, Schedule
     from acl_gym.utils.threads import get_num_threads, set_num_threads
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 # Name -> module. Modules are imported on first use, because compiled kernels and torch
 # take seconds to load, which `gym.make` of another environment should not cost.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any, Self
 
 import numpy as np
@@ -388,14 +389,16 @@ class ACL(PheromoneAgent, ColonyAgent):
             **saved,
             "alpha": schedule_from_settings("alpha", saved["alpha"]),
             "epsilon": schedule_from_settings("epsilon", saved["epsilon"]),
-            "cost": cost_from_settings(saved["cost"]),
-            "deposit": deposit_from_settings(saved["deposit"]),
         }
-        # Older files have neither and mean the defaults.
-        if "beta" in saved:
-            restored["beta"] = schedule_from_settings("beta", saved["beta"])
-        if "update" in saved:
-            restored["update"] = update_from_settings(saved["update"])
+        later: dict[str, Callable[[Any], Any]] = {
+            "beta": partial(schedule_from_settings, "beta"),
+            "cost": cost_from_settings,
+            "deposit": deposit_from_settings,
+            "update": update_from_settings,
+        }
+        # Files of version 0.1 lack some of these and mean the defaults.
+        for name in later.keys() & saved.keys():
+            restored[name] = later[name](saved[name])
         return restored
 
     def _arrays(self) -> dict[str, NDArray[Any]]:

@@ -323,7 +323,7 @@ def _command(
 
 def _facts(policy: TablePolicy, folder: Path) -> dict[str, Any]:
     """How large a controller is."""
-    header = (folder / "policy.h").read_text()
+    header = (folder / "policy.h").read_text(encoding="utf-8")
     about = header[: header.index("*/")]
     return {
         "partition": repr(policy.partition),

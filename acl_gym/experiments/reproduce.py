@@ -15,7 +15,7 @@ from acl_gym.experiments import comparison, outcome, plots, thesis
 from acl_gym.experiments.names import EXECUTORS, GROUPS
 from acl_gym.experiments.outcome import Outcome, without_curves
 from acl_gym.experiments.provenance import ROOT, circumstances
-from acl_gym.experiments.report import write_claims, write_report
+from acl_gym.experiments.report import CURVES, write_claims, write_report
 from acl_gym.experiments.results import Results
 from acl_gym.experiments.runner import exclusive_lock, list_jobs, run_studies
 from acl_gym.experiments.store import Job, Store
@@ -92,7 +92,8 @@ def reproduce(
         names: see `chosen`.
         runs: of each study, >= 1; the thesis has 30.
         directory: receives results.json, results.parquet, report.html, claims.md, in
-            figures/ the figures, and in runs/ a file for each run.
+            figures/ and curves/ what the report loads, and in runs/ a file for each
+            run.
         first_seed: the seeds are this one and those that follow it.
         workers: processes, >= 1; None takes one for each core.
         executor: see `runner.run_studies`.
@@ -323,5 +324,6 @@ def _generated_files(directory: Path) -> list[Path]:
     """The files of a folder generated from results: rows, reports, and figures."""
     names = {Path(ANIMATION).stem, *(experiment.name for experiment in EXPERIMENTS)}
     files = [directory / name for name in (ROWS, PAGE, CLAIMS_TABLE)]
-    files += [p for p in (directory / _FIGURES).glob("*.*") if p.stem in names]
+    for folder in (_FIGURES, CURVES):
+        files += [p for p in (directory / folder).glob("*.*") if p.stem in names]
     return [path for path in files if path.is_file()]

@@ -108,7 +108,7 @@ class Journal:
         if not path.exists():
             return None
         try:
-            found = json.loads(path.read_text())
+            found = json.loads(path.read_text(encoding="utf-8"))
             rows = [dict(row) for row in found["history"]]
             return State(int(found["interactions"]), float(found["seconds"]), rows)
         except (ValueError, KeyError, TypeError) as error:
@@ -128,7 +128,7 @@ class Journal:
             [steps["states"], steps["inputs"], steps["next_states"], steps["rewards"]]
         )
         if self._file is None:
-            self._file = (self.folder / DATA).open("a", newline="")
+            self._file = (self.folder / DATA).open("a", newline="", encoding="utf-8")
         writer = csv.writer(self._file)
         if self._file.tell() == 0:
             writer.writerow(self._columns())
@@ -149,7 +149,7 @@ class Journal:
             write_atomically(path, (json.dumps(wanted, indent=1) + "\n").encode())
             return
         try:
-            found = json.loads(path.read_text())
+            found = json.loads(path.read_text(encoding="utf-8"))
             changed = sorted(k for k in wanted if found.get(k) != wanted[k])
         except (ValueError, AttributeError, OSError) as error:
             raise ValueError(

@@ -35,6 +35,7 @@ def test_a_figure_and_its_report(tmp_path: Path) -> None:
         "results.json",
         "results.parquet",
         "figures/fig3.9.png",
+        "curves/fig3.9.js",
     ):
         assert (folder / name).is_file()
     table = (folder / "claims.md").read_text()
@@ -54,10 +55,11 @@ def test_a_figure_and_its_report(tmp_path: Path) -> None:
     assert [path.stat().st_mtime_ns for path in everything] == times
 
     # What is missing is made, and nothing else.
-    (folder / "figures" / "fig3.9.png").unlink()
-    again = invoke(*SMALL, "--out", "r")
-    assert "Nothing to do" not in again.stdout
-    assert (folder / "figures" / "fig3.9.png").is_file()
+    for name in ("figures/fig3.9.png", "curves/fig3.9.js"):
+        (folder / name).unlink()
+        again = invoke(*SMALL, "--out", "r")
+        assert "Nothing to do" not in again.stdout
+        assert (folder / name).is_file()
     assert [path.stat().st_mtime_ns for path in files] == before
 
     # Whoever wants no figures leaves those that are there, of these results.

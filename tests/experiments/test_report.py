@@ -1,7 +1,8 @@
-"""What experiments found, as JSON and as one page."""
+"""What experiments found, as JSON and as a page with figures and curves beside it."""
 
 from __future__ import annotations
 
+import base64
 import json
 import re
 from html.parser import HTMLParser
@@ -23,9 +24,12 @@ from tests.experiments.synthetic import (
     pendulums,
 )
 
-# Not a picture, but the report does not look inside.
-PNG = b"\x89PNG\r\n\x1a\n" + bytes(range(50))
-VOID = {"meta", "link", "img", "br"}
+# A grey pixel.
+PNG = base64.b64decode(
+    "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAAAAAA6fptVAAAACklEQVR4nGNoAAAAggCBd81ytgAAAABJRU5"
+    "ErkJggg=="
+)
+VOID = {"meta", "link", "img", "br", "input"}
 
 
 class Page(HTMLParser):
@@ -161,25 +165,71 @@ def test_the_page_holds_everything(tmp_path: Path, summed: Outcome) -> None:
     assert {"lang": "en"} in page.all("html")
     (image,) = page.all("img")
     assert str(image["alt"]).startswith("A trial, rho = 0.1. ")
+    assert (image["src"], image["loading"]) == ("trial.png", "lazy")
+    assert (image["width"], image["height"]) == ("1", "1")
     (best,) = [cell for cell in page.all("td") if cell.get("class") == "best"]
     assert best["data-heading"] == "last, cost"
     assert all(cell["scope"] in ("col", "row") for cell in page.all("th"))
 
 
-def test_the_page_loads_nothing_and_its_links_lead_somewhere(
+def test_the_page_loads_files_beside_it_and_its_links_lead_somewhere(
     tmp_path: Path, summed: Outcome
 ) -> None:
     summed["claims"] = ["C1"]
     text = write(tmp_path, summed, claims=[CLAIM])
     page = Page(text)
     assert not re.search(r"https?://(?!www\.w3\.org/2000/svg)", text)
-    for _, attributes in page.tags:
-        assert str(attributes.get("src", "data:")).startswith("data:")
+    loaded = [a[k] for _, a in page.tags for k in ("src", "data-curves") if k in a]
+    assert loaded == ["trial.png", "curves/trial.js"]
+    assert all((tmp_path / str(file)).is_file() for file in loaded)
     ids = [str(a["id"]) for _, a in page.tags if "id" in a]
     assert len(ids) == len(set(ids))
-    links = [str(a["href"])[1:] for a in page.all("a")]
-    assert sorted(links) == ["C1", "trial"], "what was not run has no link"
-    assert set(links) <= set(ids)
+    links = {str(a["href"]) for a in page.all("a")}
+    within = {link[1:] for link in links if link.startswith("#")}
+    assert within == {"C1", "claims", "content", "how", "repeat", "trial"}, (
+        "what was not run has no link"
+    )
+    assert within <= set(ids)
+    assert links - {f"#{link}" for link in within} == {"trial.png"}
+
+
+def test_curves_stand_in_a_script_of_their_own(tmp_path: Path, summed: Outcome) -> None:
+    text = write(tmp_path, summed)
+    script = (tmp_path / "curves" / "trial.js").read_text()
+    name, studies = json.loads(f"[{script.removeprefix('showCurves(')[:-3]}]")
+    assert name == "trial"
+    curves = {study["label"]: study["curves"] for study in summed["studies"]}
+    assert {study["label"]: study["curves"] for study in studies} == curves
+    assert "setting" not in studies[0], "only what is drawn"
+    assert str(summed["studies"][0]["curves"]["policy_cost"]["mean"][0]) not in text
+
+
+def test_figures_may_lie_in_another_folder(tmp_path: Path, summed: Outcome) -> None:
+    (tmp_path / "pictures #1").mkdir()
+    (tmp_path / "pictures #1" / "trial.png").write_bytes(PNG)
+    text = write(tmp_path, summed, figures=tmp_path / "pictures #1")
+    (image,) = Page(text).all("img")
+    assert image["src"] == "pictures%20%231/trial.png"
+
+
+@pytest.mark.parametrize("name", ["../trial", "/trial", "a/b"])
+def test_no_name_leads_out_of_the_folder(
+    tmp_path: Path, summed: Outcome, name: str
+) -> None:
+    summed["name"] = summed["figures"][0]["file"] = name
+    folder = tmp_path / "inner"
+    folder.mkdir()
+    report.write_report(
+        folder / "report.html",
+        title="",
+        experiments=[summed],
+        figures=folder,
+        command="",
+        made={},
+    )
+    assert {path.name for path in tmp_path.rglob("*")} == {
+        *("inner", "report.html", "curves")
+    }
 
 
 def test_a_figure_that_is_not_there_is_left_out(
@@ -231,8 +281,10 @@ CHROMIUM = next(
 def test_the_page_in_a_browser(
     tmp_path: Path, summed: Outcome, width: int, scheme: str
 ) -> None:
-    """No errors, no requests, no scrolling sideways; hovering and no script work."""
+    """No errors, no scrolling sideways; the mouse, the keyboard and no script work."""
     sync = pytest.importorskip("playwright.sync_api")
+    reference = next(each for each in summed["studies"] if each["label"] == "J*")
+    del reference["curves"]["sensitivity"]
     write(tmp_path, summed, claims=[CLAIM])
     wrong: list[str] = []
     with sync.sync_playwright() as playwright:
@@ -243,22 +295,49 @@ def test_the_page_in_a_browser(
             viewport={"width": width, "height": 800}, color_scheme=scheme
         )
         tab.on("pageerror", lambda error: wrong.append(str(error)))
+        tab.on("console", lambda message: wrong.append(message.text))
+        tab.on("requestfailed", lambda request: wrong.append(request.url))
         address = (tmp_path / "report.html").as_uri()
         tab.goto(address)
         assert tab.evaluate("document.documentElement.scrollWidth") <= width
         paper = tab.evaluate("getComputedStyle(document.body).backgroundColor")
         assert (paper == "rgb(255, 255, 255)") == (scheme == "light")
-        box = tab.locator('.explore[data-name="trial"]')
-        choice, measure = box.locator("select").all()
+        tab.keyboard.press("Tab")
+        assert tab.evaluate("document.activeElement.textContent") == (
+            "Skip to the content"
+        )
+        box = tab.get_by_role("group", name="Curves of trial")
+        box.scroll_into_view_if_needed()
+        choice = box.get_by_label("Setting")
         choice.select_option(label="ACL, crisp")
-        measure.select_option(label="sensitivity")
-        plot = box.locator("svg")
+        box.get_by_label("Measure").select_option(label="sensitivity")
+        plot = box.get_by_role("img")
         plot.hover(position={"x": plot.bounding_box()["width"] - 5, "y": 60})
-        shown = box.locator("output").inner_text()
-        assert shown == f"trial {TRIALS}: mean 0.05, from 0.05 to 0.05"
+        output = box.get_by_role("status")
+        assert output.inner_text() == f"trial {TRIALS}: mean 0.05, from 0.05 to 0.05"
+        assert str(plot.get_attribute("aria-label")).startswith(
+            "sensitivity, ACL, crisp: at first trial 1: mean"
+        )
+        slider = box.get_by_label("Point on the curve")
+        slider.focus()
+        slider.press("Home")
+        assert output.inner_text().startswith("trial 1: mean")
+        assert slider.get_attribute("aria-valuetext") == output.inner_text()
+        assert slider.evaluate("e => getComputedStyle(e).outlineStyle") == "solid"
+        choice.select_option(label="J*")
+        assert output.inner_text() == "This measure is not known of this setting."
+        assert slider.is_disabled()
+        picture = tab.locator("img").first
+        assert picture.evaluate("e => e.complete && e.naturalWidth") == 1
+        assert picture.bounding_box()["width"] <= width
+        assert wrong == []
         quiet = browser.new_context(java_script_enabled=False).new_page()
         quiet.goto(address)
         assert quiet.locator("tr#C1 .verdict").is_visible()
         assert not quiet.locator(".explore").first.is_visible()
+        (tmp_path / "curves" / "trial.js").unlink()
+        alone = browser.new_page()
+        alone.goto(address)
+        lost = alone.get_by_text("There is no curves/trial.js beside this page.")
+        lost.wait_for()
         browser.close()
-    assert wrong == []

@@ -368,7 +368,7 @@ def _read_csv(path: Path) -> Any:
     """A frame from a CSV file, whatever separates its columns."""
     import pandas as pd
 
-    with path.open(errors="replace") as file:
+    with path.open(encoding="utf-8", errors="replace") as file:
         head, first = file.readline(), file.readline()
     separator = max((",", ";", "\t"), key=head.count)
     comma = separator != "," and "," in first and "." not in first

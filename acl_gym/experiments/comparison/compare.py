@@ -61,8 +61,8 @@ def compare(
         preset: a key of `tasks.PRESETS`.
         agents: some of those of the system; None takes them all.
         seeds: runs of each agent; None takes the preset's number.
-        directory: receives results.json, results.parquet, report.html and figures, and
-            in runs/ the result of each run.
+        directory: receives results.json, results.parquet, report.html and figures, in
+            curves/ the curves of the report, and in runs/ the result of each run.
         first_seed: the seeds are this one and those that follow it.
         fresh: make every run anew, also those that are there.
         workers: processes; None takes one for each core.

@@ -3,7 +3,7 @@
 All of it is data, in tasks.toml and settings.json. A `System` is one of the four systems
 as `acl-gym compare` runs it, a `TunedTask` is a system, as it is or made harder, for which
 each method was tuned. To add a system or a task, add one entry to tasks.toml; for a method
-see CONTRIBUTING.md. How settings were chosen is in docs/comparison-settings.md and
+see docs/project/developing.md. How settings were chosen is in docs/comparison-settings.md and
 docs/versus.md.
 """
 

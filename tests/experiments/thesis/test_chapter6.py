@@ -264,7 +264,8 @@ def test_the_report_shows_swarms_by_their_own_measures(tmp_path: Path) -> None:
     options = re.findall(r'<option value="(\w+)"( data-logarithmic)?>', page)
     assert ("drift", "") in options
     assert "In the end: distance of the outermost agent from the centre" in page
-    assert '"unit": "step"' in page
+    curves = (tmp_path / "curves" / "fig6.delays.js").read_text()
+    assert '"unit":"step"' in curves
     optimum = EXPERIMENTS["fig6.order"]
     assert outcome.summary(optimum, make_results(optimum))["measures"] == [
         {"key": "value", "name": "least value so far", "logarithmic": True}

@@ -7,7 +7,6 @@ from typing import Any
 
 from acl_gym.experiments.study import Experiment
 from acl_gym.experiments.swarms.study import AGGREGATION, ANTS, PSO, SwarmStudy
-from acl_gym.experiments.thesis.common import fewer
 from acl_gym.swarm.pso.benchmark_functions import BENCHMARK_FUNCTIONS
 
 AGENTS, TIME_STEP, STEPS = 50, 0.002, 2_000
@@ -117,8 +116,8 @@ def _pso_channels(largest: float) -> dict[str, dict[str, Any]]:
         "everyone": {},
         "von Neumann": {"topology": "von_neumann"},
         "ring": {"topology": "ring"},
-        "5 nearest": {**nearest, "include_self": True},
-        "5 nearest, not oneself": nearest,
+        "5 nearest": nearest,
+        "5 nearest, not oneself": {**nearest, "include_self": False},
         "radius 2 L": {"topology": "radius", "sigma": 2.0 * largest},
         "radius 1 L": {"topology": "radius", "sigma": largest},
         **{f"{loss:.0%} lost": {"loss": loss} for loss in PSO_LOSSES},
@@ -128,12 +127,10 @@ def _pso_channels(largest: float) -> dict[str, dict[str, Any]]:
 
 
 SWARMS = {
-    function: fewer(
-        {
-            label: particles(function, channel)
-            for label, channel in _pso_channels(benchmark.largest).items()
-        }
-    )
+    function: {
+        label: particles(function, channel)
+        for label, channel in _pso_channels(benchmark.largest).items()
+    }
     for function, benchmark in BENCHMARK_FUNCTIONS.items()
 }
 

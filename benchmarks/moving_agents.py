@@ -17,11 +17,13 @@ from matplotlib.patches import FancyArrowPatch, FancyBboxPatch
 
 from acl_gym.plotting import style
 from acl_gym.swarm import (
+    AggregatingAgents,
     Channel,
     Delayed,
     DynamicAgents,
     Environment,
     Everyone,
+    Field,
     Inbox,
     Lossy,
     Nearest,
@@ -96,23 +98,6 @@ class Meeting(DynamicAgents):
         return self._gain * (self.aim - self.own)
 
 
-class Attracted(Meeting):
-    """Agents that attract each other, and repel those that are near: eq. (6.5)."""
-
-    step, attraction, repulsion, width = 0.002, 1.0, 20.0, 0.2
-
-    def hear(self, inbox: Inbox) -> None:
-        receiver = inbox.links.receiver
-        away = self.own[receiver] - inbox.pairs("where")
-        squares = (away**2).sum(axis=1, keepdims=True)
-        push = self.repulsion * np.exp(-squares / self.width)
-        self.force = np.zeros_like(self.own)
-        np.add.at(self.force, receiver, away * (push - self.attraction))
-
-    def decide(self, rng: np.random.Generator) -> Any:
-        return self.step * self.force
-
-
 def centre_moved(x: Any) -> Any:
     """How far the centre is from where it began, in each step."""
     centre = x.mean(axis=1)
@@ -145,9 +130,9 @@ def readings(seed: int) -> dict[str, Any]:
     for name, stale in (("split", False), ("strict", True)):
         agents, plane = Meeting(gain=1.0), Plane(RING)
         ring = run(agents, plane, RING_STEPS, seed, Ring(), stale=stale, record=("x",))
-        cluster = run(
-            Attracted(), Plane(20), 400, seed, Everyone(), stale=stale, record=("x",)
-        )
+        # They attract each other, and repel those that are near: eq. (6.5).
+        field = Field(20, bounds=(0.0, 1.0), time_step=0.002)
+        cluster = run(AggregatingAgents(), field, 400, seed, stale=stale, record=("x",))
         found[name] = {
             "disagreement": disagreement(ring["x"]),
             "centre_moved": centre_moved(cluster["x"]),

@@ -18,7 +18,6 @@ examples:
 
 from __future__ import annotations
 
-import argparse
 import contextlib
 import importlib.metadata
 import importlib.util
@@ -43,10 +42,18 @@ from acl_gym.swarm.pso.benchmark_functions import (
     BENCHMARK_FUNCTIONS,
     BenchmarkFunction,
 )
-from acl_gym.utils import validation
 from acl_gym.utils.compiling import njit
 
-Row = dict[str, Any]
+from tables import (  # isort: skip  # the script beside this one
+    Row,
+    add_json,
+    add_seeds,
+    at_least_one,
+    markdown,
+    number,
+    parser_of,
+    seed,
+)
 
 INERTIA, ACCELERATION = constriction_coefficients()
 PARTICLES, VARIABLES = 40, 30
@@ -199,11 +206,15 @@ PEERS = {"pyswarms": "as pyswarms", "pygmo": "as pygmo"}
 
 
 def quality(
-    functions: list[str], methods: list[str], seeds: range, evaluations: int
+    functions: list[str],
+    topologies: list[str],
+    methods: list[str],
+    seeds: range,
+    evaluations: int,
 ) -> list[Row]:
     """Values of all runs: a row for each function, topology and method."""
     rows = []
-    cases = [(name, topology) for name in functions for topology in TOPOLOGIES]
+    cases = [(name, topology) for name in functions for topology in topologies]
     with tqdm(
         total=len(cases) * len(seeds) * len(methods), unit="run", disable=None
     ) as bar:
@@ -350,25 +361,27 @@ def printed(rows: list[Row], tests: list[Row]) -> Iterator[str]:
     for row in rows:
         cases.setdefault((row["function"], row["topology"]), {})[row["method"]] = row
     yield "Median of the values found\n"
-    yield f"| function | neighbours | {' | '.join(methods)} |"
-    yield f"| --- | --- |{' ---: |' * len(methods)}"
-    for (name, topology), found in cases.items():
-        cells = (f"{found[each]['median']:.3g}" for each in methods)
-        yield f"| {name} | {topology} | {' | '.join(cells)} |"
+    yield markdown(
+        ["function", "neighbours", *methods],
+        [
+            [*case, *(f"{found[each]['median']:.3g}" for each in methods)]
+            for case, found in cases.items()
+        ],
+        names=(0, 1),
+    )
     yield ""
     if tests:
         yield "p of the one-sided rank test: small where acl-gym is worse\n"
-        yield "| function | neighbours | peer | the same algorithm | acl-gym's defaults |"
-        yield "| --- | --- | --- | ---: | ---: |"
-        for test in tests:
-            cells = (
-                format(test[key], ".3g") if key in test else ""
-                for key in ("p", "p_defaults")
-            )
-            yield (
-                f"| {test['function']} | {test['topology']} | {test['peer']} "
-                f"| {' | '.join(cells)} |"
-            )
+        names = ("function", "topology", "peer")
+        yield markdown(
+            ["function", "neighbours", "peer", "same algorithm", "acl-gym's defaults"],
+            [
+                [*(test[name] for name in names)]
+                + [number(test.get(key), ".3g") for key in ("p", "p_defaults")]
+                for test in tests
+            ],
+            names=(0, 1, 2),
+        )
         yield ""
 
 
@@ -389,32 +402,36 @@ def available(methods: list[str]) -> list[str]:
 
 def main() -> None:
     """Measure and print."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = parser_of(__doc__)
     names = list(BENCHMARK_FUNCTIONS)
     parser.add_argument("--functions", nargs="+", choices=names, default=names)
     parser.add_argument(
         "--methods", nargs="+", choices=list(METHODS), default=list(METHODS)
     )
-    parser.add_argument("--seeds", type=int, default=30, help="runs of each (30)")
-    parser.add_argument("--first-seed", type=int, default=0, help="of those runs (0)")
     parser.add_argument(
-        "--evaluations", type=int, default=300_000, help="of each run (300,000)"
+        "--topologies", nargs="+", choices=TOPOLOGIES, default=list(TOPOLOGIES)
+    )
+    add_seeds(parser, 30)
+    parser.add_argument("--first-seed", type=seed, default=0, help="of those runs (0)")
+    parser.add_argument(
+        "--evaluations",
+        type=at_least_one,
+        default=300_000,
+        help="of each run (300,000)",
     )
     parser.add_argument("--only", choices=("quality", "speed"))
     parser.add_argument(
-        "--repetitions", type=int, default=7, help="of each measurement of speed (7)"
+        "--repetitions",
+        type=at_least_one,
+        default=7,
+        help="of each measurement of speed (7)",
     )
-    parser.add_argument("--json", action="store_true", help="print JSON")
+    add_json(parser)
     options = parser.parse_args()
-    try:
-        validation.integer("--seeds", options.seeds, at_least=1)
-        validation.integer("--first-seed", options.first_seed, at_least=0)
-        validation.integer("--repetitions", options.repetitions, at_least=1)
-        validation.integer("--evaluations", options.evaluations, at_least=3 * PARTICLES)
-    except ValueError as error:
-        parser.error(str(error))
+    if options.evaluations < 3 * PARTICLES:
+        parser.error(
+            f"--evaluations must be at least {3 * PARTICLES}, got {options.evaluations}."
+        )
     methods = available(options.methods)
     if not methods:
         parser.error("none of the methods is installed.")
@@ -430,6 +447,7 @@ def main() -> None:
     if options.only != "speed":
         found["quality"] = quality(
             options.functions,
+            options.topologies,
             methods,
             range(options.first_seed, options.first_seed + options.seeds),
             options.evaluations,

@@ -3,14 +3,13 @@
 A point of the search is a colony: its exploration epsilon, the weight rho of its deposits,
 the decay gamma of visited pairs (rho and gamma by their logarithms) and the exponent alpha.
 Its value is the number of steps that an ant walks to the goal, on average over the first
-trials, while the colony learns, or that of the policy learned in the end. Each point is tried with a few seeds, the same for all
-points. What was found is then compared with the defaults on seeds that the search has not
-seen, by both measures. Takes two minutes.
+trials, while the colony learns, or that of the policy learned in the end. Each point is
+tried with a few seeds, the same for all points. What was found is then compared with the
+defaults on seeds that the search has not seen, by both measures. Takes two minutes.
 """
 
 from __future__ import annotations
 
-import argparse
 import json
 import time
 from typing import Any
@@ -23,7 +22,8 @@ from tqdm import tqdm
 
 from acl_gym import ACL, evaluate_policy_cost
 from acl_gym.swarm import minimize
-from acl_gym.utils import validation
+
+from tables import add_json, at_least_one, parser_of, seed  # isort: skip
 
 ENV_ID = "acl_gym/GridSearch2D-v0"
 ANTS, TRIALS = 30, 20
@@ -80,25 +80,16 @@ def search(measure: str, iterations: int, particles: int, seed: int) -> Any:
 
 def main() -> None:
     """Search, compare and print."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = parser_of(__doc__)
     parser.add_argument("--measure", choices=list(MEASURES), default="learning")
-    parser.add_argument("--iterations", type=int, default=ITERATIONS)
-    parser.add_argument("--particles", type=int, default=PARTICLES)
-    parser.add_argument("--seed", type=int, default=0, help="of the swarm")
+    parser.add_argument("--iterations", type=at_least_one, default=ITERATIONS)
+    parser.add_argument("--particles", type=at_least_one, default=PARTICLES)
+    parser.add_argument("--seed", type=seed, default=0, help="of the swarm")
     parser.add_argument(
-        "--fresh", type=int, default=60, help="seeds to compare on (60)"
+        "--fresh", type=at_least_one, default=60, help="seeds to compare on (60)"
     )
-    parser.add_argument("--json", action="store_true", help="print JSON")
+    add_json(parser)
     options = parser.parse_args()
-    try:
-        validation.integer("--iterations", options.iterations, at_least=0)
-        validation.integer("--particles", options.particles, at_least=1)
-        validation.integer("--fresh", options.fresh, at_least=2)
-        validation.seed(options.seed)
-    except ValueError as error:
-        parser.error(str(error))
 
     learned(0)  # compiles
     began = time.perf_counter()

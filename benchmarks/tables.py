@@ -28,6 +28,11 @@ def add_seeds(parser: argparse.ArgumentParser, default: int = 5) -> None:
     )
 
 
+def add_json(parser: argparse.ArgumentParser) -> None:
+    """The option `--json`."""
+    parser.add_argument("--json", action="store_true", help="print JSON, nothing else")
+
+
 def add_results(parser: argparse.ArgumentParser, figure: str) -> None:
     """Options of what is made of the rows: `--from-json`, `--figure` and `--json`.
 
@@ -43,7 +48,7 @@ def add_results(parser: argparse.ArgumentParser, figure: str) -> None:
         help="show what --json has printed, of several parts together",
     )
     parser.add_argument("--figure", type=Path, metavar="PNG", help=f"draw {figure}")
-    parser.add_argument("--json", action="store_true", help="print JSON, no table")
+    add_json(parser)
 
 
 def rows_of(paths: Iterable[Path], name: str = "rows") -> list[Row]:
@@ -55,6 +60,13 @@ def at_least_one(text: str) -> int:
     """The type of an option that is a whole number >= 1."""
     if not (text.isdecimal() and int(text) >= 1):
         raise argparse.ArgumentTypeError(f"must be an integer >= 1, got {text!r}")
+    return int(text)
+
+
+def seed(text: str) -> int:
+    """The type of an option that is a seed, a whole number >= 0."""
+    if not text.isdecimal():
+        raise argparse.ArgumentTypeError(f"must be an integer >= 0, got {text!r}")
     return int(text)
 
 

@@ -19,7 +19,13 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from acl_gym.swarm.channel import Channel, Delayed, Lossy, Topology
+from acl_gym.swarm.channel import (
+    Channel,
+    ChannelWrapper,
+    Delayed,
+    Lossy,
+    Topology,
+)
 from acl_gym.swarm.inbox import Inbox
 from acl_gym.swarm.links import Links
 from acl_gym.swarm.protocols import DynamicAgents, Environment
@@ -45,6 +51,7 @@ _PACKAGES = ("aggregation", "pso")
 __all__ = [
     "AggregatingAgents",
     "Channel",
+    "ChannelWrapper",
     "Delayed",
     "DynamicAgents",
     "Environment",

@@ -66,7 +66,30 @@ class Topology(Channel):
         return Inbox(self.links(x), sent)
 
 
-class Lossy(Channel):
+class ChannelWrapper(Channel):
+    """A channel that changes what another one delivers.
+
+    Args:
+        channel: the other one.
+
+    Raises:
+        TypeError: it is not a `Channel`.
+    """
+
+    def __init__(self, channel: Channel) -> None:
+        if not isinstance(channel, Channel):
+            raise TypeError(
+                "channel must be a Channel, such as Everyone(), got "
+                f"{validation.shown(channel)}."
+            )
+        self.channel = channel
+
+    def reset(self, n: int) -> None:
+        """See `Channel.reset`."""
+        self.channel.reset(n)
+
+
+class Lossy(ChannelWrapper):
     """Loses messages: what is sent over a link is lost with probability p.
 
     In every step one number is drawn for each link of the channel inside. An agent
@@ -84,13 +107,9 @@ class Lossy(Channel):
     """
 
     def __init__(self, channel: Channel, p: float, symmetric: bool = False) -> None:
-        self.channel = _checked_channel(channel)
+        super().__init__(channel)
         self.p = validation.number("p", p, at_least=0, at_most=1)
         self.symmetric = validation.boolean("symmetric", symmetric)
-
-    def reset(self, n: int) -> None:
-        """See `Channel.reset`."""
-        self.channel.reset(n)
 
     def deliver(
         self,
@@ -133,7 +152,7 @@ def _keep(
             kept[link] = i == j or coin >= p
 
 
-class Delayed(Channel):
+class Delayed(ChannelWrapper):
     """Delivers late: messages and positions are those of some steps ago.
 
     At the beginning they are the oldest that there are. Agents hear themselves late as
@@ -149,14 +168,14 @@ class Delayed(Channel):
     """
 
     def __init__(self, channel: Channel, steps: int) -> None:
-        self.channel = _checked_channel(channel)
+        super().__init__(channel)
         self.steps = validation.integer("steps", steps, at_least=0)
         self._under_way: deque[tuple[dict[str, NDArray[Any]], FloatArray]] = deque()
 
     def reset(self, n: int) -> None:
         """See `Channel.reset`."""
         self._under_way.clear()
-        self.channel.reset(n)
+        super().reset(n)
 
     def deliver(
         self,
@@ -175,12 +194,3 @@ class Delayed(Channel):
     def __repr__(self) -> str:
         """The call that makes it."""
         return f"Delayed({self.channel!r}, steps={self.steps})"
-
-
-def _checked_channel(channel: Any) -> Channel:
-    if not isinstance(channel, Channel):
-        raise TypeError(
-            "channel must be a Channel, such as Everyone(), got "
-            f"{validation.shown(channel)}."
-        )
-    return channel

@@ -82,20 +82,17 @@ class Inbox:
                 f"message {key!r} must be one real number for each agent, got an array "
                 f"of {values.dtype} and shape {values.shape}."
             )
-        least = int(values.argmin())  # that of a NaN, if there is one
-        if values[least] != values[least]:
+        links, values = self.links, np.ascontiguousarray(values)
+        found = np.empty(links.n, np.int64)
+        if links.is_implicit:
+            unordered = _best_of_all(values, links.all_others, found)
+        else:
+            unordered = _best(values, *links.csr(), found)
+        if unordered >= 0:
             raise ValueError(
-                f"message {key!r} must not be NaN, got NaN from agent {least}; send "
+                f"message {key!r} must not be NaN, got NaN from agent {unordered}; send "
                 "infinity where there is no value."
             )
-        links = self.links
-        if links.is_implicit:
-            found = np.full(links.n, least)
-            if links.all_others:
-                found[least] = _least_but(values, least)
-            return found
-        found = np.empty(links.n, np.int64)
-        _best(np.ascontiguousarray(values), *links.csr(), found)
         return found
 
     def sum(self, rows: ArrayLike) -> FloatArray:
@@ -218,16 +215,40 @@ def _fits(array: NDArray[Any], target: NDArray[Any]) -> bool:
         return False
 
 
-def _least_but(values: NDArray[Any], best: int) -> int:
-    """The number of the least value when the best one does not count; -1: no other."""
-    others = np.delete(np.arange(values.size), best)
-    return int(others[values[others].argmin()]) if others.size else -1
+@njit
+def _best_of_all(values: NDArray[Any], all_others: bool, found: IntArray) -> int:
+    """Whom everyone has heard the least value of; the first NaN, or -1 if there is none.
+
+    Args:
+        values: of all agents, `(n,)`.
+        all_others: whether an agent does not hear itself.
+        found: `(n,)`, receives the senders, -1 where there is no other agent.
+    """
+    first = 0
+    for j in range(values.size):
+        if values[j] != values[j]:
+            return j
+        if values[j] < values[first]:
+            first = j
+    for i in range(found.size):
+        found[i] = first
+    if all_others:
+        second = -1
+        for j in range(values.size):
+            if j != first and (second < 0 or values[j] < values[second]):
+                second = j
+        found[first] = second
+    return -1
 
 
 @njit
 def _best(
     values: NDArray[Any], senders: IntArray, offsets: IntArray, found: IntArray
-) -> None:
+) -> int:
+    """The same for those that each agent hears; -1 for one that hears nobody."""
+    for j in range(values.size):
+        if values[j] != values[j]:
+            return j
     for i in range(found.size):
         best = -1
         for link in range(offsets[i], offsets[i + 1]):
@@ -235,6 +256,7 @@ def _best(
             if best < 0 or values[j] < values[best]:
                 best = j
         found[i] = best
+    return -1
 
 
 @njit

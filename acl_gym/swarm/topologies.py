@@ -164,7 +164,7 @@ class Radius(Topology):
 
 
 class Nearest(Topology):
-    """Each agent hears the k others that are nearest to it.
+    """Each agent hears the k others that are nearest to it, and itself.
 
     An agent may hear another one that does not hear it. Where others are equally
     distant, it is left open which of them it hears; in the same positions it is always
@@ -172,7 +172,10 @@ class Nearest(Topology):
 
     Args:
         k: how many, >= 1, and less than the number of agents.
-        include_self: whether an agent hears itself beside them.
+        include_self: whether an agent hears itself beside them, as it does within a
+            radius, where its distance of 0 counts. A particle that does not hear itself
+            settles badly: if it has found the best point of its neighbourhood, its local
+            best is a worse one.
 
     Raises:
         TypeError: `k` is not an integer.
@@ -180,7 +183,7 @@ class Nearest(Topology):
             others.
     """
 
-    def __init__(self, k: int, include_self: bool = False) -> None:
+    def __init__(self, k: int, include_self: bool = True) -> None:
         self.k = validation.integer("k", k, at_least=1)
         self.include_self = validation.boolean("include_self", include_self)
 

@@ -241,9 +241,11 @@ class World:
 
     def _looked(self) -> Look:
         system, x, n = self.system, np.ascontiguousarray(self.positions), self.n
-        heard = np.full(n, n - 1)
-        # All others' positions relative to it: their sum minus n times its own.
-        towards = x.sum(axis=0) - n * x
+        if system.sensing_radius is None:
+            # All others' positions relative to it: their sum minus n times its own.
+            heard, towards = np.full(n, n - 1), x.sum(axis=0) - n * x
+        else:
+            heard, towards = np.empty(n, np.int64), np.empty((n, 2))
         collisions = np.empty(n, np.int64)
         nearest = np.empty((n, 2 * system.nearest))
         side = max(system.collision_distance, self._cell_side(x))

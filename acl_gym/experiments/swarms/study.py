@@ -102,7 +102,7 @@ def make_channel(
     *,
     sigma: float | list[float] = 0.0,
     neighbours: int = 1,
-    include_self: bool = False,
+    include_self: bool = True,
     loss: float = 0.0,
     symmetric: bool = False,
     delay: int = 0,

@@ -126,7 +126,17 @@ class ParticleSwarm(DynamicAgents):
     def decide(self, rng: np.random.Generator) -> FloatArray:
         """Draw r1 and r2, and return u, `(n, d)`."""
         u = np.empty(self._position.shape)
-        self.attract(slice(None), self._position, self.draw(rng), u)
+        # All shapes were checked when these arrays were taken in.
+        kernels.attract(
+            self._position,
+            self.best_positions,
+            self._chosen,
+            self._heard,
+            self._c1,
+            self._c2,
+            self.draw(rng),
+            u,
+        )
         return u
 
     def draw(self, rng: np.random.Generator) -> FloatArray:
@@ -206,7 +216,7 @@ def _observed(y: Any, n: int, d: int | None) -> tuple[FloatArray, FloatArray]:
 def _rows(name: str, rows: Any) -> FloatArray:
     """An array of numbers as kernels take it, not copied if it is one already."""
     if type(rows) is np.ndarray and rows.dtype == np.float64 and rows.ndim:
-        return rows if rows.flags.c_contiguous else np.ascontiguousarray(rows)
+        return np.ascontiguousarray(rows)
     array = validation.as_array(rows)
     if array is None or array.dtype.kind not in "biuf" or array.ndim == 0:
         raise ValueError(

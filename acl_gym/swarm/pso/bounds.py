@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -35,7 +36,7 @@ class SearchSpace:
     lower: FloatArray
     upper: FloatArray
 
-    @property
+    @cached_property
     def d(self) -> int:
         """The number of variables."""
         return self.lower.size

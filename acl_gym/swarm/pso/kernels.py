@@ -7,12 +7,16 @@ then the velocity. No kernel draws random numbers.
 from __future__ import annotations
 
 import math
+import sys
 
 from acl_gym.utils.compiling import njit
 from acl_gym.utils.typing import FloatArray, IntArray
 
 NONE, CLIP, ABSORB, REFLECT = range(4)
 """What happens at the bounds, see `acl_gym.swarm.pso.bounds.BOUNDARIES`."""
+
+LARGEST = sys.float_info.max
+"""The largest float: what is larger is infinite."""
 
 
 @njit(error_model="numpy")
@@ -82,11 +86,14 @@ def attract(
     """
     for i in range(positions.shape[0]):
         j = chosen[i]
-        local = personal[i] if j < 0 else heard[j]
-        for k in range(positions.shape[1]):
-            theta = positions[i, k]
-            own = cognitive[i] * uniforms[i, 0, k] * (personal[i, k] - theta)
-            u[i, k] = own + social[i] * uniforms[i, 1, k] * (local[k] - theta)
+        # Rows, because compilers make vector instructions of loops over them.
+        theta, best, out = positions[i], personal[i], u[i]
+        local = best if j < 0 else heard[j]
+        r1, r2 = uniforms[i, 0], uniforms[i, 1]
+        c1, c2 = cognitive[i], social[i]
+        for k in range(theta.size):
+            own = c1 * r1[k] * (best[k] - theta[k])
+            out[k] = own + c2 * r2[k] * (local[k] - theta[k])
 
 
 @njit(error_model="numpy")
@@ -133,41 +140,41 @@ def move(
         boundary: `NONE`, `CLIP`, `ABSORB` or `REFLECT`.
         limit: largest absolute velocity, may be inf, `(d,)`.
         literal: move with the old velocity.
-        farthest: how far from 0 a position may be.
+        farthest: how far from 0 a position may be if `boundary` is `NONE`.
 
     Returns:
-        Whether all states are finite, and no position is farther away. Where they are not, no particle is to be used any
-        more.
+        Whether all states are finite, and no position is farther away. Where they are
+        not, no particle is to be used any more.
     """
     n, d = u.shape
+    reach = min(farthest, LARGEST) if boundary == NONE else LARGEST
     finite = True
     for i in range(n):
-        w = inertia[i]
+        w, theta, nu, added = inertia[i], x[i, :d], x[i, d:], u[i]
+        inside = True
+        # Without a branch, so that compilers make vector instructions of it.
         for k in range(d):
-            old = x[i, d + k]
-            new = w * old + u[i, k]
+            old = nu[k]
+            new = w * old + added[k]
             # Not min and max, which may make a number of NaN.
             new = limit[k] if new > limit[k] else new
             new = -limit[k] if new < -limit[k] else new
-            x[i, d + k] = new
-            x[i, k] += old if literal else new
-        for k in range(d):
-            finite &= math.isfinite(x[i, k]) and math.isfinite(x[i, d + k])
-        if boundary == NONE:
-            for k in range(d):
-                finite &= abs(x[i, k]) <= farthest
-        if boundary == NONE or not finite:
+            place = theta[k] + (old if literal else new)
+            nu[k], theta[k] = new, place
+            finite &= (abs(place) <= reach) & (abs(new) <= LARGEST)
+            inside &= (lower[k] <= place) & (place <= upper[k])
+        if inside or boundary == NONE or not finite:
             continue
         for k in range(d):
-            if lower[k] <= x[i, k] <= upper[k]:
+            if lower[k] <= theta[k] <= upper[k]:
                 continue
             if boundary == REFLECT:
-                x[i, k], x[i, d + k] = mirror(x[i, k], x[i, d + k], lower[k], upper[k])
-                finite &= math.isfinite(x[i, k])
+                theta[k], nu[k] = mirror(theta[k], nu[k], lower[k], upper[k])
+                finite &= math.isfinite(theta[k])
             else:
-                x[i, k] = min(max(x[i, k], lower[k]), upper[k])
+                theta[k] = min(max(theta[k], lower[k]), upper[k])
                 if boundary == ABSORB:
-                    x[i, d + k] = 0.0
+                    nu[k] = 0.0
     return finite
 
 

@@ -217,7 +217,8 @@ class Landscape(Environment):
         if not finite:
             raise ExplosionError(
                 f"positions must stay within {FARTHEST:g} and velocities finite, but the "
-                f"swarm has exploded in iteration {self.iteration}; use order='standard', a smaller inertia or acceleration "
+                f"swarm has exploded in iteration {self.iteration}; use "
+                "order='standard', a smaller inertia or acceleration "
                 "(acl_gym.swarm.pso.is_stable tells which), bounds or a velocity_limit."
             )
 

@@ -66,9 +66,11 @@ class Objective:
         self.evaluations += len(points)
         if self.vectorized:
             n, d = points.shape
-            extra = n == d > 1 and not self._unlike
-            batch = np.vstack([points, points[:1]]) if extra else points.copy()
-            values = self._checked(self.function(batch), n + extra)[:n]
+            if self._unlike or n != d or d == 1:
+                values = self._checked(self.function(points.copy()), n)
+            else:
+                batch = np.vstack([points, points[:1]])
+                values = self._checked(self.function(batch), n + 1)[:n]
             self._unlike = True
         else:
             values = np.array([self._of_one(row.copy()) for row in points])

@@ -211,7 +211,7 @@ def test_channels_by_name(topology: str) -> None:
         "ring": np.full(9, 5),
         "von_neumann": np.full(9, 5),
         "radius": (distance < 0.5).sum(axis=1),
-        "nearest": np.full(9, 2),
+        "nearest": np.full(9, 3),
     }
     assert inbox.count.tolist() == expected[topology].tolist()
 
@@ -223,8 +223,8 @@ def test_channels_with_losses_delays_and_radii_of_each_agent() -> None:
     radii = make_channel(3, "radius", sigma=[1.0, 2.0])
     assert isinstance(radii, Radius)
     assert radii.sigma.tolist() == [1.0, 1.5, 2.0]
-    nearest = make_channel(3, "nearest", neighbours=1, include_self=True)
-    assert repr(nearest) == "Nearest(1, include_self=True)"
+    nearest = make_channel(3, "nearest", neighbours=1, include_self=False)
+    assert repr(nearest) == "Nearest(1, include_self=False)"
     with pytest.raises(ValueError, match="topology must be one of"):
         make_channel(3, "star")
 

@@ -90,6 +90,8 @@ def _link_to_site(app: Sphinx, error: Exception | None) -> None:
     if error is not None or app.builder.format != "html":
         return
     for page in app.env.found_docs:
+        if posixpath.dirname(page) != "guides":
+            continue  # another page may have the name of a guide
         name = posixpath.basename(page)
         for path in Path(app.outdir, "_downloads").glob(f"*/{name}.ipynb"):
             notebook = json.loads(path.read_text(encoding="utf-8"))

@@ -2,9 +2,10 @@
 
 Sphinx, because API pages come from the docstrings that the package has, and because it
 checks every reference between pages. MyST, because the pages are Markdown that a code
-host shows as well. Furo, because Gymnasium's site is built on it, so that its readers
-find their way; it needs neither a network nor fonts of its own, follows the reader's
-choice of light or dark, and fits a phone.
+host shows as well, and because MyST-NB runs those that are notebooks. Furo, because
+Gymnasium's site is built on it, so that its readers find their way; it needs neither a
+network nor fonts of its own, follows the reader's choice of light or dark, and fits a
+phone.
 
 Nothing is loaded from elsewhere, neither when the site is built nor when it is read:
 equations are MathML, which browsers draw themselves (`_extensions/mathml.py`).
@@ -30,10 +31,11 @@ extensions = [
     "sphinx.ext.autodoc",
     "sphinx.ext.autosummary",
     "sphinx.ext.napoleon",
-    "myst_parser",
+    "myst_nb",
     "sphinx_copybutton",
     "docstrings",
     "environment_pages",
+    "guides",
     "mathml",
     "public_names",
     "repository_links",
@@ -65,7 +67,16 @@ nitpick_ignore_regex = [
 myst_enable_extensions = ["attrs_inline", "colon_fence", "deflist", "dollarmath"]
 myst_heading_anchors = 4
 html_math_renderer = "mathml"
+html_baseurl = "https://acl-gym.github.io/acl-gym/"
 repository_url = "https://github.com/acl-gym/acl-gym"
+
+# Guides, which are notebooks; `_extensions/guides.py` chooses the cache.
+nb_execution_mode = "cache"
+nb_execution_in_temp = True
+nb_execution_raise_on_error = True
+nb_execution_timeout = 120  # seconds, of a cell
+nb_merge_streams = True
+nb_output_stderr = "warn"  # a cell that warns stops the build
 
 # API pages
 autosummary_generate = False

@@ -59,7 +59,10 @@ def learn_from_plant(
         agent: what learns in the model: None takes a `ReturningACL`; an agent of this
             package, which then changes its environment; or a function of the model (a
             vector environment) that returns anything with `learn(total_timesteps=)` and
-            `predict`, such as an agent of Stable-Baselines3 over a `VectorEnvAdapter`.
+            `predict`, such as an agent of Stable-Baselines3 over a `VectorEnvAdapter`. Its
+            best policy is kept as a deep copy of what chooses actions: its attribute
+            `policy` if that has `predict`, else the agent. Of an agent that cannot be
+            copied the last policy is taken, with a warning on the log.
         interactions: steps of the plant, of all slots together, >= 1; with `data` also
             0, to learn from what was recorded before and nothing else.
         rounds: after how many interactions the colony learns: a number of rounds of

@@ -90,7 +90,8 @@ def test_an_agent_of_stable_baselines_learns_in_the_model() -> None:
     )
     assert isinstance(learned.agent, A2C)
     assert len(learned.history) == 2
-    assert learned.policy is learned.agent
+    assert isinstance(learned.policy, type(learned.agent.policy))
+    assert learned.policy is not learned.agent.policy  # a copy, which stays the best
 
 
 def test_several_plants_run_side_by_side() -> None:

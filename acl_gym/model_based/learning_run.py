@@ -173,6 +173,7 @@ class LearningRun:
             )
         progress(self._made_before)
         try:
+            self._go_on()
             if asynchronous:
                 self._side_by_side(callback, progress)
             else:
@@ -192,6 +193,22 @@ class LearningRun:
                 f"{self._journal.folder}; run the same again, and it goes on from there."
             )
 
+    def _go_on(self) -> None:
+        """Take up the model and the best policy of a run that was killed.
+
+        So that the plant follows this policy from the first step.
+        """
+        if self._journal is None or self._learned_at < 0 or self._too_few():
+            return
+        self._model = self._fitted(self._recorded(), None)
+        files = self._journal.path(AGENT), self._journal.path(BEST)
+        if files[0].exists():
+            self._improving.restore(*files, self._model)
+        self._runner.policy = self._improving.best
+        if self._improving.best is None:  # its file is gone
+            self._learn()
+            self._keep()
+
     def _in_turn(self, callback: Callback, progress: Callable[[int], Any]) -> None:
         """Plant and colony take turns."""
         for end in self._ends:
@@ -205,7 +222,6 @@ class LearningRun:
             self._keep()
             if callback is not None and callback(self._result(), row) is False:
                 return
-        self._take_over()
 
     def _side_by_side(self, callback: Callback, progress: Callable[[int], Any]) -> None:
         """The plant runs in a thread of its own, and nobody waits."""
@@ -245,14 +261,6 @@ class LearningRun:
         finally:
             stop.set()
             plant.join()
-        self._take_over()
-
-    def _take_over(self) -> None:
-        """Where all was done before the run was killed: the model and the best policy."""
-        if self._model is None:
-            self._learn(0)
-        if self._improving.best is None:  # its file is gone
-            self._learn()
 
     @property
     def _interactions(self) -> int:
@@ -277,31 +285,18 @@ class LearningRun:
             joined = joined + part
         return joined
 
-    def _learn(self, most_steps: int | None = None) -> Row:
+    def _learn(self) -> Row:
         """Fit the model to everything recorded, and let the colony go on in it."""
         began = time.perf_counter()
         recorded = self._recorded()
-        restored = self._learned_at >= 0
         before = 0 if self._data is None else len(self._data)
         self._learned_at = len(recorded) - before
         begin: LearnedDynamics | None = (
             None if self._model is None else self._model.dynamics
         )
-        first = self._model is None
-        with warnings.catch_warnings():
-            # That there are few steps is the point, and from one start a plant without
-            # noise repeats itself.
-            warnings.simplefilter("ignore", DataWarning)
-            self._model = self._fitted(recorded, begin)
-        if first and restored and self._journal is not None:
-            files = self._journal.path(AGENT), self._journal.path(BEST)
-            if files[0].exists():
-                self._improving.restore(*files, self._model)
-        model: LearnedVectorEnv = self._model
+        model = self._model = self._fitted(recorded, begin)
         states = self._compared(model)
-        if most_steps is None:
-            usual = usual_model_steps(model.system.low.size)
-            most_steps = self._model_steps or usual
+        most_steps = self._model_steps or usual_model_steps(model.system.low.size)
         steps = self._improving.improve(model, states, most_steps)
         self._runner.policy = self._improving.best
         self._seconds += time.perf_counter() - began
@@ -312,14 +307,13 @@ class LearningRun:
             "model_cost": float(self._improving.cost),
             "model_steps": steps,
         }
-        if steps:
-            self._history.append(row)
-            logger.info(
-                "%d interactions: %r; the best policy costs %.4g in the model.",
-                self._interactions,
-                model.dynamics,
-                row["model_cost"],
-            )
+        self._history.append(row)
+        logger.info(
+            "%d interactions: %r; the best policy costs %.4g in the model.",
+            self._interactions,
+            model.dynamics,
+            row["model_cost"],
+        )
         return row
 
     def _compared(self, model: LearnedVectorEnv) -> FloatArray:
@@ -348,7 +342,11 @@ class LearningRun:
             arguments["initial"] = "anywhere"
         else:
             arguments["initial"] = self._initial
-        return LearnedVectorEnv(recorded, ANTS, **arguments)
+        with warnings.catch_warnings():
+            # That there are few steps is the point, and from one start a plant without
+            # noise repeats itself.
+            warnings.simplefilter("ignore", DataWarning)
+            return LearnedVectorEnv(recorded, ANTS, **arguments)
 
     def _result(self) -> PlantLearning:
         improving = self._improving

@@ -18,6 +18,7 @@ from gymnasium.vector import SyncVectorEnv
 from acl_gym import (
     ACL,
     PlantLearning,
+    QLearning,
     ReturningACL,
     Transitions,
     VectorEnvAdapter,
@@ -334,6 +335,43 @@ class TestFolder:
         for name in ("agent.npz", "best.npz"):
             (tmp_path / name).unlink()
         assert self.run(tmp_path, interactions=10).policy is not None
+
+    @pytest.mark.parametrize("asynchronous", [False, True])
+    def test_a_run_that_goes_on_follows_its_best_policy_at_once(
+        self, tmp_path: Path, asynchronous: bool
+    ) -> None:
+        """Not only from the end of its next round on."""
+
+        class Failing(gym.Wrapper[Any, Any, Any, Any]):
+            left = 22
+
+            def step(self, action: Any) -> Any:
+                self.left -= 1
+                if self.left < 0:
+                    raise ConnectionError("the fuse has blown")
+                return self.env.step(action)
+
+        def learn(env: Any, **more: Any) -> Any:
+            return learn_from_plant(
+                env,
+                interactions=60,
+                rounds=[20],
+                explore=0.0,
+                folder=tmp_path,
+                seed=0,
+                **{**QUICK, **more},
+            )
+
+        with pytest.raises(ConnectionError):
+            learn(Failing(pendulum()))
+        best = QLearning.load(tmp_path / "best.npz").policy
+        learn(pendulum(), asynchronous=asynchronous)
+        # A thread follows it until the first round ends, which takes longer than a step.
+        rows = np.array(self.rows(tmp_path), dtype=float)[22:]
+        rows = rows[:8] if asynchronous else rows
+        torques = np.array([-0.8, 0.0, 0.8])
+        actions, _ = best.predict(rows[:, 1:3])
+        np.testing.assert_array_equal(rows[:, 3], torques[actions])
 
     def test_another_plant_is_refused(self, tmp_path: Path) -> None:
         self.run(tmp_path, interactions=10)

@@ -126,8 +126,10 @@ class Improving:
         if isinstance(self.agent, TabularAgent):
             return self.agent.policy.copy()
         # What chooses the actions, without what learning needs, such as a large memory.
-        policy = getattr(self.agent, "policy", None)
-        chooser = policy if callable(getattr(policy, "predict", None)) else self.agent
+        policy: Any = getattr(self.agent, "policy", None)
+        chooser: Any = (
+            policy if callable(getattr(policy, "predict", None)) else self.agent
+        )
         try:
             # Copies walk in no model, so they may share it.
             copied: Predictor = copy.deepcopy(chooser, {id(self._model): self._model})

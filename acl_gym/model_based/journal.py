@@ -17,7 +17,6 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from acl_gym.envs.learned import Transitions
 from acl_gym.envs.learned.description import described_by
 from acl_gym.model_based.arguments import action_space_of
 from acl_gym.utils import validation
@@ -55,7 +54,7 @@ class Journal:
             has said what numbered ones set.
 
     Attributes:
-        transitions: what the file held; None if it is new.
+        arrays: what the file held, arguments of `Transitions`; None if it is new.
 
     Raises:
         ValueError: the folder holds another run.
@@ -78,10 +77,9 @@ class Journal:
         numbered = isinstance(action_space_of(env), spaces.Discrete)
         facts = described_by(env, values if numbered else None)
         self._size, self._n_inputs = facts.pop("size"), facts.pop("n_inputs")
-        self._facts = facts if values is None else {**facts, "values": values}
         settings = {**settings, "plant": _plain(facts)}
         self._check(settings)
-        self.transitions, self._runs = self._read()
+        self.arrays, self._runs = self._read()
         self._file: IO[str] | None = None  # opened with the first step
 
     def close(self) -> None:
@@ -163,7 +161,7 @@ class Journal:
                 "to go on."
             )
 
-    def _read(self) -> tuple[Transitions | None, int]:
+    def _read(self) -> tuple[dict[str, NDArray[Any]] | None, int]:
         """What was written until now, without a line that was not completed."""
         path = self.folder / DATA
         if not path.exists():
@@ -186,15 +184,14 @@ class Journal:
         ends = np.cumsum([1, self._size, self._n_inputs, self._size, 1])
         run, states, inputs, after, rewards, ended = np.split(table, ends, axis=1)
         order = np.argsort(run[:, 0], kind="stable")
-        found = Transitions(
-            states[order],
-            inputs[order],
-            after[order],
-            rewards[order, 0],
-            ended[order, 0],
-            episodes=run[order, 0].astype(np.int64),
-            **self._facts,
-        )
+        found = {
+            "states": states[order],
+            "inputs": inputs[order],
+            "next_states": after[order],
+            "rewards": rewards[order, 0],
+            "terminated": ended[order, 0],
+            "episodes": run[order, 0].astype(np.int64),
+        }
         return found, int(run.max()) + 1
 
     def _table(self, path: Path, rows: list[list[str]]) -> NDArray[np.float64]:

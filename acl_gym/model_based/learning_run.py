@@ -23,6 +23,7 @@ from acl_gym.envs.learned import (
 from acl_gym.envs.learned.regression import LEAST_STEPS
 from acl_gym.envs.learned.system import LearnedSystem
 from acl_gym.model_based.arguments import (
+    check_actions,
     check_plant,
     episode_steps,
     inputs_of_actions,
@@ -32,6 +33,7 @@ from acl_gym.model_based.arguments import (
 )
 from acl_gym.model_based.improving import Improving
 from acl_gym.model_based.journal import AGENT, BEST, Journal, State
+from acl_gym.model_based.plant_facts import arrays_of, facts_of_plant, joined
 from acl_gym.model_based.plant_runner import PlantRunner
 from acl_gym.model_based.result import PlantLearning
 from acl_gym.partitions.around_goal import partition_around_goal
@@ -75,6 +77,7 @@ class LearningRun:
         model: dict[str, Any] | None,
         model_steps: int | None,
         data: Transitions | None,
+        circular: Any,
         folder: str | os.PathLike[str] | None,
         seed: int | None,
     ) -> None:
@@ -114,10 +117,19 @@ class LearningRun:
                 f'{{"pessimism": 1.0}}, got {validation.shown(model)}.'
             )
         self._arguments = dict(model or {})
+        if "inputs" in self._arguments:
+            raise ValueError(
+                "model must not hold inputs, since plant and model must have the same "
+                "actions; give inputs= of learn_from_plant."
+            )
         self._steps = episode_steps(env, max_episode_steps)
         values = inputs_of_actions(env, inputs)
+        self._facts = facts_of_plant(env, values, circular, data)
+        if data is not None:
+            joined([arrays_of(data)], self._facts)  # fails now, before the plant moves
+        check_actions(agent, env, values)
         self._journal: Journal | None = None
-        self._before: Transitions | None = None
+        self._before: dict[str, Any] | None = None
         if folder is not None:
             settings = {
                 "explore": explore,
@@ -125,10 +137,11 @@ class LearningRun:
                 "restart_after": restart_after,
                 "seed": seed,
                 "inputs": None if values is None else values.tolist(),
+                "circular": None if circular is None else [*self._facts["circular"]],
             }
             self._journal = Journal(folder, settings, env, values)
-            self._before = self._journal.transitions
-        made = 0 if self._before is None else len(self._before)
+            self._before = self._journal.arrays
+        made = 0 if self._before is None else len(self._before["states"])
         self._runner = PlantRunner(
             env,
             inputs=values,
@@ -272,18 +285,12 @@ class LearningRun:
 
     def _recorded(self) -> Transitions:
         """Everything that is known of the plant."""
-        parts = [self._data, self._before]
+        parts = [] if self._data is None else [arrays_of(self._data)]
+        if self._before is not None:
+            parts.append(self._before)
         if self._runner.steps:
-            parts.append(self._runner.transitions())
-        there = [part for part in parts if part is not None]
-        if not there:
-            raise ValueError(
-                f"at least {LEAST_STEPS} interactions are needed to learn from, got 0."
-            )
-        joined = there[0]
-        for part in there[1:]:
-            joined = joined + part
-        return joined
+            parts.append(self._runner.arrays())
+        return joined(parts, self._facts)
 
     def _learn(self) -> Row:
         """Fit the model to everything recorded, and let the colony go on in it."""

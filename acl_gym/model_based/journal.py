@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import IO, Any, NamedTuple
 
 import numpy as np
+from filelock import FileLock, Timeout
 from gymnasium import spaces
 from numpy.typing import NDArray
 
@@ -25,6 +26,7 @@ from acl_gym.utils.typing import Row
 
 DATA, SETTINGS = "transitions.csv", "run.json"
 AGENT, BEST = "agent.npz", "best.npz"
+LOCK = "running.lock"
 
 _STATE, _VERSION = "state.json", 1
 
@@ -57,7 +59,7 @@ class Journal:
         arrays: what the file held, arguments of `Transitions`; None if it is new.
 
     Raises:
-        ValueError: the folder holds another run.
+        ValueError: the folder holds another run, or one that is running.
         OSError: it cannot be written.
     """
 
@@ -74,18 +76,41 @@ class Journal:
                 f"folder must be a folder or a new name, got the file {self.folder}."
             )
         self.folder.mkdir(parents=True, exist_ok=True)
+        # Released by the operating system when the process ends, however it does.
+        self._lock = FileLock(self.folder / LOCK)
+        try:
+            self._lock.acquire(timeout=0)
+        except Timeout as error:
+            raise ValueError(
+                f"{self.folder} must be used by one run at a time, got another one that "
+                "writes there now; wait for its end, or give another folder."
+            ) from error
+        self._file: IO[str] | None = None  # opened with the first step
+        try:
+            self._open(settings, env, values)
+        except BaseException:
+            self.close()
+            raise
+
+    def _open(
+        self,
+        settings: dict[str, Any],
+        env: Any,
+        values: NDArray[np.float64] | None,
+    ) -> None:
+        """Compare the settings, and read what was written; see the class."""
         numbered = isinstance(action_space_of(env), spaces.Discrete)
         facts = described_by(env, values if numbered else None)
         self._size, self._n_inputs = facts.pop("size"), facts.pop("n_inputs")
         settings = {**settings, "plant": _plain(facts)}
         self._check(settings)
         self.arrays, self._runs = self._read()
-        self._file: IO[str] | None = None  # opened with the first step
 
     def close(self) -> None:
-        """Close the file."""
+        """Close the file, and let others write in the folder."""
         if self._file is not None:
             self._file.close()
+        self._lock.release()
 
     def path(self, name: str) -> Path:
         """A file of the run."""

@@ -142,26 +142,30 @@ class LearningRun:
             self._journal = Journal(folder, settings, env, values)
             self._before = self._journal.arrays
         made = 0 if self._before is None else len(self._before["states"])
-        self._runner = PlantRunner(
-            env,
-            inputs=values,
-            explore=explore,
-            hold=hold,
-            restart_after=restart_after,
-            # A run that goes on does not repeat the numbers of its beginning.
-            seed=None if seed is None else seed + made,
-        )
-        self._made_before = made
-        self._improving = Improving(
-            default_agent(seed) if agent is None else agent,
-            None if self._journal is None else self._journal.path(BEST),
-        )
-        self._model: LearnedVectorEnv | None = None
-        state = None if self._journal is None else self._journal.kept_state()
-        self._learned_at, self._seconds, self._history = state or State(-1, 0.0, [])
+        try:
+            self._runner = PlantRunner(
+                env,
+                inputs=values,
+                explore=explore,
+                hold=hold,
+                restart_after=restart_after,
+                # A run that goes on does not repeat the numbers of its beginning.
+                seed=None if seed is None else seed + made,
+            )
+            self._made_before = made
+            self._improving = Improving(
+                default_agent(seed) if agent is None else agent,
+                None if self._journal is None else self._journal.path(BEST),
+            )
+            self._model: LearnedVectorEnv | None = None
+            state = None if self._journal is None else self._journal.kept_state()
+            self._learned_at, self._seconds, self._history = state or State(-1, 0.0, [])
+        except BaseException:
+            self.close()  # lets others use the folder
+            raise
 
     def close(self) -> None:
-        """Close the file of interactions."""
+        """Close the file of interactions, and let others use the folder."""
         if self._journal is not None:
             self._journal.close()
 

@@ -104,7 +104,7 @@ def learn_from_plant(
         folder: where every interaction is written down as soon as it was made, and the
             agent after each round. A call with the same arguments goes on with a run
             that was killed, or in which the plant has raised an error: no interaction is
-            lost, and none is made twice.
+            lost, and none is made twice. One run at a time may use it.
         asynchronous: let the plant run in a thread of its own, at its own pace, with
             whatever policy is the best at the moment, while the colony learns from what
             was recorded so far and waits for nothing. For a plant whose steps take time;

@@ -384,6 +384,52 @@ class TestFolder:
                 **QUICK,
             )
 
+    def test_one_run_at_a_time_uses_a_folder(self, tmp_path: Path) -> None:
+        """Another process is refused while one learns, and not after it is killed."""
+        program = f"""
+import sys, time
+sys.path.insert(0, {str(Path(__file__).parents[2])!r})
+import gymnasium as gym
+from acl_gym import learn_from_plant
+from tests.model_based.plants import QUICK, pendulum
+
+class Waiting(gym.Wrapper):
+    left = 12
+
+    def step(self, action):
+        self.left -= 1
+        if not self.left:
+            print("waits", flush=True)
+            time.sleep(300)
+        return self.env.step(action)
+
+learn_from_plant(Waiting(pendulum()), interactions=40, rounds=[10, 20, 30],
+                 folder={str(tmp_path)!r}, seed=0, **QUICK)
+"""
+        with subprocess.Popen(
+            [sys.executable, "-c", program], stdout=subprocess.PIPE, text=True
+        ) as process:
+            assert process.stdout is not None
+            assert process.stdout.readline() == "waits\n"
+            kept = self.rows(tmp_path)
+            with pytest.raises(ValueError, match="used by one run at a time"):
+                self.run(tmp_path)
+            assert self.rows(tmp_path) == kept
+            process.kill()
+        assert len(self.run(tmp_path).transitions) == 40
+        assert self.rows(tmp_path)[: len(kept)] == kept
+
+    def test_a_run_that_is_refused_leaves_the_folder_to_others(
+        self, tmp_path: Path
+    ) -> None:
+        self.run(tmp_path, interactions=10)
+        errors = []  # kept, and with them the objects of the runs that were refused
+        for changed in ({"hold": 4}, {"agent": 3}):
+            with pytest.raises((ValueError, TypeError)) as caught:
+                self.run(tmp_path, **changed)
+            errors.append(caught.value)
+        assert len(self.run(tmp_path, interactions=12).transitions) == 12
+
     def test_a_line_that_is_damaged_is_named(self, tmp_path: Path) -> None:
         self.run(tmp_path, interactions=10)
         lines = (tmp_path / DATA).read_text().splitlines(keepends=True)

@@ -46,10 +46,10 @@ class Starts:
             memory: what has been seen before.
         """
         if self.wide is None:
-            if sum(map(len, self._seen)) >= ENOUGH:
-                self._decide(memory)
-            else:
+            if sum(map(len, self._seen)) < ENOUGH:
                 self._seen.append(observation.copy())
+            elif memory.live_rows().size:  # none are left after the agent has forgotten
+                self._decide(memory)
 
     def steps(self, most: int) -> int:
         """After how many steps ants set out anew.

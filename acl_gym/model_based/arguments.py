@@ -9,6 +9,7 @@ import numpy as np
 from gymnasium import spaces
 from gymnasium.vector import VectorEnv
 
+from acl_gym.agents.base import TabularAgent
 from acl_gym.envs.control.lookup import system_of
 from acl_gym.envs.learned.description import described_by, rows_of_inputs
 from acl_gym.envs.wrappers.action_grid import grid_over
@@ -132,3 +133,22 @@ def inputs_of_actions(env: Any, inputs: Any) -> FloatArray | None:
             f"{validation.shown(inputs)}."
         )
     return array
+
+
+def check_actions(agent: Any, env: Any, values: FloatArray | None) -> None:
+    """Refuse an agent whose table has other actions than the plant, before it moves.
+
+    Args:
+        agent: what `learn_from_plant` was given.
+        env: the plant.
+        values: what each action sets; None where actions are numbered.
+
+    Raises:
+        ValueError: it has.
+    """
+    count = action_space_of(env).n if values is None else len(values)
+    if isinstance(agent, TabularAgent) and agent.n_actions != count:
+        raise ValueError(
+            f"agent must have {count} actions, as the plant has, got {agent.n_actions}; "
+            "give inputs= for its actions, or another agent."
+        )

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import copy
+import logging
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -13,6 +15,8 @@ from acl_gym.envs.learned import LearnedVectorEnv
 from acl_gym.evaluation import evaluate_policy_cost
 from acl_gym.utils import validation
 from acl_gym.utils.typing import FloatArray, Predictor
+
+logger = logging.getLogger("acl_gym")
 
 CHUNKS, LEAST_CHUNK = 15, 4_000
 """Evaluations of the policy in a round that does not end early, and the least steps
@@ -38,7 +42,9 @@ class Improving:
 
     Attributes:
         agent: what learns; None before the first model.
-        best: the best policy in the newest model; None before the first.
+        best: the best policy in the newest model, a copy that no longer changes; None
+            before the first. Of an agent that cannot be copied the agent itself, whose
+            policy is the last one.
         cost: what it costs there.
     """
 
@@ -54,6 +60,7 @@ class Improving:
         self.agent: Any = agent if self._make is None else None
         self._best_file = best_file
         self._model: LearnedVectorEnv | None = None
+        self._warned = False
         self.best: Predictor | None = None
         self.cost = np.inf
 
@@ -89,13 +96,12 @@ class Improving:
             chunk = min(each, most_steps - done)
             self.agent.learn(total_timesteps=chunk)
             done += chunk
-            policy = getattr(self.agent, "policy", None)
-            # A policy of another package changes with its agent; there is no copy.
-            snapshot = policy if isinstance(self.agent, TabularAgent) else self.agent
-            cost = self._cost(snapshot, states)
+            own = isinstance(self.agent, TabularAgent)
+            cost = self._cost(self.agent.policy if own else self.agent, states)
             in_vain = 0 if cost < (1.0 - BETTER) * self.cost else in_vain + chunk
-            if cost <= self.cost or snapshot is self.agent:
-                self.best, self.cost = snapshot, cost
+            # Where the agent itself stands for its policy, the older one is lost.
+            if cost <= self.cost or self.best is self.agent:
+                self.best, self.cost = self._snapshot(), cost
                 if self._best_file is not None and hasattr(self.agent, "save"):
                     self.agent.save(self._best_file)
         return done
@@ -114,6 +120,30 @@ class Improving:
             self._model.set_system(model.system, model.parameters)
             model = self._model
         self._model = model
+
+    def _snapshot(self) -> Predictor:
+        """The policy of the agent as it is now, which no longer changes."""
+        if isinstance(self.agent, TabularAgent):
+            return self.agent.policy.copy()
+        # What chooses the actions, without what learning needs, such as a large memory.
+        policy: Any = getattr(self.agent, "policy", None)
+        chooser: Any = (
+            policy if callable(getattr(policy, "predict", None)) else self.agent
+        )
+        try:
+            # Copies walk in no model, so they may share it.
+            copied: Predictor = copy.deepcopy(chooser, {id(self._model): self._model})
+        except Exception as error:  # whatever an agent of another package does
+            if not self._warned:
+                self._warned = True
+                logger.warning(
+                    "%s cannot be copied (%s), so its last policy is taken in place of "
+                    "its best one.",
+                    type(self.agent).__name__,
+                    error,
+                )
+            return self.agent  # type: ignore[no-any-return]
+        return copied
 
     def _made(self, model: LearnedVectorEnv) -> Any:
         made = self._make(model)  # type: ignore[misc]

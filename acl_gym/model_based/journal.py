@@ -14,10 +14,10 @@ from pathlib import Path
 from typing import IO, Any, NamedTuple
 
 import numpy as np
+from filelock import FileLock, Timeout
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from acl_gym.envs.learned import Transitions
 from acl_gym.envs.learned.description import described_by
 from acl_gym.model_based.arguments import action_space_of
 from acl_gym.utils import validation
@@ -26,6 +26,7 @@ from acl_gym.utils.typing import Row
 
 DATA, SETTINGS = "transitions.csv", "run.json"
 AGENT, BEST = "agent.npz", "best.npz"
+LOCK = "running.lock"
 
 _STATE, _VERSION = "state.json", 1
 
@@ -55,10 +56,10 @@ class Journal:
             has said what numbered ones set.
 
     Attributes:
-        transitions: what the file held; None if it is new.
+        arrays: what the file held, arguments of `Transitions`; None if it is new.
 
     Raises:
-        ValueError: the folder holds another run.
+        ValueError: the folder holds another run, or one that is running.
         OSError: it cannot be written.
     """
 
@@ -75,19 +76,41 @@ class Journal:
                 f"folder must be a folder or a new name, got the file {self.folder}."
             )
         self.folder.mkdir(parents=True, exist_ok=True)
+        # Released by the operating system when the process ends, however it does.
+        self._lock = FileLock(self.folder / LOCK)
+        try:
+            self._lock.acquire(timeout=0)
+        except Timeout as error:
+            raise ValueError(
+                f"{self.folder} must be used by one run at a time, got another one that "
+                "writes there now; wait for its end, or give another folder."
+            ) from error
+        self._file: IO[str] | None = None  # opened with the first step
+        try:
+            self._open(settings, env, values)
+        except BaseException:
+            self.close()
+            raise
+
+    def _open(
+        self,
+        settings: dict[str, Any],
+        env: Any,
+        values: NDArray[np.float64] | None,
+    ) -> None:
+        """Compare the settings, and read what was written; see the class."""
         numbered = isinstance(action_space_of(env), spaces.Discrete)
         facts = described_by(env, values if numbered else None)
         self._size, self._n_inputs = facts.pop("size"), facts.pop("n_inputs")
-        self._facts = facts if values is None else {**facts, "values": values}
         settings = {**settings, "plant": _plain(facts)}
         self._check(settings)
-        self.transitions, self._runs = self._read()
-        self._file: IO[str] | None = None  # opened with the first step
+        self.arrays, self._runs = self._read()
 
     def close(self) -> None:
-        """Close the file."""
+        """Close the file, and let others write in the folder."""
         if self._file is not None:
             self._file.close()
+        self._lock.release()
 
     def path(self, name: str) -> Path:
         """A file of the run."""
@@ -163,7 +186,7 @@ class Journal:
                 "to go on."
             )
 
-    def _read(self) -> tuple[Transitions | None, int]:
+    def _read(self) -> tuple[dict[str, NDArray[Any]] | None, int]:
         """What was written until now, without a line that was not completed."""
         path = self.folder / DATA
         if not path.exists():
@@ -186,15 +209,14 @@ class Journal:
         ends = np.cumsum([1, self._size, self._n_inputs, self._size, 1])
         run, states, inputs, after, rewards, ended = np.split(table, ends, axis=1)
         order = np.argsort(run[:, 0], kind="stable")
-        found = Transitions(
-            states[order],
-            inputs[order],
-            after[order],
-            rewards[order, 0],
-            ended[order, 0],
-            episodes=run[order, 0].astype(np.int64),
-            **self._facts,
-        )
+        found = {
+            "states": states[order],
+            "inputs": inputs[order],
+            "next_states": after[order],
+            "rewards": rewards[order, 0],
+            "terminated": ended[order, 0],
+            "episodes": run[order, 0].astype(np.int64),
+        }
         return found, int(run.max()) + 1
 
     def _table(self, path: Path, rows: list[list[str]]) -> NDArray[np.float64]:

@@ -23,6 +23,7 @@ from acl_gym.envs.learned import (
 from acl_gym.envs.learned.regression import LEAST_STEPS
 from acl_gym.envs.learned.system import LearnedSystem
 from acl_gym.model_based.arguments import (
+    check_actions,
     check_plant,
     episode_steps,
     inputs_of_actions,
@@ -32,6 +33,7 @@ from acl_gym.model_based.arguments import (
 )
 from acl_gym.model_based.improving import Improving
 from acl_gym.model_based.journal import AGENT, BEST, Journal, State
+from acl_gym.model_based.plant_facts import arrays_of, facts_of_plant, joined
 from acl_gym.model_based.plant_runner import PlantRunner
 from acl_gym.model_based.result import PlantLearning
 from acl_gym.partitions.around_goal import partition_around_goal
@@ -75,6 +77,7 @@ class LearningRun:
         model: dict[str, Any] | None,
         model_steps: int | None,
         data: Transitions | None,
+        circular: Any,
         folder: str | os.PathLike[str] | None,
         seed: int | None,
     ) -> None:
@@ -114,10 +117,19 @@ class LearningRun:
                 f'{{"pessimism": 1.0}}, got {validation.shown(model)}.'
             )
         self._arguments = dict(model or {})
+        if "inputs" in self._arguments:
+            raise ValueError(
+                "model must not hold inputs, since plant and model must have the same "
+                "actions; give inputs= of learn_from_plant."
+            )
         self._steps = episode_steps(env, max_episode_steps)
         values = inputs_of_actions(env, inputs)
+        self._facts = facts_of_plant(env, values, circular, data)
+        if data is not None:
+            joined([arrays_of(data)], self._facts)  # fails now, before the plant moves
+        check_actions(agent, env, values)
         self._journal: Journal | None = None
-        self._before: Transitions | None = None
+        self._before: dict[str, Any] | None = None
         if folder is not None:
             settings = {
                 "explore": explore,
@@ -125,30 +137,35 @@ class LearningRun:
                 "restart_after": restart_after,
                 "seed": seed,
                 "inputs": None if values is None else values.tolist(),
+                "circular": None if circular is None else [*self._facts["circular"]],
             }
             self._journal = Journal(folder, settings, env, values)
-            self._before = self._journal.transitions
-        made = 0 if self._before is None else len(self._before)
-        self._runner = PlantRunner(
-            env,
-            inputs=values,
-            explore=explore,
-            hold=hold,
-            restart_after=restart_after,
-            # A run that goes on does not repeat the numbers of its beginning.
-            seed=None if seed is None else seed + made,
-        )
-        self._made_before = made
-        self._improving = Improving(
-            default_agent(seed) if agent is None else agent,
-            None if self._journal is None else self._journal.path(BEST),
-        )
-        self._model: LearnedVectorEnv | None = None
-        state = None if self._journal is None else self._journal.kept_state()
-        self._learned_at, self._seconds, self._history = state or State(-1, 0.0, [])
+            self._before = self._journal.arrays
+        made = 0 if self._before is None else len(self._before["states"])
+        try:
+            self._runner = PlantRunner(
+                env,
+                inputs=values,
+                explore=explore,
+                hold=hold,
+                restart_after=restart_after,
+                # A run that goes on does not repeat the numbers of its beginning.
+                seed=None if seed is None else seed + made,
+            )
+            self._made_before = made
+            self._improving = Improving(
+                default_agent(seed) if agent is None else agent,
+                None if self._journal is None else self._journal.path(BEST),
+            )
+            self._model: LearnedVectorEnv | None = None
+            state = None if self._journal is None else self._journal.kept_state()
+            self._learned_at, self._seconds, self._history = state or State(-1, 0.0, [])
+        except BaseException:
+            self.close()  # lets others use the folder
+            raise
 
     def close(self) -> None:
-        """Close the file of interactions."""
+        """Close the file of interactions, and let others use the folder."""
         if self._journal is not None:
             self._journal.close()
 
@@ -173,6 +190,7 @@ class LearningRun:
             )
         progress(self._made_before)
         try:
+            self._go_on()
             if asynchronous:
                 self._side_by_side(callback, progress)
             else:
@@ -192,6 +210,22 @@ class LearningRun:
                 f"{self._journal.folder}; run the same again, and it goes on from there."
             )
 
+    def _go_on(self) -> None:
+        """Take up the model and the best policy of a run that was killed.
+
+        So that the plant follows this policy from the first step.
+        """
+        if self._journal is None or self._learned_at < 0 or self._too_few():
+            return
+        self._model = self._fitted(self._recorded(), None)
+        files = self._journal.path(AGENT), self._journal.path(BEST)
+        if files[0].exists():
+            self._improving.restore(*files, self._model)
+        self._runner.policy = self._improving.best
+        if self._improving.best is None:  # its file is gone
+            self._learn()
+            self._keep()
+
     def _in_turn(self, callback: Callback, progress: Callable[[int], Any]) -> None:
         """Plant and colony take turns."""
         for end in self._ends:
@@ -205,7 +239,6 @@ class LearningRun:
             self._keep()
             if callback is not None and callback(self._result(), row) is False:
                 return
-        self._take_over()
 
     def _side_by_side(self, callback: Callback, progress: Callable[[int], Any]) -> None:
         """The plant runs in a thread of its own, and nobody waits."""
@@ -245,14 +278,6 @@ class LearningRun:
         finally:
             stop.set()
             plant.join()
-        self._take_over()
-
-    def _take_over(self) -> None:
-        """Where all was done before the run was killed: the model and the best policy."""
-        if self._model is None:
-            self._learn(0)
-        if self._improving.best is None:  # its file is gone
-            self._learn()
 
     @property
     def _interactions(self) -> int:
@@ -264,44 +289,25 @@ class LearningRun:
 
     def _recorded(self) -> Transitions:
         """Everything that is known of the plant."""
-        parts = [self._data, self._before]
+        parts = [] if self._data is None else [arrays_of(self._data)]
+        if self._before is not None:
+            parts.append(self._before)
         if self._runner.steps:
-            parts.append(self._runner.transitions())
-        there = [part for part in parts if part is not None]
-        if not there:
-            raise ValueError(
-                f"at least {LEAST_STEPS} interactions are needed to learn from, got 0."
-            )
-        joined = there[0]
-        for part in there[1:]:
-            joined = joined + part
-        return joined
+            parts.append(self._runner.arrays())
+        return joined(parts, self._facts)
 
-    def _learn(self, most_steps: int | None = None) -> Row:
+    def _learn(self) -> Row:
         """Fit the model to everything recorded, and let the colony go on in it."""
         began = time.perf_counter()
         recorded = self._recorded()
-        restored = self._learned_at >= 0
         before = 0 if self._data is None else len(self._data)
         self._learned_at = len(recorded) - before
         begin: LearnedDynamics | None = (
             None if self._model is None else self._model.dynamics
         )
-        first = self._model is None
-        with warnings.catch_warnings():
-            # That there are few steps is the point, and from one start a plant without
-            # noise repeats itself.
-            warnings.simplefilter("ignore", DataWarning)
-            self._model = self._fitted(recorded, begin)
-        if first and restored and self._journal is not None:
-            files = self._journal.path(AGENT), self._journal.path(BEST)
-            if files[0].exists():
-                self._improving.restore(*files, self._model)
-        model: LearnedVectorEnv = self._model
+        model = self._model = self._fitted(recorded, begin)
         states = self._compared(model)
-        if most_steps is None:
-            usual = usual_model_steps(model.system.low.size)
-            most_steps = self._model_steps or usual
+        most_steps = self._model_steps or usual_model_steps(model.system.low.size)
         steps = self._improving.improve(model, states, most_steps)
         self._runner.policy = self._improving.best
         self._seconds += time.perf_counter() - began
@@ -312,14 +318,13 @@ class LearningRun:
             "model_cost": float(self._improving.cost),
             "model_steps": steps,
         }
-        if steps:
-            self._history.append(row)
-            logger.info(
-                "%d interactions: %r; the best policy costs %.4g in the model.",
-                self._interactions,
-                model.dynamics,
-                row["model_cost"],
-            )
+        self._history.append(row)
+        logger.info(
+            "%d interactions: %r; the best policy costs %.4g in the model.",
+            self._interactions,
+            model.dynamics,
+            row["model_cost"],
+        )
         return row
 
     def _compared(self, model: LearnedVectorEnv) -> FloatArray:
@@ -348,7 +353,11 @@ class LearningRun:
             arguments["initial"] = "anywhere"
         else:
             arguments["initial"] = self._initial
-        return LearnedVectorEnv(recorded, ANTS, **arguments)
+        with warnings.catch_warnings():
+            # That there are few steps is the point, and from one start a plant without
+            # noise repeats itself.
+            warnings.simplefilter("ignore", DataWarning)
+            return LearnedVectorEnv(recorded, ANTS, **arguments)
 
     def _result(self) -> PlantLearning:
         improving = self._improving

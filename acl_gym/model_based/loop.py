@@ -33,6 +33,7 @@ def learn_from_plant(
     model: dict[str, Any] | None = None,
     model_steps: int | None = None,
     data: Transitions | None = None,
+    circular: Any = None,
     folder: str | os.PathLike[str] | None = None,
     asynchronous: bool = False,
     callback: Callable[[PlantLearning, Row], Any] | None = None,
@@ -59,7 +60,10 @@ def learn_from_plant(
         agent: what learns in the model: None takes a `ReturningACL`; an agent of this
             package, which then changes its environment; or a function of the model (a
             vector environment) that returns anything with `learn(total_timesteps=)` and
-            `predict`, such as an agent of Stable-Baselines3 over a `VectorEnvAdapter`.
+            `predict`, such as an agent of Stable-Baselines3 over a `VectorEnvAdapter`. Its
+            best policy is kept as a deep copy of what chooses actions: its attribute
+            `policy` if that has `predict`, else the agent. Of an agent that cannot be
+            copied the last policy is taken, with a warning on the log.
         interactions: steps of the plant, of all slots together, >= 1; with `data` also
             0, to learn from what was recorded before and nothing else.
         rounds: after how many interactions the colony learns: a number of rounds of
@@ -89,11 +93,18 @@ def learn_from_plant(
             but at most 300,000. A round ends earlier if two fifths of them brought no
             better policy.
         data: what was recorded of this plant before. The colony learns from it before
-            the first interaction.
+            the first interaction. Its variables and inputs must be those of `env`, in the
+            same order and units, with the same sampling time. Its inputs need not be
+            those of the actions. Names, the sampling time, bounds and circular variables
+            are taken from it where `env` does not tell them.
+        circular: names or numbers of the variables that wrap around, such as an angle
+            that jumps from pi to -pi, beside those of which `env` tells. They wrap around
+            at the ends of the Box of observations; where it has none, at those of `data`,
+            or else at -pi and pi. An angle shown as cosine and sine needs no word.
         folder: where every interaction is written down as soon as it was made, and the
             agent after each round. A call with the same arguments goes on with a run
             that was killed, or in which the plant has raised an error: no interaction is
-            lost, and none is made twice.
+            lost, and none is made twice. One run at a time may use it.
         asynchronous: let the plant run in a thread of its own, at its own pace, with
             whatever policy is the best at the moment, while the colony learns from what
             was recorded so far and waits for nothing. For a plant whose steps take time;
@@ -108,7 +119,8 @@ def learn_from_plant(
 
     Raises:
         TypeError: the environment, the agent or an argument is of the wrong kind.
-        ValueError: an argument is out of range, or the folder holds another run.
+        ValueError: an argument is out of range, `data` is of another plant, or the folder
+            holds another run.
     """
     asynchronous = validation.boolean("asynchronous", asynchronous)
     progress_bar = validation.boolean("progress_bar", progress_bar)
@@ -127,6 +139,7 @@ def learn_from_plant(
         model=model,
         model_steps=model_steps,
         data=data,
+        circular=circular,
         folder=folder,
         seed=seed,
     )

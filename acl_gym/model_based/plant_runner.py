@@ -8,7 +8,6 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from acl_gym.envs.learned import Transitions
 from acl_gym.envs.learned.recorder import Recorder
 from acl_gym.model_based.arguments import action_space_of
 from acl_gym.model_based.journal import Journal
@@ -84,12 +83,9 @@ class PlantRunner:
         self._since[ended] = 0
         self._held[ended] = 0
 
-    def transitions(self) -> Transitions:
-        """Everything that was recorded."""
-        facts: dict[str, Any] = {**self._recorder.facts, **self._recorder.arrays()}
-        if self._inputs is not None:
-            facts["values"] = self._inputs
-        return Transitions(**facts)
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        """Everything that was recorded, arguments of `Transitions`."""
+        return self._recorder.arrays()
 
     def _chosen(self, observation: NDArray[Any]) -> IntArray:
         """The number of the action of each slot, `(num_envs,)`."""

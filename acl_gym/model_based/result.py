@@ -14,8 +14,9 @@ class PlantLearning:
     """What `learn_from_plant` has found.
 
     Attributes:
-        policy: the best policy in the newest model; `predict` gives numbers of actions,
-            counted from 0.
+        policy: the best policy in the newest model, a copy that does not change when the
+            agent goes on; `predict` gives numbers of actions, counted from 0. Of an agent
+            of another package that cannot be copied it is the agent itself.
         agent: what learned it, as it is at the end.
         model: the newest model, in which it learned.
         transitions: everything that was recorded.

@@ -21,6 +21,7 @@ from acl_gym import (
     WaitingVectorEnv,
     evaluate_policy_cost,
 )
+from acl_gym.colony.starts import ENOUGH
 from acl_gym.partitions import Partition
 
 J_STAR = 38.4  # of the pendulum, by value iteration on a fine grid
@@ -447,6 +448,17 @@ def test_what_is_forgotten_is_gone_and_what_was_learned_stays() -> None:
     colony.learn(total_timesteps=600)
     assert 0 < colony.remembered_steps <= 900  # whole trials
     assert colony.num_timesteps > 3_000
+
+
+def test_starts_are_compared_once_something_is_remembered_again() -> None:
+    """Enough starts have been seen when the colony forgets all states."""
+    env = gym.make_vec("acl_gym/Pendulum-v0", num_envs=ENOUGH)
+    colony = ReturningACL(env, seed=0).learn(trials=1)
+    colony.forget()
+    colony.learn(trials=1)  # nothing to compare with
+    assert colony._starts.wide is None
+    colony.learn(trials=1)
+    assert colony._starts.wide is not None
 
 
 @pytest.mark.parametrize(("keep", "error"), [(-1, ValueError), (1.5, TypeError)])

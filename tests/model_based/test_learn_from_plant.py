@@ -18,6 +18,7 @@ from gymnasium.vector import SyncVectorEnv
 from acl_gym import (
     ACL,
     PlantLearning,
+    QLearning,
     ReturningACL,
     Transitions,
     VectorEnvAdapter,
@@ -90,7 +91,8 @@ def test_an_agent_of_stable_baselines_learns_in_the_model() -> None:
     )
     assert isinstance(learned.agent, A2C)
     assert len(learned.history) == 2
-    assert learned.policy is learned.agent
+    assert isinstance(learned.policy, type(learned.agent.policy))
+    assert learned.policy is not learned.agent.policy  # a copy, which stays the best
 
 
 def test_several_plants_run_side_by_side() -> None:
@@ -334,6 +336,43 @@ class TestFolder:
             (tmp_path / name).unlink()
         assert self.run(tmp_path, interactions=10).policy is not None
 
+    @pytest.mark.parametrize("asynchronous", [False, True])
+    def test_a_run_that_goes_on_follows_its_best_policy_at_once(
+        self, tmp_path: Path, asynchronous: bool
+    ) -> None:
+        """Not only from the end of its next round on."""
+
+        class Failing(gym.Wrapper[Any, Any, Any, Any]):
+            left = 22
+
+            def step(self, action: Any) -> Any:
+                self.left -= 1
+                if self.left < 0:
+                    raise ConnectionError("the fuse has blown")
+                return self.env.step(action)
+
+        def learn(env: Any, **more: Any) -> Any:
+            return learn_from_plant(
+                env,
+                interactions=60,
+                rounds=[20],
+                explore=0.0,
+                folder=tmp_path,
+                seed=0,
+                **{**QUICK, **more},
+            )
+
+        with pytest.raises(ConnectionError):
+            learn(Failing(pendulum()))
+        best = QLearning.load(tmp_path / "best.npz").policy
+        learn(pendulum(), asynchronous=asynchronous)
+        # A thread follows it until the first round ends, which takes longer than a step.
+        rows = np.array(self.rows(tmp_path), dtype=float)[22:]
+        rows = rows[:8] if asynchronous else rows
+        torques = np.array([-0.8, 0.0, 0.8])
+        actions, _ = best.predict(rows[:, 1:3])
+        np.testing.assert_array_equal(rows[:, 3], torques[actions])
+
     def test_another_plant_is_refused(self, tmp_path: Path) -> None:
         self.run(tmp_path, interactions=10)
         with pytest.raises(ValueError, match="holds another run, with plant"):
@@ -344,6 +383,52 @@ class TestFolder:
                 seed=0,
                 **QUICK,
             )
+
+    def test_one_run_at_a_time_uses_a_folder(self, tmp_path: Path) -> None:
+        """Another process is refused while one learns, and not after it is killed."""
+        program = f"""
+import sys, time
+sys.path.insert(0, {str(Path(__file__).parents[2])!r})
+import gymnasium as gym
+from acl_gym import learn_from_plant
+from tests.model_based.plants import QUICK, pendulum
+
+class Waiting(gym.Wrapper):
+    left = 12
+
+    def step(self, action):
+        self.left -= 1
+        if not self.left:
+            print("waits", flush=True)
+            time.sleep(300)
+        return self.env.step(action)
+
+learn_from_plant(Waiting(pendulum()), interactions=40, rounds=[10, 20, 30],
+                 folder={str(tmp_path)!r}, seed=0, **QUICK)
+"""
+        with subprocess.Popen(
+            [sys.executable, "-c", program], stdout=subprocess.PIPE, text=True
+        ) as process:
+            assert process.stdout is not None
+            assert process.stdout.readline() == "waits\n"
+            kept = self.rows(tmp_path)
+            with pytest.raises(ValueError, match="used by one run at a time"):
+                self.run(tmp_path)
+            assert self.rows(tmp_path) == kept
+            process.kill()
+        assert len(self.run(tmp_path).transitions) == 40
+        assert self.rows(tmp_path)[: len(kept)] == kept
+
+    def test_a_run_that_is_refused_leaves_the_folder_to_others(
+        self, tmp_path: Path
+    ) -> None:
+        self.run(tmp_path, interactions=10)
+        errors = []  # kept, and with them the objects of the runs that were refused
+        for changed in ({"hold": 4}, {"agent": 3}):
+            with pytest.raises((ValueError, TypeError)) as caught:
+                self.run(tmp_path, **changed)
+            errors.append(caught.value)
+        assert len(self.run(tmp_path, interactions=12).transitions) == 12
 
     def test_a_line_that_is_damaged_is_named(self, tmp_path: Path) -> None:
         self.run(tmp_path, interactions=10)

@@ -1,0 +1,127 @@
+"""Learning in a model until the policy no longer becomes better, and keeping the best."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from acl_gym import (
+    LearnedVectorEnv,
+    QLearning,
+    Transitions,
+    VectorEnvAdapter,
+    evaluate_policy_cost,
+)
+from acl_gym.model_based.improving import LEAST_CHUNK, Improving
+from tests.model_based.plants import pendulum
+
+STATES = np.random.default_rng(0).uniform([-3.0, -8.0], [3.0, 8.0], (50, 2))
+
+
+@pytest.fixture(scope="module")
+def model() -> LearnedVectorEnv:
+    return LearnedVectorEnv(
+        Transitions.record(pendulum(), 100, hold=3, seed=0),
+        20,
+        goal=[np.pi, 0.0],
+        tolerance=[0.1, 0.1],
+        cost=([1.0, 0.1], 0.05),
+    )
+
+
+class Turning:
+    """An agent of another package: its actions are worse after the second chunk."""
+
+    def __init__(self, env: Any) -> None:
+        self.env = env
+        self.chunks = 0
+
+    def learn(self, total_timesteps: int) -> None:
+        self.chunks += 1
+
+    def predict(self, observation: Any, **how: Any) -> Any:
+        # Pushing with the motion swings the pendulum up, no torque does not.
+        pushing = np.where(observation[:, 1] > 0, 2, 0)
+        return (pushing if self.chunks == 2 else np.ones_like(pushing)), None
+
+
+class Fixed(Turning):
+    """One that cannot be copied."""
+
+    def __deepcopy__(self, memo: Any) -> Any:
+        raise TypeError("it holds a socket")
+
+
+def cost(policy: Any, model: LearnedVectorEnv) -> float:
+    return evaluate_policy_cost(policy, model, STATES).cost
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_the_policy_is_the_best_one_and_no_longer_changes(
+    model: LearnedVectorEnv, tmp_path: Path, seed: int
+) -> None:
+    file = tmp_path / "best.npz"
+    improving = Improving(lambda env: QLearning(env, seed=seed), file)
+    improving.improve(model, STATES, 4 * LEAST_CHUNK)
+    best: Any = improving.best
+    assert not np.shares_memory(best.table, improving.agent.policy.table)
+    kept = QLearning.load(file).policy
+    np.testing.assert_array_equal(best.table, kept.table)
+    before = best.table.copy()
+    improving.agent.learn(total_timesteps=2_000)
+    assert (improving.agent.table != before).any()
+    np.testing.assert_array_equal(best.table, before)
+    assert cost(best, model) == improving.cost == cost(kept, model)
+
+
+def test_the_best_policy_of_an_agent_of_another_package_is_kept(
+    model: LearnedVectorEnv,
+) -> None:
+    improving = Improving(Turning, None)
+    improving.improve(model, STATES, 5 * LEAST_CHUNK)
+    best: Any = improving.best
+    assert improving.agent.chunks > 2
+    assert best.chunks == 2
+    assert best.env is model  # the model itself is not copied
+    assert improving.cost == cost(best, model) < cost(improving.agent, model)
+
+
+def test_an_agent_that_cannot_be_copied_gives_its_last_policy(
+    model: LearnedVectorEnv, caplog: pytest.LogCaptureFixture
+) -> None:
+    improving = Improving(Fixed, None)
+    improving.improve(model, STATES, 5 * LEAST_CHUNK)
+    assert improving.best is improving.agent
+    assert improving.cost == cost(improving.agent, model)
+    (said,) = [r.getMessage() for r in caplog.records]
+    assert "Fixed cannot be copied (it holds a socket)" in said
+
+
+def test_of_an_agent_of_stable_baselines_the_networks_are_kept(
+    model: LearnedVectorEnv,
+) -> None:
+    from stable_baselines3 import DQN
+
+    def make(env: Any) -> Any:
+        return DQN(
+            "MlpPolicy",
+            VectorEnvAdapter(env),
+            learning_starts=10,
+            policy_kwargs={"net_arch": [8]},
+            device="cpu",
+            seed=0,
+        )
+
+    improving = Improving(make, None)
+    improving.improve(model, STATES, 300)
+    best: Any = improving.best
+    assert isinstance(best, type(improving.agent.policy))  # without the replay buffer
+    before = [p.detach().clone() for p in best.parameters()]
+    improving.agent.learn(total_timesteps=300)
+    now = list(improving.agent.policy.parameters())
+    assert any((a != b).any() for a, b in zip(before, now, strict=True))
+    assert all((a == b).all() for a, b in zip(before, best.parameters(), strict=True))
+    assert best.predict(STATES)[0].shape == (50,)

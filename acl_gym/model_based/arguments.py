@@ -27,7 +27,7 @@ VALUES = 5
 """Values of each continuous input, if none are given."""
 
 
-MODEL_STEPS, MOST_MODEL_STEPS = 20_000, 300_000
+MODEL_STEPS, MOST_MODEL_STEPS = 20_000, 150_000
 """Steps in the model in a round: with two variables, and with many."""
 
 

@@ -23,7 +23,8 @@ CHUNKS, LEAST_CHUNK = 15, 4_000
 between two of them."""
 
 PATIENCE = 0.4
-"""The share of the steps of a round that may bring no better policy before it ends."""
+"""The share of the steps of a round that may bring no better policy before it ends, where
+the colony goes on with what it has learned before."""
 
 ALIKE = 0.1
 """Two models may differ by this share of the deviation of a step's change, and what ants
@@ -88,11 +89,13 @@ class Improving:
         Returns:
             The steps of all ants.
         """
-        self._enter(model)
+        begins = self._enter(model)
         self.cost = np.inf if self.best is None else self._cost(self.best, states)
+        # A colony that begins needs time before it can surpass the best of those before.
+        patience = most_steps if begins else PATIENCE * most_steps
         done, in_vain = 0, 0
         each = max(-(-most_steps // CHUNKS), LEAST_CHUNK)
-        while done < most_steps and in_vain < PATIENCE * most_steps:
+        while done < most_steps and in_vain < patience:
             chunk = min(each, most_steps - done)
             self.agent.learn(total_timesteps=chunk)
             done += chunk
@@ -106,20 +109,32 @@ class Improving:
                     self.agent.save(self._best_file)
         return done
 
-    def _enter(self, model: LearnedVectorEnv) -> None:
-        """Let the agent walk in this model from now on, with what it has learned."""
-        if self.agent is None:
+    def _enter(self, model: LearnedVectorEnv) -> bool:
+        """Let the agent walk in this model from now on, with what it has learned.
+
+        Returns:
+            Whether it begins anew.
+        """
+        begins = self.agent is None
+        if begins:
             self.agent = self._made(model)
         elif isinstance(self.agent, TabularAgent):
             self.agent.set_env(model)
             believed = self._model is not None and _agree(self._model, model)
             if hasattr(self.agent, "forget") and not believed:
-                self.agent.forget()  # paths in a model that is no longer believed
+                # Paths in a model that is no longer believed. Their levels are no good
+                # either: what promises too much has to be tried again pair by pair, and
+                # a new colony is faster.
+                if self._make is None:
+                    self.agent.forget()
+                else:
+                    self.agent, begins = self._made(model), True
         elif self._model is not None:
             # An agent of another package keeps its environment, which changes.
             self._model.set_system(model.system, model.parameters)
             model = self._model
         self._model = model
+        return begins
 
     def _snapshot(self) -> Predictor:
         """The policy of the agent as it is now, which no longer changes."""

@@ -50,6 +50,10 @@ COMPARED, MORE_COMPARED = 100, 300
 """States from which policies are compared in the model: with up to two variables, and
 with more, where few would make the choice a matter of luck."""
 
+CAUTION = 0.1
+"""What a step of which the model knows nothing costs more, as a share of the most that a
+step costs, where there are more than two variables."""
+
 Callback = Callable[[PlantLearning, Row], Any] | None
 
 
@@ -357,7 +361,12 @@ class LearningRun:
             # That there are few steps is the point, and from one start a plant without
             # noise repeats itself.
             warnings.simplefilter("ignore", DataWarning)
-            return LearnedVectorEnv(recorded, ANTS, **arguments)
+            model = LearnedVectorEnv(recorded, ANTS, **arguments)
+        if model.system.low.size > 2 and "pessimism" not in self._arguments:
+            # With more variables a model is never right everywhere, and a colony finds
+            # out where it promises too much.
+            model.system.pessimism = CAUTION * max(model.system.max_stage_cost, 0.0)
+        return model
 
     def _result(self) -> PlantLearning:
         improving = self._improving

@@ -43,9 +43,10 @@ def learn_from_plant(
     """Learn a policy for a plant from few interactions with it.
 
     In each round the plant runs with the best policy so far and some exploration, what
-    it did is recorded, a model is fitted to all recordings, and the colony goes on
-    learning in it, its pheromone kept. Its policies are compared in the newest model,
-    and the best is applied to the plant in the next round.
+    it did is recorded, and a model is fitted to all recordings. Where it agrees with the
+    one before, the colony goes on learning in it, its pheromone kept; otherwise a new
+    colony learns. All policies are compared in the newest model, and the best is applied
+    to the plant in the next round.
 
     >>> import gymnasium as gym
     >>> from acl_gym import learn_from_plant
@@ -87,11 +88,12 @@ def learn_from_plant(
             them in recorded states, half anywhere within the bounds.
         max_episode_steps: T in the model; None takes the limit of `env`, or 300.
         model: further arguments of `LearnedVectorEnv`, such as `regressor`, `pessimism`
-            or `uncertain`.
+            or `uncertain`. With more than two variables `pessimism` is a tenth of the
+            most that a step costs, unless you say otherwise.
         model_steps: the most steps of all ants in the model in a round, >= 1. None takes
             20,000 with one or two state variables, four times as many with each more,
-            but at most 300,000. A round ends earlier if two fifths of them brought no
-            better policy.
+            but at most 150,000. A round in which the colony goes on ends earlier if two
+            fifths of them brought no better policy.
         data: what was recorded of this plant before. The colony learns from it before
             the first interaction. Its variables and inputs must be those of `env`, in the
             same order and units, with the same sampling time. Its inputs need not be

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 from acl_gym.partitions.grid import Fuzzy
 from acl_gym.utils.typing import FloatArray
 
-CELLS = {3: 17, 4: 9, 5: 7, 6: 5}
+CELLS = {3: 9, 4: 5, 5: 5, 6: 5}
 """Number of variables -> centres of each. With one or two variables an evenly spaced grid
 can grow until its cells are as small as the goal."""
 

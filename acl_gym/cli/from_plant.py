@@ -37,6 +37,7 @@ from acl_gym.model_based import PlantLearning, learn_from_plant
 from acl_gym.model_based.arguments import VALUES, task_of
 from acl_gym.model_based.journal import AGENT, BEST
 from acl_gym.model_based.learning_run import default_agent
+from acl_gym.model_based.plant_facts import CLOSE
 from acl_gym.utils import files
 from acl_gym.utils.typing import FloatArray, Row
 
@@ -88,7 +89,7 @@ def run(
     plant, inputs = _plant(environment)
     with bad_arguments():
         described_by(plant)  # fails now for observations that are no numbers
-    data = _data(options, plant, inputs)
+    data = _data(options, plant)
     if data is not None:
         for doubt in data.doubts():
             report("acl-gym", f"warning: {doubt}")
@@ -117,6 +118,7 @@ def run(
                     inputs=inputs,
                     max_episode_steps=steps,
                     data=data,
+                    circular=options.circular_variables(data),
                     folder=kept,
                     callback=watch,
                     progress_bar=count > 0 and shown.progress and sys.stderr.isatty(),
@@ -211,10 +213,8 @@ def _plant(environment: Environment) -> tuple[Any, FloatArray | None]:
     return plain, np.asarray(values, np.float64).reshape(len(values), -1)
 
 
-def _data(
-    options: PlantOptions, plant: Any, inputs: FloatArray | None
-) -> Transitions | None:
-    """The recorded steps, with names and bounds of the environment.
+def _data(options: PlantOptions, plant: Any) -> Transitions | None:
+    """The recorded steps.
 
     Raises:
         BadArgumentError: there is no such file, or it is not of this environment.
@@ -238,10 +238,10 @@ def _data(
                 f"{file} must have {size} variables and {n_inputs} inputs, as the "
                 f"environment has, got {shape[0]} and {shape[1]}."
             )
-        time, known = found.sampling_time, facts.get("sampling_time")
-        if time and known and not math.isclose(time, known, rel_tol=0.01):
+        time, own_time = found.sampling_time, facts.get("sampling_time")
+        if time and own_time and not math.isclose(time, own_time, rel_tol=CLOSE):
             raise BadArgumentError(
-                f"{file} must have a sampling time of {known:g} s, as the environment "
+                f"{file} must have a sampling time of {own_time:g} s, as the environment "
                 f"has, got {time:g} s."
             )
         if found.rewards is None and "cost" not in task_of(plant, {}):
@@ -250,8 +250,10 @@ def _data(
                 f"{file} must hold rewards, from which the cost is learned, since the "
                 f"environment does not tell its own; {remedy}."
             )
-        if inputs is not None:
-            facts["values"] = inputs
+        known = found.description
+        if not facts.get("numbered") or known.numbered:
+            return found
+        # The numbers in a table are those of actions: the environment has nothing else.
         return Transitions(
             found.states,
             found.inputs,
@@ -259,7 +261,13 @@ def _data(
             found.rewards,
             found.terminated,
             episodes=found.episodes,
-            **facts,
+            state_names=known.state_names,
+            circular=known.circular,
+            sampling_time=known.sampling_time,
+            low=known.low,
+            high=known.high,
+            values=facts["values"],
+            numbered=True,
         )
 
 

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from acl_gym.cli.errors import BadArgumentError
+
+if TYPE_CHECKING:  # slow to import
+    from acl_gym.envs.learned import Transitions
 
 TABLES = {".csv": "csv", ".parquet": "parquet"}
 """The endings of files with a row for each moment."""
@@ -24,6 +27,7 @@ class PlantOptions(NamedTuple):
         run: a column whose value changes from one run to the next.
         reward: a column of what the step gave that begins in a row.
         terminated: a column that says whether an episode ended with that step.
+        circular: names or numbers of variables that wrap around, with commas.
     """
 
     interactions: int | None
@@ -35,6 +39,7 @@ class PlantOptions(NamedTuple):
     run: str | None
     reward: str | None
     terminated: str | None
+    circular: str | None
 
     @property
     def wanted(self) -> bool:
@@ -53,6 +58,20 @@ class PlantOptions(NamedTuple):
             if column is not None:
                 named[name] = column
         return named
+
+    def circular_variables(self, data: Transitions | None) -> list[str | int] | None:
+        """What `learn_from_plant` takes for `circular`.
+
+        Args:
+            data: whose names are known; others are numbers, counted from 0.
+        """
+        if self.circular is None:
+            return None
+        known = () if data is None else data.state_names
+        return [
+            int(each) if each.isdecimal() and each not in known else each
+            for each in _names("--circular", self.circular, "variables")
+        ]
 
     @property
     def kind_of_table(self) -> str | None:
@@ -91,6 +110,11 @@ class PlantOptions(NamedTuple):
                 "--restart-after belongs to --interactions, which makes steps; leave it "
                 "out or add --interactions N."
             )
+        if self.circular is not None and not self.wanted:
+            raise BadArgumentError(
+                "--circular belongs to --interactions and --from-data, which learn in a "
+                "model; leave it out or add one of them."
+            )
         columns = {
             "--state": self.state,
             "--input": self.input,
@@ -122,10 +146,10 @@ class PlantOptions(NamedTuple):
             )
 
 
-def _names(option: str, text: str | None) -> list[str]:
+def _names(option: str, text: str | None, what: str = "columns") -> list[str]:
     names = [part.strip() for part in (text or "").split(",")]
     if not all(names):
         raise BadArgumentError(
-            f"{option} must be names of columns such as theta,omega, got {text!r}."
+            f"{option} must be names of {what} such as theta,omega, got {text!r}."
         )
     return names

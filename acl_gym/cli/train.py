@@ -259,6 +259,16 @@ def train(
             show_default=False,
         ),
     ] = None,
+    circular: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME,...",
+            help="With --interactions and --from-data: variables that wrap around, such as "
+            "an angle that jumps from pi to -pi, by the names of --state or by numbers "
+            "from 0, beside those of which the environment tells.",
+            show_default=False,
+        ),
+    ] = None,
     log: Annotated[
         Path | None,
         typer.Option(
@@ -301,6 +311,7 @@ def train(
         run,
         reward,
         terminated,
+        circular,
     )
     if few.wanted:
         few.refuse_options(

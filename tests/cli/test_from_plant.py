@@ -270,6 +270,19 @@ def test_a_table_without_rewards_does_not_tell_a_cost(corridor: list[str]) -> No
     assert "must have a column 'gain'" in refused(2, *corridor, "--reward", "gain")
 
 
+def test_variables_of_another_package_may_wrap_around(corridor: list[str]) -> None:
+    """By the names of columns or by numbers; a corridor bent into a ring of 2 m."""
+    found = [
+        figures(*corridor, "--reward", "r", *more, "--out", f"ring{i}.npz")
+        for i, more in enumerate(([], ["--circular", "x"], ["--circular", "0"]))
+    ]
+    assert found[1]["best"] | {"file": ""} == found[2]["best"] | {"file": ""}
+    assert found[1]["rows"][0]["model_error"] != found[0]["rows"][0]["model_error"]
+    shown = invoke(*corridor, "--reward", "r", "--circular", "y")
+    assert shown.exit_code == 2
+    assert "names or numbers of the variables ('x',), got ['y']" in shown.stderr
+
+
 DATA = ["train", PENDULUM, "--from-data"]
 
 
@@ -283,6 +296,8 @@ DATA = ["train", PENDULUM, "--from-data"]
         ([*FEW, "--param", "epsilon=5"], "epsilon must lie in [0, 1], got 5"),
         ([*FEW, "--state", "a"], "--state names columns of --from-data"),
         (["train", PENDULUM, "--restart-after", "9"], "belongs to --interactions"),
+        (["train", PENDULUM, "--circular", "0"], "belongs to --interactions"),
+        ([*FEW, "--circular", "0,"], "--circular must be names of variables"),
         ([*DATA, "no.npz"], "no.npz"),
         ([*DATA, "no.csv", "--state", "a,b"], "needs --input"),
         ([*DATA, "no.csv", "--state", "a,", "--input", "u"], "--state must be names"),

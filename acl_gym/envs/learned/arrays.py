@@ -95,3 +95,22 @@ def runs_of(states: FloatArray, next_states: FloatArray) -> IntArray:
     breaks = np.zeros(len(states), np.int64)
     breaks[1:] = (states[1:] != next_states[:-1]).any(axis=1)
     return np.cumsum(breaks)
+
+
+def chosen_runs(episodes: IntArray, rows: IntArray) -> IntArray:
+    """The numbers of the runs of some steps, which may have torn runs apart.
+
+    Args:
+        episodes: of all steps, `(n,)`, in order.
+        rows: which were chosen, `(m,)`, without repetition.
+
+    Returns:
+        Those that they had, unless a run was torn apart or the order was changed: then
+        all are numbered anew.
+    """
+    chosen = episodes[rows]
+    begins = (np.diff(chosen) != 0) | (np.diff(rows) != 1)
+    if not (begins & (np.diff(chosen) <= 0)).any():
+        return chosen
+    numbers: IntArray = np.concatenate([[0], np.cumsum(begins)]).astype(np.int64)
+    return numbers

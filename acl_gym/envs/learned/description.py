@@ -66,6 +66,10 @@ class Description:
             own, its = getattr(self, name), getattr(other, name)
             if own != its:
                 return f"{name} {own} and {its}"
+        # A number means another action where there are others; what one sets does not.
+        numbers = self.values, other.values
+        if self.numbered and None not in numbers and numbers[0] != numbers[1]:
+            return f"the numbers of actions {numbers[0]} and {numbers[1]}"
         own_time, its_time = self.sampling_time, other.sampling_time
         known = own_time is not None and its_time is not None
         if known and not math.isclose(own_time, its_time, rel_tol=0.01):  # type: ignore[arg-type]

@@ -15,6 +15,7 @@ from acl_gym.envs.learned.arrays import (
     checked_flags,
     checked_runs,
     checked_table,
+    chosen_runs,
     runs_of,
 )
 from acl_gym.envs.learned.description import Description, described
@@ -201,7 +202,9 @@ class Transitions:
         )
 
     def __getitem__(self, rows: Any) -> Self:
-        """Some steps, in order: a slice, or a mask `(n,)`.
+        """Some steps: a slice, or a mask `(n,)`.
+
+        Where two that follow each other did not do so before, a new run begins.
 
         Raises:
             TypeError: `rows` is neither.
@@ -221,16 +224,18 @@ class Transitions:
         kept = {name: array[rows] for name, array in self._arrays.items()}
         if not len(kept["states"]):
             raise ValueError("at least one step must be left, got none.")
+        kept["episodes"] = chosen_runs(self.episodes, np.arange(len(self))[rows])
         return self._made(self.description, kept, self._unit_doubts)
 
     def __add__(self, other: Any) -> Self:
         """Both recordings, one after the other.
 
-        What only one of them knows, such as rewards, is left out.
+        What only one of them knows, such as rewards, is left out. So are the inputs of
+        the actions where they differ.
 
         Raises:
-            ValueError: they are not of the same plant: names, angles or the sampling
-                time differ.
+            ValueError: they are not of the same plant: names, angles, the numbers of
+                actions or the sampling time differ.
         """
         if not isinstance(other, Transitions):
             return NotImplemented
@@ -393,10 +398,13 @@ class Transitions:
 
 def _both(one: Description, other: Description) -> Description:
     """The wider bounds of two recordings, and what either knows."""
+    values = one.values if one.values is not None else other.values
+    if other.values not in (None, values):
+        values = None  # each had other actions
     return replace(
         one,
         low=tuple(map(min, one.low, other.low)),
         high=tuple(map(max, one.high, other.high)),
-        values=one.values if one.values is not None else other.values,
+        values=values,
         sampling_time=one.sampling_time or other.sampling_time,
     )

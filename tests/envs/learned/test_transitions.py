@@ -222,6 +222,44 @@ def test_steps_are_chosen_by_slices_and_masks() -> None:
         data[np.array([True])]
 
 
+@pytest.mark.parametrize(
+    ("rows", "starts", "episodes"),
+    [
+        (slice(None, None, 2), [0, 2, 4], [0, 1, 2]),
+        (slice(None, None, -1), [5, 4, 3, 2, 1, 0], [0, 1, 2, 3, 4, 5]),
+        (np.array([1, 0, 1, 1, 0, 1], bool), [0, 2, 3, 5], [0, 1, 2, 3]),
+        (np.array([0, 0, 0, 1, 1, 1], bool), [3], [7, 7, 7]),
+        (slice(2, 5), [2, 3], [4, 7, 7]),
+    ],
+)
+def test_runs_that_are_torn_apart_are_several(
+    rows: Any, starts: list[int], episodes: list[int]
+) -> None:
+    """Steps 0 to 2 of run 4 and 3 to 5 of run 7, each to the next whole number."""
+    x = np.arange(6.0)
+    data = Transitions(x, x % 2, x + 1, episodes=[4, 4, 4, 7, 7, 7])[rows]
+    assert data.starts[:, 0].tolist() == starts
+    assert np.unique(data.episodes).tolist() == np.unique(episodes).tolist()
+    assert len(np.unique(data.episodes)) == len(data.starts)
+
+
+def test_actions_of_joined_recordings() -> None:
+    x = np.arange(12.0)
+
+    def made(values: Any, numbered: bool = False) -> Transitions:
+        return Transitions(
+            x, np.resize(values or [0, 1], 12), x + 1, values=values, numbered=numbered
+        )
+
+    with pytest.raises(ValueError, match="got the numbers of actions"):
+        made([0, 1], numbered=True) + made([0, 1, 2], numbered=True)
+    # What actions set may differ: then nobody knows what the actions are.
+    assert (made([-1, 1]) + made([-2, 0, 2])).description.values is None
+    assert (made([-1, 1]) + made(None)).description.values == ((-1.0,), (1.0,))
+    assert (made(None) + made([-1, 1])).description.values == ((-1.0,), (1.0,))
+    assert (made([-1, 1]) + made([-1, 1])).description.values == ((-1.0,), (1.0,))
+
+
 def test_arrays_cannot_be_changed() -> None:
     with pytest.raises(ValueError, match="read-only"):
         pendulum().states[0] = 0.0

@@ -342,10 +342,13 @@ def test_inputs_must_be_numbers_of_actions() -> None:
         ([np.nan, 0.0], 0.0, r"finite numbers, got \[nan, 0\.0\]"),
         ([0.0, 0.0], np.inf, "with reward inf"),
         ([0.0], 0.0, r"observations of shape \(1, 2\)"),
+        ([0.0, 0.0], np.zeros(2), "rewards with one number for each of 1 slots"),
+        ([0.0, 0.0], "0", "rewards with one number for each of 1 slots"),
+        ([0.0, 0.0], None, "rewards with one number for each of 1 slots"),
     ],
 )
 def test_what_a_plant_returns_is_checked(
-    observation: Any, reward: float, message: str
+    observation: Any, reward: Any, message: str
 ) -> None:
     class Broken(gym.Wrapper[Any, Any, Any, Any]):
         def step(self, action: Any) -> Any:
@@ -353,3 +356,16 @@ def test_what_a_plant_returns_is_checked(
 
     with pytest.raises(ValueError, match=message):
         Transitions.record(Broken(gym.make("acl_gym/Pendulum-v0")), 5, seed=0)
+
+
+def test_a_reward_may_be_an_array_of_one_number() -> None:
+    class Boxed(gym.Wrapper[Any, Any, Any, Any]):
+        def step(self, action: Any) -> Any:
+            found, reward, terminated, truncated, info = super().step(action)
+            return found, np.array([reward]), np.array([terminated]), truncated, info
+
+    env = gym.make("acl_gym/Pendulum-v0", max_episode_steps=10)
+    boxed = Transitions.record(Boxed(env), 30, hold=3, seed=0)
+    assert same(boxed, Transitions.record(env, 30, hold=3, seed=0))
+    assert boxed.rewards is not None
+    assert boxed.rewards.shape == (30,)

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from acl_gym.cli.errors import BadArgumentError
+from acl_gym.cli.recorded import split_names
 
 TABLES = {".csv": "csv", ".parquet": "parquet"}
 """The endings of files with a row for each moment."""
@@ -123,7 +124,7 @@ class PlantOptions(NamedTuple):
 
 
 def _names(option: str, text: str | None) -> list[str]:
-    names = [part.strip() for part in (text or "").split(",")]
+    names = split_names(text or "")
     if not all(names):
         raise BadArgumentError(
             f"{option} must be names of columns such as theta,omega, got {text!r}."

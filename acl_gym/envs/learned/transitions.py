@@ -9,7 +9,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from acl_gym.envs.learned import reading, saving
+from acl_gym.envs.learned import data_sets, reading, saving, table_files
 from acl_gym.envs.learned.arrays import (
     checked_column,
     checked_flags,
@@ -340,27 +340,29 @@ class Transitions:
                 - `state`: names of the columns of the state, required;
                 - `input`: those of the inputs, which are held from their row to the
                   next, required;
-                - `time`: the column of the time in seconds, for gaps and the sampling
-                  time;
+                - `time`: the column of the time in seconds, or of dates in a frame or in
+                  Parquet, for gaps and the sampling time;
                 - `run`: the column whose value changes from one run to the next;
                 - `reward`, `terminated`: columns of the step that begins in a row;
                 - `next_state`: columns of the next state, for rows that are steps
                   already.
 
-                And what `Transitions` takes: `circular`, `low`, `high`, `sampling_time`,
+                And what `Transitions` takes: `state_names` and `input_names` in place of
+                the names of the columns, `circular`, `low`, `high`, `sampling_time`,
                 `values`, `angles`, `numbered`.
 
         Raises:
             FileNotFoundError: there is no such file.
-            ValueError: a column is missing or holds what is no number, or time does not
-                increase.
+            ValueError: a column is missing or holds what is no number, a row has no run,
+                or time does not increase.
+            TypeError: an argument has another name.
         """
-        return cls(**reading.arrays_of_files(path, "csv", **columns))
+        return cls(**table_files.arrays_of_files(path, "csv", **columns))
 
     @classmethod
     def from_parquet(cls, path: Any, **columns: Any) -> Self:
         """Read measurements from a Parquet file; see `from_csv`."""
-        return cls(**reading.arrays_of_files(path, "parquet", **columns))
+        return cls(**table_files.arrays_of_files(path, "parquet", **columns))
 
     @classmethod
     def from_minari(cls, dataset: Any, **described: Any) -> Self:
@@ -376,7 +378,7 @@ class Transitions:
             ValueError: it is damaged, or holds no episode.
             TypeError: observations or actions are not arrays of one axis or numbers.
         """
-        return cls(**{**reading.arrays_of_minari(dataset), **described})
+        return cls(**{**data_sets.arrays_of_minari(dataset), **described})
 
     @classmethod
     def _made(

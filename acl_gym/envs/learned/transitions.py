@@ -256,7 +256,9 @@ class Transitions:
         Few steps, inputs that never change, rows that are there twice, variables that
         never change, and units that do not fit together.
         """
-        found = doubts(self.states, self.inputs, self.next_states, self.description)
+        found = doubts(
+            self.states, self.inputs, self.next_states, self.episodes, self.description
+        )
         return found + self._unit_doubts
 
     def save(self, path: archives.Target) -> Any:
@@ -268,7 +270,7 @@ class Transitions:
         Returns:
             The path written; None for an open file.
         """
-        return saving.save(path, self.description, self._arrays)
+        return saving.save(path, self.description, self._arrays, self._unit_doubts)
 
     @classmethod
     def load(cls, path: archives.Target, *, max_bytes: int = saving.MOST_BYTES) -> Self:
@@ -282,7 +284,11 @@ class Transitions:
             FileNotFoundError: there is no such file.
             ValueError: it is none of this package, or is damaged.
         """
-        return saving.load(path, max_bytes, lambda facts: cls(**facts))
+        found, told = saving.load(
+            path, max_bytes, lambda facts, told: (cls(**facts), told)
+        )
+        found._unit_doubts = list(dict.fromkeys(found._unit_doubts + told))
+        return found
 
     @classmethod
     def record(

@@ -30,6 +30,8 @@ _OPTIONS = {
     "max_episode_steps=": "--max-steps",
     "tolerance=": "--tolerance",
     "inputs=": "--actions",
+    "low=": "--low",
+    "high=": "--high",
 }
 """What the arguments are called where a plant is known by recordings."""
 
@@ -66,7 +68,10 @@ def advice_on_model(model: Mapping[str, Any]) -> list[str]:
     Args:
         model: what `model_facts` has found.
     """
-    found = [f"Repair the recording: {doubt}" for doubt in model["doubts"]]
+    found = [
+        f"Repair the recording or its description: {_as_options(doubt)}"
+        for doubt in model["doubts"]
+    ]
     if not found:
         found.append(
             "Check that --state names all that decides what happens next, that angles "

@@ -177,7 +177,10 @@ def test_a_model_that_predicts_nothing_is_1_and_says_what_to_do() -> None:
     last = result.stderr.splitlines()[-1]
     assert "the model does not predict angle: its error in cross-val" in last
     assert "figures say nothing about the plant" in last
-    assert "What to try: Repair the recording: the angle angle goes through" in last
+    assert (
+        "Repair the recording or its description: the angle angle goes through" in last
+    )
+    assert "give --low and --high such as 0 and 360" in last
     assert "Errors in cross-validation" in result.stdout
     assert "Its spread on the paths of the policy" in result.stdout
     page = Path("data-design", "report.html").read_text()

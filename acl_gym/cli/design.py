@@ -46,8 +46,8 @@ for NumPy; report.html, one page with the policy, trajectories from a typical an
 worst start, and success, cost, settling time and overshoot over 1,000 random starts;
 summary.json with the same figures; and the pictures as PNG.
 
-The exit code is 1 if the goal is not reached from 95% of the starts; the folder is
-written all the same, with what to try. Ctrl-C keeps the best controller so far.
+The exit code is 1 if the goal is not reached from 95% of the starts, or if the model is
+unsure almost everywhere; the folder is written all the same, with what to try. Ctrl-C keeps the best controller so far.
 
 \b
 Examples:
@@ -142,7 +142,8 @@ def design(
         str | None,
         typer.Option(
             metavar="NAME,...",
-            help="For DATA.csv: the columns of the state.",
+            help="For DATA.csv: the columns of the state; a name with a comma in double "
+            "quotes.",
             show_default=False,
         ),
     ] = None,
@@ -386,11 +387,13 @@ def _run(
             interruption.exit_code,
         )
     if not made.succeeded:
-        report(
-            "acl-gym",
+        why = (
             f"the goal is reached from {made.measures.success_rate:.1%} of the starts, "
-            f"less than 95%. What to try: {' '.join(made.advice)}",
+            "less than 95%"
         )
+        if made.model_fault is not None:
+            why = f"{made.model_fault}, so that its figures say nothing about the plant"
+        report("acl-gym", f"{why}. What to try: {' '.join(made.advice)}")
         raise typer.Exit(1)
 
 

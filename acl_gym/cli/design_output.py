@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from acl_gym.cli.common import console
 from acl_gym.cli.errors import report
+from acl_gym.cli.model_words import model_in_words
 
 if TYPE_CHECKING:
     from acl_gym.design import Design
@@ -81,10 +82,22 @@ def print_design(made: Design) -> None:
     for line in lines:
         screen.print(line, markup=False, highlight=False, soft_wrap=True)
     screen.print(table)
-    screen.print(
+    lines = []
+    model = made.summary["model"]
+    if model is not None:
+        spread = model["spread"]
+        lines += model_in_words(
+            model["regressor"],
+            model["steps"],
+            model["errors"],
+            median=spread["median"],
+            highest=spread["worst"],
+            limit=spread["limit"],
+            unsure=spread["unsure"],
+        )
+    lines.append(
         f"Wrote {made.folder / 'report.html'}, and the controller, "
-        f"{made.folder / 'policy.h'}.",
-        markup=False,
-        highlight=False,
-        soft_wrap=True,
+        f"{made.folder / 'policy.h'}."
     )
+    for line in lines:
+        screen.print(line, markup=False, highlight=False, soft_wrap=True)

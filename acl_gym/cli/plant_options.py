@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from acl_gym.cli.errors import BadArgumentError
+from acl_gym.cli.recorded import split_names
 
 if TYPE_CHECKING:  # slow to import
     from acl_gym.envs.learned import Transitions
@@ -147,7 +148,7 @@ class PlantOptions(NamedTuple):
 
 
 def _names(option: str, text: str | None, what: str = "columns") -> list[str]:
-    names = [part.strip() for part in (text or "").split(",")]
+    names = split_names(text or "")
     if not all(names):
         raise BadArgumentError(
             f"{option} must be names of {what} such as theta,omega, got {text!r}."

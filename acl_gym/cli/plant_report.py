@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from acl_gym.cli.common import console
+from acl_gym.cli.model_words import model_in_words
 from acl_gym.colony.episodes import Episode
 from acl_gym.envs.control.lookup import system_of
 from acl_gym.envs.learned import LearnedVectorEnv
@@ -76,16 +77,15 @@ def print_found(facts: dict[str, Any]) -> None:
         )
     screen.print(table)
     model, best = facts["model"], facts["best"]
-    errors = ", ".join(
-        f"{name.split(',')[0]} {error:.3f}" for name, error in model["errors"].items()
+    lines = model_in_words(
+        model["regressor"],
+        facts["recorded_steps"],
+        model["errors"],
+        median=model["spread_median"],
+        highest=model["spread_highest"],
+        limit=UNSURE,
+        unsure=model["unsure"],
     )
-    lines = [
-        f"The model, {model['regressor']}, of {facts['recorded_steps']:,} steps. Errors "
-        f"in cross-validation (0: none, 1: no better than the mean): {errors}.",
-        "Its spread on the paths of the policy (0: certain, 1: the data say nothing): "
-        f"median {model['spread_median']:.2f}, highest {model['spread_highest']:.2f}; "
-        f"above {UNSURE:g} from {model['unsure']:.0%} of the starts.",
-    ]
     if model["learned_cost_error"] is not None:
         lines.append(
             "The cost was learned from rewards, with an error of "

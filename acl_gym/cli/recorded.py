@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -55,8 +56,14 @@ def load(file: Path, given: Mapping[str, Any]) -> Any:
         return plant_of_recording(file, recording)
 
 
+def split_names(text: str) -> list[str]:
+    """Names between commas; one that holds a comma itself stands in double quotes."""
+    line = text.replace("\r", " ").replace("\n", " ")
+    return [part.strip() for part in next(csv.reader([line], skipinitialspace=True))]
+
+
 def _names(text: str) -> tuple[str, ...]:
-    return tuple(part.strip() for part in text.split(",") if part.strip())
+    return tuple(name for name in split_names(text) if name)
 
 
 def _numbers(option: str, text: str) -> tuple[float, ...]:

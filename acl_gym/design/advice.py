@@ -1,6 +1,9 @@
-"""What to try where the goal is not reached from enough starts."""
+"""What to try where the goal is not reached from enough starts, or in a poor model."""
 
 from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
 
 from acl_gym.design.learning import GOOD, Learned
 from acl_gym.design.measures import Measures
@@ -9,6 +12,12 @@ from acl_gym.utils.text import digits
 
 NEAR = 3.0
 """Multiples of the half-widths of the goal within which a failure was close."""
+
+MOSTLY = 0.5
+"""The share of starts with an unsure model, above which its figures say nothing."""
+
+NOTHING = 0.95
+"""The error in cross-validation from which on a variable is not predicted at all."""
 
 _MORE = {
     "time": "Give it more time, --seconds with a larger number",
@@ -21,8 +30,60 @@ _OPTIONS = {
     "max_episode_steps=": "--max-steps",
     "tolerance=": "--tolerance",
     "inputs=": "--actions",
+    "low=": "--low",
+    "high=": "--high",
 }
 """What the arguments are called where a plant is known by recordings."""
+
+
+def fault_of_model(model: Mapping[str, Any] | None) -> str | None:
+    """Why the figures of a learned model say nothing about the plant, a clause.
+
+    Args:
+        model: what `model_facts` has found; None for a plant with equations.
+
+    Returns:
+        None where they may be believed.
+    """
+    if model is None:
+        return None
+    spread, errors = model["spread"], model["errors"]
+    if spread["unsure"] > MOSTLY:
+        return (
+            f"the model is unsure (spread above {spread['limit']:g}) on the way from "
+            f"{spread['unsure']:.1%} of the starts"
+        )
+    name = max(errors, key=errors.__getitem__)
+    if errors[name] > NOTHING:
+        return (
+            f"the model does not predict {name}: its error in cross-validation is "
+            f"{errors[name]:.2f}, where 1 is no better than the mean"
+        )
+    return None
+
+
+def advice_on_model(model: Mapping[str, Any]) -> list[str]:
+    """Sentences on what to try where the model has a fault, the most promising first.
+
+    Args:
+        model: what `model_facts` has found.
+    """
+    found = [
+        f"Repair the recording or its description: {_as_options(doubt)}"
+        for doubt in model["doubts"]
+    ]
+    if not found:
+        found.append(
+            "Check that --state names all that decides what happens next, that angles "
+            "are named by --circular, with their ends by --low and --high if they are not "
+            "in radians, and that the sampling time is right. Filter noise, or sample less "
+            "often, where it is more than what a step changes."
+        )
+    found.append(
+        f"Record more than these {model['steps']:,} steps, from all states that the plant "
+        "is to pass."
+    )
+    return found
 
 
 def advice(learned: Learned, measures: Measures, plant: Plant) -> list[str]:

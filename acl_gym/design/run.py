@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from acl_gym.design import pictures
-from acl_gym.design.advice import advice
+from acl_gym.design.advice import advice, advice_on_model, fault_of_model
 from acl_gym.design.learning import CHOOSING, GOOD, Learned, Progress, learn
 from acl_gym.design.measures import Measures, measure, typical, worst
 from acl_gym.design.page import write_page
@@ -47,7 +47,10 @@ class Design:
         policy: the controller.
         measures: what it does from the random starts.
         learned: how it was learned.
-        advice: what to try, where the goal is not reached from 95% of the starts.
+        advice: what to try, where the goal is not reached from 95% of the starts, or
+            where the model has a fault.
+        model_fault: why the figures say nothing about the plant, where its model was
+            learned from a recording and is unsure almost everywhere; else None.
         summary: what `summary.json` holds.
     """
 
@@ -56,12 +59,13 @@ class Design:
     measures: Measures
     learned: Learned
     advice: tuple[str, ...]
+    model_fault: str | None
     summary: dict[str, Any]
 
     @property
     def succeeded(self) -> bool:
-        """Whether the goal is reached from 95% of the starts or more."""
-        return self.measures.success_rate >= GOOD
+        """Whether the goal is reached from 95% of the starts, in a model to be believed."""
+        return self.measures.success_rate >= GOOD and self.model_fault is None
 
 
 def design(
@@ -204,6 +208,10 @@ def _written(
         name = "plant.py" if measured.model is None else f"data{source.suffix}"
         files.write_atomically(folder / name, source.read_bytes())
     tips = advice(learned, measures, system)
+    fault = fault_of_model(measured.model)
+    if fault is not None and measured.model is not None:
+        # A better controller of a poor model is no gain: its data come first.
+        tips = advice_on_model(measured.model)
     facts = {
         "plant": "acl_gym.plant(...)" if source is None else str(source),
         "reaches_goal": measures.success_rate >= GOOD,
@@ -212,6 +220,7 @@ def _written(
         "costs": asdict(measures.cost),
         "uncertain": measured.robustness,
         "model": measured.model,
+        "model_fault": fault,
         "seed": seed,
         "command": command,
         "interactions": learned.interactions,
@@ -228,7 +237,9 @@ def _written(
     text = json.dumps(summary, indent=1)
     files.write_atomically(folder / "summary.json", text.encode())
     write_page(folder, summary, learned, measures, system, measured.figures)
-    return Design(folder, learned.policy, measures, learned, tuple(tips), summary)
+    return Design(
+        folder, learned.policy, measures, learned, tuple(tips), fault, summary
+    )
 
 
 def checked_folder(out: str | Path) -> Path:

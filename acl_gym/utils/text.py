@@ -41,3 +41,8 @@ def replace_unprintable_letters() -> None:
         reconfigure = getattr(stream, "reconfigure", None)
         if reconfigure is not None:
             reconfigure(errors="replace")
+
+
+def first_line(error: Exception) -> str:
+    """The first line of what an error of another library says, without a full stop."""
+    return (str(error) or type(error).__name__).splitlines()[0].rstrip(".")

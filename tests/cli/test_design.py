@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from acl_gym.cli.design import EXAMPLES, _free_folder, example
+from acl_gym.cli.recorded import split_names
 from tests.cli.runner import STARTED, figures, invoke, refused, run
 
 # A mass on a line is brought to rest; learned in a second.
@@ -155,6 +156,50 @@ def test_measurements_become_a_folder() -> None:
     page = (folder / "report.html").read_text()
     assert "280 recorded steps in 40 runs" in page
     assert "What was assumed" in page
+
+
+@pytest.mark.filterwarnings("ignore::acl_gym.envs.learned.DataWarning")
+def test_a_model_that_predicts_nothing_is_1_and_says_what_to_do() -> None:
+    """An angle in degrees, described as one in radians."""
+    rng = np.random.default_rng(0)
+    rows, angle, speed = ["t,angle,speed,force"], 0.0, 0.0
+    for step in range(200):
+        if step % 5 == 0:
+            force = rng.integers(-1, 2)
+        rows.append(f"{0.1 * step:.1f},{np.degrees(angle)},{speed},{force}")
+        angle += 0.1 * speed
+        speed += 0.1 * (10.0 * force - np.sin(angle) - 0.2 * speed)
+    Path("data.csv").write_text("\n".join(rows))
+    words = "--state angle,speed --circular angle --input force --time t --goal 0,0"
+    words += " --tolerance 3,9 --steps 1500 --quiet"
+    result = invoke("design", "data.csv", *words.split())
+    assert result.exit_code == 1, result.output
+    last = result.stderr.splitlines()[-1]
+    assert "the model does not predict angle: its error in cross-val" in last
+    assert "figures say nothing about the plant" in last
+    assert (
+        "Repair the recording or its description: the angle angle goes through" in last
+    )
+    assert "give --low and --high such as 0 and 360" in last
+    assert "Errors in cross-validation" in result.stdout
+    assert "Its spread on the paths of the policy" in result.stdout
+    page = Path("data-design", "report.html").read_text()
+    assert "These figures say nothing about the plant" in page
+
+
+def test_names_with_a_comma_stand_in_double_quotes() -> None:
+    assert split_names('theta, "U Motor, V" ,omega') == ["theta", "U Motor, V", "omega"]
+    assert split_names("angle\n,") == ["angle", ""]
+    record("data.csv", 20)
+    text = Path("data.csv").read_text()
+    Path("data.csv").write_text(text.replace("speed,force", 'speed,"force, N"'))
+    words = ["--state", "place,speed", "--time", "t", "--run", "run", "--goal", "1"]
+    # The columns are found, so that the next fault is the one that is told.
+    quoted = refused(2, "design", "data.csv", *words, "--input", '"force, N"')
+    assert "goal must hold a number for each of the 2 columns" in quoted
+    words[-1] = "0,0"
+    bare = refused(2, "design", "data.csv", *words, "--input", "force, N")
+    assert "stands in double quotes, such as '\"force, N\"'" in bare
 
 
 def test_show_prints_a_file_that_can_be_used() -> None:

@@ -10,7 +10,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import acl_gym
-from acl_gym.design.advice import advice, state_in_words
+from acl_gym.design.advice import (
+    advice,
+    advice_on_model,
+    fault_of_model,
+    state_in_words,
+)
 from acl_gym.design.learning import Choice, Learned, Quality
 from acl_gym.design.measures import measure, typical, worst
 from acl_gym.design.page import percent
@@ -186,6 +191,29 @@ def test_advice_names_the_worst_start_and_what_to_try() -> None:
     first, *_ = advice(learned("converged"), late, plant)
     assert "max_episode_steps=" in first
     assert "reached later" in first
+
+
+def model(unsure: float, *errors: float) -> dict[str, Any]:
+    return {
+        "steps": 300,
+        "doubts": [],
+        "errors": dict(zip(("place", "speed"), errors, strict=True)),
+        "spread": {"limit": 0.5, "unsure": unsure},
+    }
+
+
+def test_a_model_has_a_fault_where_it_is_unsure_or_predicts_nothing() -> None:
+    assert fault_of_model(None) is None
+    assert fault_of_model(model(0.2, 0.7, 0.1)) is None
+    fault = fault_of_model(model(0.999, 0.7, 0.1))
+    assert fault is not None
+    assert "unsure (spread above 0.5) on the way from 99.9% of the starts" in fault
+    fault = fault_of_model(model(0.0, 0.1, 0.98))
+    assert fault is not None
+    assert "does not predict speed: its error in cross-validation is 0.98" in fault
+    tips = " ".join(advice_on_model(model(0.999, 0.7, 0.1)))
+    assert "--circular" in tips
+    assert "Record more than these 300 steps" in tips
 
 
 def test_words_and_percents() -> None:

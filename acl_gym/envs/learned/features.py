@@ -16,8 +16,10 @@ from acl_gym.utils.typing import FloatArray, IntArray
 LINEAR, COSINE, SINE, IS_ACTION = range(4)
 """What a feature is of its variable or input."""
 
-_LEAST = 1e-9
-"""A variable that changes less than this counts as one that does not change."""
+_LEAST = 1e-12
+"""A deviation that is less than this share of the largest number is one of rounding.
+
+It is relative, since a plant may be described in any unit."""
 
 
 @dataclass(frozen=True)
@@ -86,6 +88,7 @@ class Features:
         )
         change = differences(variables, next_variables, period)
         deviation = change.std(axis=0)
+        largest = np.maximum(np.abs(variables), np.abs(next_variables)).max(axis=0)
         return cls(
             kinds.astype(np.int64),
             sources.astype(np.int64),
@@ -93,7 +96,7 @@ class Features:
             scales.astype(np.float64),
             period,
             change.mean(axis=0),
-            np.where(deviation > _LEAST, deviation, 1.0),
+            np.where(_varies(deviation, largest), deviation, 1.0),
         )
 
     def __len__(self) -> int:
@@ -169,7 +172,13 @@ def differences(
 def _standard(column: FloatArray) -> tuple[float, float]:
     """Mean and one over the deviation."""
     deviation = float(column.std())
-    return float(column.mean()), 1.0 / deviation if deviation > _LEAST else 1.0
+    varies = _varies(deviation, np.abs(column).max())
+    return float(column.mean()), 1.0 / deviation if varies else 1.0
+
+
+def _varies(deviation: Any, largest: Any) -> Any:
+    """Whether a deviation is more than rounding, of numbers up to `largest`."""
+    return deviation > np.maximum(_LEAST * largest, np.finfo(np.float64).tiny)
 
 
 @njit(error_model="numpy")

@@ -6,8 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from acl_gym.envs.learned.copies import copied_steps, stalled_steps
 from acl_gym.envs.learned.description import Description
-from acl_gym.utils.typing import FloatArray
+from acl_gym.utils.angles import FULL_CIRCLE
+from acl_gym.utils.typing import FloatArray, IntArray
 
 FEW = 10
 """Steps for each variable and input, below which a recording is called short."""
@@ -16,7 +18,20 @@ MANY_TURNS = 20
 """Turns of an angle in one recording that are hardly turns."""
 
 OFTEN_TWICE = 0.25
-"""The share of rows that may be there twice; a plant at rest repeats itself."""
+"""The share of moving steps that may be there twice; runs with the same start may begin
+alike."""
+
+OFTEN_STALLED = 0.02
+"""The share of steps that may stall between moving ones, see `stalled_steps`."""
+
+PARTS = 20
+"""Parts of a recording in which units are compared, to see whether they change."""
+
+ALIKE = 0.1
+"""The share by which two factors may differ that are taken for the same one."""
+
+ROUGHLY = 0.5
+"""The same for factors of parts, which are less certain; those between units are larger."""
 
 FAR = 0.5
 """How many times its recorded range a goal may lie beyond it, in a variable, before that
@@ -40,6 +55,7 @@ def doubts(
     states: FloatArray,
     inputs: FloatArray,
     next_states: FloatArray,
+    episodes: IntArray,
     description: Description,
 ) -> list[str]:
     """What speaks against learning from this data, a sentence each.
@@ -48,6 +64,7 @@ def doubts(
         states: `(n, d)`, circular variables between their ends.
         inputs: `(n, m)`.
         next_states: `(n, d)`.
+        episodes: the number of the run of each step, `(n,)`.
         description: of both.
     """
     count, size = states.shape
@@ -71,23 +88,24 @@ def doubts(
                 f"the variable {name} is always {both[0]:g}; leave it out, or check its "
                 "sensor."
             )
-    rows = np.concatenate([states, inputs, next_states], axis=1)
-    twice = count - len(np.unique(rows, axis=0))
-    if twice > OFTEN_TWICE * count and not _discrete(states):
+    twice = copied_steps(states, inputs, next_states, episodes)
+    if twice > OFTEN_TWICE * count:
         found.append(
-            f"{twice} of {count} rows occur more than once; check that no file "
-            "was read twice, and that no sensor stands still."
+            f"{twice} of {count} steps are copies of others; check that no file was read "
+            "twice, and remove rows that are there twice."
+        )
+    stalled = stalled_steps(states, inputs, next_states, episodes)
+    if stalled > OFTEN_STALLED * count:
+        found.append(
+            f"in {_count(stalled, 'step')} of {count} nothing moves, though the plant moves "
+            "before and, with the same input, after; remove rows that are there twice, and "
+            "check that each sensor is read anew for each row."
         )
     return found
 
 
 def _count(number: int, what: str) -> str:
     return f"{number} {what}" if number == 1 else f"{number} {what}s"
-
-
-def _discrete(states: FloatArray) -> bool:
-    """Whether states are whole numbers, which repeat themselves."""
-    return bool((states == np.rint(states)).all())
 
 
 def unit_doubts(
@@ -121,27 +139,99 @@ def unit_doubts(
         span = description.high[axis] - description.low[axis]
         if np.abs(change[:, axis]).max() <= span:  # else it is no angle in this unit
             change[:, axis] -= span * np.rint(change[:, axis] / span)
-    middle = 0.5 * (states + next_states)
+    moved = time * 0.5 * (states + next_states)  # what each variable says as a rate
     names = description.state_names
     for axis in range(states.shape[1]):
         for rate in range(states.shape[1]):
-            factor = _factor(change[:, axis], middle[:, rate] * time)
-            if axis == rate or factor is None:
+            if axis == rate or _is_told(
+                axis, change[:, axis], moved[:, rate], description
+            ):
                 continue
-            near = min(
-                (
-                    (abs(np.log(factor / times)), words)
-                    for unit, words in UNITS.items()
-                    for times in (unit, 1 / unit)
-                ),
+            words = _unit_of_rate(
+                change[:, axis], moved[:, rate], names[axis], names[rate]
             )
-            if near[0] < 0.1:
-                found.append(
-                    f"{names[axis]} changes {factor:.3g} times as fast as "
-                    f"{names[rate]} says, as if one of them were in {near[1]}; give both "
-                    "in the same unit."
-                )
+            if words is not None:
+                found.append(words)
     return found
+
+
+def _unit_of_rate(
+    change: FloatArray, expected: FloatArray, name: str, rate: str
+) -> str | None:
+    """What speaks against the units of a variable and its rate of change, a sentence.
+
+    Args:
+        change: of the variable in each step, `(n,)`.
+        expected: what the rate says it is, `(n,)`.
+        name: of the variable.
+        rate: name of the rate.
+    """
+    factor = _factor(change, expected)
+    if factor is not None:
+        unit = _unit(factor)
+        if unit is None:
+            return None
+        return (
+            f"{name} changes {factor:.3g} times as fast as {rate} says, as if one of them "
+            f"were in {unit}; give both in the same unit."
+        )
+    # Together they do not fit. Do they in parts?
+    size = max(FEW, -(-len(change) // PARTS))
+    factors = [
+        (first, each)
+        for first in range(0, len(change), size)
+        if (each := _factor(change[first:][:size], expected[first:][:size])) is not None
+    ]
+    if not factors:
+        return None
+    same = [each for _, each in factors if _alike(each, factors[0][1], ROUGHLY)]
+    others = [
+        (first, each)
+        for first, each in factors
+        if not _alike(each, factors[0][1], ROUGHLY)
+    ]
+    # Two parts of each, since one may look so by chance. The unit changes within a part,
+    # whose factor may be anything.
+    if len(same) < 2 or len(others) < 2:
+        return None
+    before, after = float(np.median(same)), float(np.median([f for _, f in others]))
+    unit = _unit(after / before)
+    meant = any(
+        _alike(each, 1.0) or _unit(each) is not None for each in (before, after)
+    )
+    if unit is None or not meant:
+        return None
+    return (
+        f"{name} changes by {before:.3g} times what {rate} says at first, and by "
+        f"{after:.3g} times that from about step {others[0][0]} on, as if one of them were "
+        f"in {unit} in a part of the recording; give all of it in the same unit."
+    )
+
+
+def _is_told(
+    axis: int, change: FloatArray, expected: FloatArray, description: Description
+) -> bool:
+    """Whether the ends of an angle tell that its unit differs from that of its rate.
+
+    A turn from -180 to 180 is one in degrees, and its rate may be in radians per second.
+    """
+    factor = _factor(change, expected)
+    if axis not in description.circular or factor is None:
+        return False
+    turn = description.high[axis] - description.low[axis]
+    return _alike(factor, turn / FULL_CIRCLE)
+
+
+def _alike(one: float, other: float, share: float = ALIKE) -> bool:
+    return bool(abs(np.log(one / other)) < share)
+
+
+def _unit(factor: float) -> str | None:
+    """The units that are mixed up where there is such a factor, in words."""
+    for unit, words in UNITS.items():
+        if _alike(factor, unit) or _alike(factor, 1 / unit):
+            return words
+    return None
 
 
 def goal_doubts(
@@ -178,4 +268,5 @@ def _factor(change: FloatArray, expected: FloatArray) -> float | None:
         return None
     if np.corrcoef(change, expected)[0, 1] < 0.98:
         return None
-    return float(change @ expected / (expected @ expected))
+    factor = float(change @ expected / (expected @ expected))
+    return factor if factor > 0.0 else None

@@ -1,77 +1,39 @@
-"""Recordings of others: tables of measurements, and Minari's data sets."""
+"""Steps from tables of measurements, with a row for each moment."""
 
 from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
 from difflib import get_close_matches
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-from gymnasium import spaces
 from numpy.typing import NDArray
 
 from acl_gym.envs.learned.quality import DataWarning
 from acl_gym.utils import validation
-from acl_gym.utils.boxes import declared_bounds
 
 UNEVEN = 0.1
 """The share of a sampling time by which a step may be longer or shorter."""
 
+OFTEN = 0.1
+"""The share of uneven steps from which on they are no gaps, but the clock is uneven."""
 
-def arrays_of_files(
-    path: Any,
-    kind: str,
-    *,
-    state: Any = None,
-    input: Any = None,
-    next_state: Any = None,
-    **columns: Any,
-) -> dict[str, Any]:
-    """Read one or several tables; see `Transitions.from_csv`.
+COLUMNS = ("state", "input", "next_state", "time", "run", "reward", "terminated")
+"""The arguments that name columns."""
 
-    Args:
-        path: a path, or a list of them.
-        kind: "csv" or "parquet".
-        state: see there.
-        input: see there.
-        next_state: see there.
-        **columns: see there.
-
-    Returns:
-        Arguments of `Transitions`.
-    """
-    import pandas as pd
-
-    read = _read_csv if kind == "csv" else pd.read_parquet
-    several = isinstance(path, list | tuple)
-    paths = [
-        validation.file_path("path", each) for each in (path if several else [path])
-    ]
-    if not paths:
-        raise ValueError("path must be a file or several, got an empty list.")
-    frames = []
-    for each in paths:
-        if not each.is_file():
-            raise FileNotFoundError(
-                f"there is no file {each}; check the name and the folder."
-            )
-        try:
-            frames.append(read(each))
-        except Exception as error:  # whatever pandas raises for a file of another kind
-            raise ValueError(
-                f"{each} must be a {kind} file with names of columns in its first row, "
-                f"but cannot be read: {_first_line(error)}."
-            ) from error
-    return arrays_of_frames(
-        frames,
-        names=[str(each) for each in paths],
-        state=state,
-        input=input,
-        next_state=next_state,
-        **columns,
-    )
+DESCRIBED = (
+    "sampling_time",
+    "state_names",
+    "input_names",
+    "circular",
+    "low",
+    "high",
+    "angles",
+    "values",
+    "numbered",
+)
+"""The arguments that describe what the columns hold."""
 
 
 def arrays_of_frames(
@@ -110,7 +72,16 @@ def arrays_of_frames(
         ValueError: a column is missing or holds no numbers, time does not increase, or
             no two rows follow each other.
     """
+    _check_described(described)
     columns = {"state": _listed("state", state), "input": _listed("input", input)}
+    time, run, reward, terminated = (
+        None if each is None else _listed(key, each)[0]
+        for key, each in zip(
+            ("time", "run", "reward", "terminated"),
+            (time, run, reward, terminated),
+            strict=True,
+        )
+    )
     if next_state is not None:
         columns["next_state"] = _listed("next_state", next_state)
         if len(columns["next_state"]) != len(columns["state"]):
@@ -141,7 +112,7 @@ def arrays_of_frames(
             if column is not None:
                 table[key] = _numbers(frame, [column], name)[:, 0]
         if time is not None:
-            table["time"] = _numbers(frame, [time], name)[:, 0]
+            table["time"] = _seconds(frame, time, name)
         table["run"] = _changes(frame, run, name)
         if time is not None:
             times.append(_usual_step(table["time"], table["run"], time, name))
@@ -155,14 +126,20 @@ def arrays_of_frames(
         gaps += missed
         parts.append(part)
     if gaps:
-        warnings.warn(
-            DataWarning(
-                f"there {'is 1 gap' if gaps == 1 else f'are {gaps} gaps'} in time, where "
-                f"a row is not {sampling_time:g} s after the one before; the run is taken "
-                "to end there. Resample a recording whose steps are uneven throughout."
-            ),
-            stacklevel=4,
+        left = sum(len(part["states"]) for part in parts)
+        words = (
+            f"there {'is 1 gap' if gaps == 1 else f'are {gaps} gaps'} in time, where "
+            f"a row is not {sampling_time:g} s after the one before; the run is taken "
+            "to end there."
         )
+        if gaps > OFTEN * (gaps + left):
+            words = (
+                f"{gaps} of {gaps + left} steps are longer or shorter than "
+                f"{sampling_time:g} s by more than {UNEVEN:.0%} and are left out: the "
+                "clock of this recording is uneven. Interpolate its rows to even times "
+                "to keep them."
+            )
+        warnings.warn(DataWarning(words), stacklevel=4)
     joined = {name: np.concatenate([p[name] for p in parts]) for name in parts[0]}
     if not len(joined["states"]):
         raise ValueError(
@@ -176,81 +153,6 @@ def arrays_of_frames(
         "sampling_time": sampling_time,
         **described,
     }
-
-
-def arrays_of_minari(dataset: Any) -> dict[str, Any]:
-    """Read a data set of Minari; see `Transitions.from_minari`.
-
-    Returns:
-        Arguments of `Transitions`.
-    """
-    if isinstance(dataset, str | Path):
-        dataset = _of_minari_id(str(dataset))
-    if not hasattr(dataset, "iterate_episodes"):
-        raise TypeError(
-            "dataset must be a minari.MinariDataset or the id of one, got "
-            f"{validation.shown(dataset)}."
-        )
-    seen, acted = dataset.observation_space, dataset.action_space
-    if not isinstance(seen, spaces.Box) or len(seen.shape) != 1:
-        raise TypeError(
-            "a data set needs observations that are a Box of one axis, got "
-            f"{validation.shown(seen)}."
-        )
-    numbered = isinstance(acted, spaces.Discrete)
-    if not numbered and not (isinstance(acted, spaces.Box) and len(acted.shape) == 1):
-        raise TypeError(
-            "a data set needs Discrete actions or a Box of one axis, got "
-            f"{validation.shown(acted)}."
-        )
-    parts: dict[str, list[NDArray[Any]]] = {}
-    for number, episode in enumerate(dataset.iterate_episodes()):
-        steps = len(episode.actions)
-        new = {
-            "states": np.asarray(episode.observations, np.float64)[:steps],
-            "inputs": np.asarray(episode.actions, np.float64).reshape(steps, -1),
-            "next_states": np.asarray(episode.observations, np.float64)[1:],
-            "rewards": np.asarray(episode.rewards, np.float64),
-            "terminated": np.asarray(episode.terminations, np.bool_),
-            "episodes": np.full(steps, number),
-        }
-        for name, array in new.items():
-            parts.setdefault(name, []).append(array)
-    if not parts:
-        raise ValueError("dataset must hold one episode or more, got none.")
-    facts: dict[str, Any] = {n: np.concatenate(kept) for n, kept in parts.items()}
-    facts["low"], facts["high"] = declared_bounds(seen)
-    if numbered:
-        numbers = np.arange(int(acted.start), int(acted.start + acted.n))
-        facts |= {"values": numbers[:, None].astype(np.float64), "numbered": True}
-    return facts
-
-
-def _of_minari_id(name: str) -> Any:
-    """The data set of that id on this machine; see `Transitions.from_minari`."""
-    try:
-        import minari
-    except ImportError as error:
-        raise ImportError(
-            "a data set is loaded by its id with Minari, which is not installed; "
-            'run pip install "acl-gym[minari]".'
-        ) from error
-    try:
-        return minari.load_dataset(name)
-    except FileNotFoundError as error:
-        there = list(minari.list_local_datasets())
-        similar = get_close_matches(name, there, 1)
-        hint = f" Did you mean {similar[0]!r}?" if similar else ""
-        raise FileNotFoundError(
-            f"dataset must be the id of a data set of Minari on this machine, got "
-            f"{validation.shown(name)}; check the spelling, or download it with "
-            f"minari.download_dataset({validation.shown(name)}).{hint}"
-        ) from error
-    except Exception as error:  # whatever Minari and HDF5 raise for a damaged one
-        raise ValueError(
-            f"the data set {validation.shown(name)} of Minari cannot be read: "
-            f"{_first_line(error)}; download or make it again."
-        ) from error
 
 
 def _steps(
@@ -299,7 +201,15 @@ def _changes(frame: Any, run: str | None, name: str) -> Any:
     if run is None:
         return np.zeros(len(frame), np.int64)
     _check_columns(frame, [run], name)
-    values = frame[run].to_numpy()
+    column = _column(frame, run)
+    missing = column.isna().to_numpy()
+    if missing.any():
+        raise ValueError(
+            f"column {run!r} of {name} must say of each row which run it belongs to, got "
+            f"nothing in row {int(np.argmax(missing))} ({np.count_nonzero(missing)} rows of "
+            f"{len(missing)} are empty); fill in the run, or leave such rows out."
+        )
+    values = column.to_numpy()
     changed = np.zeros(len(values), np.int64)
     changed[1:] = values[1:] != values[:-1]
     return np.cumsum(changed)
@@ -309,7 +219,12 @@ def _numbers(frame: Any, columns: list[str], name: str) -> NDArray[np.float64]:
     _check_columns(frame, columns, name)
     found = []
     for column in columns:
-        values = frame[column].to_numpy()
+        values = _column(frame, column).to_numpy()
+        if values.dtype.kind in "mM":
+            raise ValueError(
+                f"column {column!r} of {name} must hold numbers, got dates or times "
+                f"({values.dtype}); only the column of the time may hold these."
+            )
         if values.dtype.kind not in "biuf":
             row = next((i for i, v in enumerate(values) if not _is_number(v)), 0)
             raise ValueError(
@@ -330,22 +245,65 @@ def _numbers(frame: Any, columns: list[str], name: str) -> NDArray[np.float64]:
     return table
 
 
+def _seconds(frame: Any, column: str, name: str) -> NDArray[np.float64]:
+    """The time of each row in s; dates are counted from the first one."""
+    import pandas as pd
+
+    _check_columns(frame, [column], name)
+    values = _column(frame, column)
+    if pd.api.types.is_datetime64_any_dtype(values):
+        values = values - values.min()
+    if pd.api.types.is_timedelta64_dtype(values):
+        frame = pd.DataFrame({column: values.dt.total_seconds()})
+    return _numbers(frame, [column], name)[:, 0]
+
+
+def _column(frame: Any, name: str) -> Any:
+    """The column of that name; names in a frame may be numbers."""
+    return frame.iloc[:, [str(each) for each in frame.columns].index(name)]
+
+
 def _check_columns(frame: Any, columns: list[str], name: str) -> None:
     if not hasattr(frame, "columns") or not hasattr(frame, "__getitem__"):
         raise TypeError(f"a pandas frame is needed, got {validation.shown(frame)}.")
     there = [str(each) for each in frame.columns]
     for column in columns:
         if column not in there:
+            divided = [each for each in there if column == each.partition(",")[0]]
+            remedy = "check the spelling"
+            if divided:
+                remedy = (
+                    "on a command line, a name with a comma stands in double quotes, such "
+                    f"as '\"{divided[0]}\"'"
+                )
             raise ValueError(
                 f"{name} must have a column {column!r}, got the columns {there[:20]}; "
-                "check the spelling."
+                f"{remedy}."
             )
         if there.count(column) > 1:
             raise ValueError(f"{name} must have one column {column!r}, got several.")
 
 
+def _check_described(described: dict[str, Any]) -> None:
+    """Refuse what describes no recording, such as a name that is misspelt."""
+    for name in described:
+        if name not in DESCRIBED:
+            similar = get_close_matches(name, (*COLUMNS, *DESCRIBED), 1)
+            hint = f" Did you mean {similar[0]!r}?" if similar else ""
+            raise TypeError(
+                f"columns of a recording are named by {', '.join(COLUMNS)}, and described "
+                f"by {', '.join(DESCRIBED)}, got {name!r}.{hint}"
+            )
+
+
 def _listed(name: str, columns: Any) -> list[str]:
-    listed = [columns] if isinstance(columns, str) else validation.elements(columns)
+    single = isinstance(columns, str | int)
+    listed = [columns] if single else validation.elements(columns)
+    if listed and not any(isinstance(each, bool) for each in listed):
+        # A frame that was made of an array has numbers as names.
+        listed = [
+            str(each) if isinstance(each, int | np.integer) else each for each in listed
+        ]
     if not listed or not all(isinstance(each, str) for each in listed):
         raise ValueError(
             f"{name} must be names of columns, one or more, got "
@@ -362,21 +320,3 @@ def _is_number(value: Any) -> bool:
     except (TypeError, ValueError):
         return False
     return True
-
-
-def _read_csv(path: Path) -> Any:
-    """A frame from a CSV file, whatever separates its columns."""
-    import pandas as pd
-
-    with path.open(encoding="utf-8", errors="replace") as file:
-        head, first = file.readline(), file.readline()
-    separator = max((",", ";", "\t"), key=head.count)
-    comma = separator != "," and "," in first and "." not in first
-    frame = pd.read_csv(
-        path, sep=separator, decimal="," if comma else ".", skipinitialspace=True
-    )
-    return frame.rename(columns=lambda name: str(name).strip())
-
-
-def _first_line(error: Exception) -> str:
-    return (str(error) or type(error).__name__).splitlines()[0].rstrip(".")

@@ -88,13 +88,17 @@ class Recorder:
         if actions is None:
             actions = self._chosen()
         if self._vector:
-            found, rewards, terminated, truncated, infos = self.env.step(actions)
+            found, *results, infos = self.env.step(actions)
         else:
             found, *results, infos = self.env.step(self._single(actions))
             found = np.asarray(found)[None]
-            rewards, terminated, truncated = (np.array([each]) for each in results)
+        rewards = self._of_slots("rewards", results[0], "biuf").astype(np.float64)
+        terminated, truncated = (
+            self._of_slots(name, each, "biu").astype(np.bool_)
+            for name, each in zip(("terminated", "truncated"), results[1:], strict=True)
+        )
         found = self._numbers(found)
-        ended = np.asarray(terminated | truncated, dtype=np.bool_)
+        ended = terminated | truncated
         reached = found
         mode = self._mode()
         if ended.any() and mode is AutoresetMode.SAME_STEP:
@@ -109,8 +113,8 @@ class Recorder:
             "states": self.observation[rows],
             "inputs": self._inputs(actions)[rows],
             "next_states": reached[rows],
-            "rewards": np.asarray(rewards, dtype=np.float64)[rows],
-            "terminated": np.asarray(terminated, dtype=np.bool_)[rows],
+            "rewards": rewards[rows],
+            "terminated": terminated[rows],
             "runs": self._runs[rows],
         }
         self._kept.append(new)
@@ -141,6 +145,32 @@ class Recorder:
                 "kept."
             )
         return array.astype(np.float64)
+
+    def _of_slots(self, name: str, values: Any, kinds: str) -> NDArray[Any]:
+        """One value for each slot, `(num_envs,)`; arrays that hold one are values too.
+
+        Args:
+            name: of what the plant returned.
+            values: what that is.
+            kinds: letters of the NumPy types that it may have.
+
+        Raises:
+            ValueError: it is of another type, or not one for each slot.
+        """
+        array = validation.as_array(values)
+        if (
+            array is None
+            or array.dtype.kind not in kinds
+            or array.size != self.num_envs
+            or any(size not in (1, self.num_envs) for size in array.shape)
+        ):
+            one = "one number" if name == "rewards" else "True or False"
+            raise ValueError(
+                f"the plant must return {name} with {one} for each of "
+                f"{self.num_envs} slots after step {self.steps}, got "
+                f"{validation.shown(values)}; nothing of that step was kept."
+            )
+        return array.reshape(self.num_envs)
 
     def _check(self, reached: NDArray[np.float64], rewards: Any) -> None:
         """Refuse what is not finite before it is kept: nobody could learn from it."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, TypeVar
 
 import numpy as np
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from acl_gym.envs.learned.description import Description
 from acl_gym.utils import archives
+from acl_gym.utils.validation import shown
 
 MOST_BYTES = 2**32
 """What a file of transitions may hold unpacked, unless `load` is told otherwise."""
@@ -21,7 +22,10 @@ Made = TypeVar("Made")
 
 
 def save(
-    path: archives.Target, description: Description, arrays: Mapping[str, NDArray[Any]]
+    path: archives.Target,
+    description: Description,
+    arrays: Mapping[str, NDArray[Any]],
+    unit_doubts: Sequence[str],
 ) -> Any:
     """Write a file; see `Transitions.save`.
 
@@ -29,8 +33,10 @@ def save(
         path: see there.
         description: of the arrays.
         arrays: of `_ARRAYS` those that are known.
+        unit_doubts: what spoke against the units before angles were brought back.
     """
     header = {name: getattr(description, name) for name in _FLAT}
+    header["unit_doubts"] = list(unit_doubts)
     header["sampling_time"] = description.sampling_time
     kept: dict[str, NDArray[Any]] = dict(arrays)
     kept |= {"low": np.array(description.low), "high": np.array(description.high)}
@@ -40,14 +46,17 @@ def save(
 
 
 def load(
-    path: archives.Target, max_bytes: int, make: Callable[[dict[str, Any]], Made]
+    path: archives.Target,
+    max_bytes: int,
+    make: Callable[[dict[str, Any], list[str]], Made],
 ) -> Made:
     """Read a file; see `Transitions.load`.
 
     Args:
         path: see there.
         max_bytes: see there.
-        make: of the arguments of `Transitions`, which it checks.
+        make: of the arguments of `Transitions`, which it checks, and the doubts about
+            units.
     """
     archive = archives.Archive(path, max_bytes, archives.TRANSITIONS)
     try:
@@ -56,7 +65,10 @@ def load(
         facts |= {n: archive.arrays[n] for n in _ARRAYS if n in archive.arrays}
         for name in ("low", "high", "values"):
             facts[name] = archive.arrays.get(name)
-        return make(facts)
+        told = archive.header.get("unit_doubts", [])  # older files have none
+        if not isinstance(told, list) or not all(isinstance(t, str) for t in told):
+            raise ValueError(f"unit_doubts must be texts, got {shown(told)}.")
+        return make(facts, told)
     except archives.TooLargeError as error:
         raise ValueError(f"{archive.name} {error}") from error
     except Exception as error:  # whatever a damaged file leads to

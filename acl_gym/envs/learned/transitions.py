@@ -9,7 +9,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from acl_gym.envs.learned import reading, saving
+from acl_gym.envs.learned import data_sets, reading, saving, table_files
 from acl_gym.envs.learned.arrays import (
     checked_column,
     checked_flags,
@@ -261,7 +261,9 @@ class Transitions:
         Few steps, inputs that never change, rows that are there twice, variables that
         never change, and units that do not fit together.
         """
-        found = doubts(self.states, self.inputs, self.next_states, self.description)
+        found = doubts(
+            self.states, self.inputs, self.next_states, self.episodes, self.description
+        )
         return found + self._unit_doubts
 
     def save(self, path: archives.Target) -> Any:
@@ -273,7 +275,7 @@ class Transitions:
         Returns:
             The path written; None for an open file.
         """
-        return saving.save(path, self.description, self._arrays)
+        return saving.save(path, self.description, self._arrays, self._unit_doubts)
 
     @classmethod
     def load(cls, path: archives.Target, *, max_bytes: int = saving.MOST_BYTES) -> Self:
@@ -287,7 +289,11 @@ class Transitions:
             FileNotFoundError: there is no such file.
             ValueError: it is none of this package, or is damaged.
         """
-        return saving.load(path, max_bytes, lambda facts: cls(**facts))
+        found, told = saving.load(
+            path, max_bytes, lambda facts, told: (cls(**facts), told)
+        )
+        found._unit_doubts = list(dict.fromkeys(found._unit_doubts + told))
+        return found
 
     @classmethod
     def record(
@@ -345,27 +351,29 @@ class Transitions:
                 - `state`: names of the columns of the state, required;
                 - `input`: those of the inputs, which are held from their row to the
                   next, required;
-                - `time`: the column of the time in seconds, for gaps and the sampling
-                  time;
+                - `time`: the column of the time in seconds, or of dates in a frame or in
+                  Parquet, for gaps and the sampling time;
                 - `run`: the column whose value changes from one run to the next;
                 - `reward`, `terminated`: columns of the step that begins in a row;
                 - `next_state`: columns of the next state, for rows that are steps
                   already.
 
-                And what `Transitions` takes: `circular`, `low`, `high`, `sampling_time`,
+                And what `Transitions` takes: `state_names` and `input_names` in place of
+                the names of the columns, `circular`, `low`, `high`, `sampling_time`,
                 `values`, `angles`, `numbered`.
 
         Raises:
             FileNotFoundError: there is no such file.
-            ValueError: a column is missing or holds what is no number, or time does not
-                increase.
+            ValueError: a column is missing or holds what is no number, a row has no run,
+                or time does not increase.
+            TypeError: an argument has another name.
         """
-        return cls(**reading.arrays_of_files(path, "csv", **columns))
+        return cls(**table_files.arrays_of_files(path, "csv", **columns))
 
     @classmethod
     def from_parquet(cls, path: Any, **columns: Any) -> Self:
         """Read measurements from a Parquet file; see `from_csv`."""
-        return cls(**reading.arrays_of_files(path, "parquet", **columns))
+        return cls(**table_files.arrays_of_files(path, "parquet", **columns))
 
     @classmethod
     def from_minari(cls, dataset: Any, **described: Any) -> Self:
@@ -381,7 +389,7 @@ class Transitions:
             ValueError: it is damaged, or holds no episode.
             TypeError: observations or actions are not arrays of one axis or numbers.
         """
-        return cls(**{**reading.arrays_of_minari(dataset), **described})
+        return cls(**{**data_sets.arrays_of_minari(dataset), **described})
 
     @classmethod
     def _made(

@@ -44,6 +44,32 @@ def test_sixty_steps_tell_the_dynamics_of_the_pendulum() -> None:
     assert "gaussian process; errors: angle theta" in repr(dynamics)
 
 
+@pytest.mark.parametrize("unit", [1e-10, 1e10])
+def test_the_unit_of_a_variable_does_not_matter(unit: float) -> None:
+    data = line()
+    x, y = data["states"], data["next_states"]
+    usual = LearnedDynamics(Transitions(**data), "gaussian process")
+    scaled = {**data, "states": unit * x, "next_states": unit * y}
+    dynamics = LearnedDynamics(Transitions(**scaled), "gaussian process")
+    u, far = np.array([[1.0]]), np.array([[1e3]])
+    np.testing.assert_allclose(
+        dynamics.next_variables(unit * far, u), unit * usual.next_variables(far, u)
+    )
+    np.testing.assert_allclose(
+        dynamics.spread(unit * far, u), usual.spread(far, u), rtol=1e-4
+    )
+    assert dynamics.errors == pytest.approx(usual.errors, rel=1e-3)
+
+
+def test_a_variable_that_only_rounding_changes_counts_as_constant() -> None:
+    data = line()
+    dust = 5.0 + 1e-15 * np.random.default_rng(1).standard_normal((40, 1))
+    states = np.hstack([data["states"], dust])
+    after = np.hstack([data["next_states"], dust[::-1]])
+    dynamics = LearnedDynamics(Transitions(states, data["inputs"], after))
+    assert dynamics.features.change_scale[1] == 1.0
+
+
 def test_what_a_limit_holds_is_not_learned_from() -> None:
     """A tank that overflows at 1: full, its level no longer tells what flows in."""
     rng = np.random.default_rng(0)

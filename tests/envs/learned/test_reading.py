@@ -81,6 +81,70 @@ def test_a_gap_in_time_ends_a_run() -> None:
     assert np.bincount(data.episodes).tolist() == [19, 27]
 
 
+def test_an_uneven_clock_is_told_from_gaps() -> None:
+    frame = table(200)
+    frame["t"] += np.random.default_rng(0).uniform(-0.012, 0.012, 200)
+    with pytest.warns(
+        DataWarning, match="the clock of this recording is uneven"
+    ) as told:
+        data = Transitions.from_frame(frame, **COLUMNS, time="t")
+    words = str(told[0].message)
+    assert f"{199 - len(data)} of 199 steps are longer or shorter" in words
+    assert "Interpolate its rows to even times" in words
+
+
+def test_dates_are_a_time() -> None:
+    frame, seconds = table(), Transitions.from_frame(table(), **COLUMNS, time="t")
+    for times in (
+        pd.to_datetime(1.7e9 + frame["t"], unit="s").dt.round("ms"),
+        pd.to_datetime(1.7e9 + frame["t"], unit="s", utc=True).dt.round("ms"),
+        pd.to_timedelta(frame["t"], unit="s"),
+    ):
+        data = Transitions.from_frame(frame.assign(t=times), **COLUMNS, time="t")
+        assert data.sampling_time == pytest.approx(0.1)
+        np.testing.assert_array_equal(data.states, seconds.states)
+
+
+def test_names_of_columns_may_be_numbers() -> None:
+    frame = table()
+    named = Transitions.from_frame(frame, **COLUMNS, time="t")
+    bare = pd.DataFrame(frame.to_numpy())
+    for state, u, time in (([1, 2], 3, 0), (["1", "2"], "3", "0")):
+        data = Transitions.from_frame(bare, state=state, input=u, time=time)
+        np.testing.assert_array_equal(data.states, named.states)
+        assert data.state_names == ("1", "2")
+
+
+def test_names_may_be_given_anew() -> None:
+    names = {"state_names": ["angle, rad", "speed, rad/s"], "input_names": ["torque"]}
+    data = Transitions.from_frame(table(), **COLUMNS, **names)
+    assert data.state_names == ("angle, rad", "speed, rad/s")
+    assert data.input_names == ("torque",)
+
+
+@pytest.mark.parametrize(
+    ("argument", "words"),
+    [
+        ("states", "got 'states'. Did you mean 'state'?"),
+        ("cicular", "got 'cicular'. Did you mean 'circular'?"),
+        ("next_states", "Did you mean 'next_state'?"),
+        ("xyz", "got 'xyz'."),
+    ],
+)
+def test_arguments_that_are_misspelt_are_named(argument: str, words: str) -> None:
+    with pytest.raises(TypeError) as caught:
+        Transitions.from_frame(table(), input="u", **{argument: ["theta", "omega"]})
+    assert str(caught.value).endswith(words)
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "latin-1", "utf-16"])
+def test_files_of_older_programs_are_read(encoding: str, tmp_path: Path) -> None:
+    path = tmp_path / "run.csv"
+    path.write_text("t;Winkel °;w;u\n0,0;1,0;2,0;1\n0,1;1,2;2,1;0\n", encoding=encoding)
+    data = Transitions.from_csv(path, state=["Winkel °", "w"], input="u", time="t")
+    np.testing.assert_allclose(data.states, [[1.0, 2.0]])
+
+
 def test_a_column_tells_runs_apart() -> None:
     frame = pd.concat([table(10), table(20, seed=1)])
     frame["run"] = ["a"] * 10 + ["b"] * 20
@@ -122,6 +186,31 @@ def test_rows_may_be_steps_already() -> None:
         (lambda f: f.iloc[::-1], {"time": "t"}, "must increase"),
         (lambda f: pd.concat([f, f]), {"time": "t"}, "must increase"),
         (lambda f: f[:1], {}, "two rows or more that follow each other"),
+        (
+            lambda f: f.assign(run=np.where(f.index < 20, np.nan, 1.0)),
+            {"run": "run"},
+            r"which run it belongs to, got nothing in row 0 \(20 rows of 50 are empty\)",
+        ),
+        (
+            lambda f: f.assign(run=["a"] * 49 + [None]),
+            {"run": "run"},
+            "got nothing in row 49",
+        ),
+        (
+            lambda f: f.assign(omega=pd.to_datetime(f.t, unit="s")),
+            {},
+            r"column 'omega' of the frame must hold numbers, got dates or times",
+        ),
+        (
+            lambda f: f.assign(t=pd.to_datetime(f.t.where(f.t > 0.35), unit="s")),
+            {"time": "t"},
+            r"must be finite, got \[nan\] in row 0",
+        ),
+        (
+            lambda f: f.rename(columns={"u": "u, V"}),
+            {},
+            "a name with a comma stands in double quotes, such as '\"u, V\"'",
+        ),
         (lambda f: f[:0], {}, "two rows or more|array of real numbers"),
         (lambda f: f, {"state": []}, "state must be names of columns"),
         (lambda f: f, {"input": None}, "input must be names of columns"),

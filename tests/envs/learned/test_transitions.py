@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import re
 import zipfile
 from pathlib import Path
 from typing import Any
@@ -330,7 +331,7 @@ def test_good_data_is_not_doubted() -> None:
 def test_few_steps_and_copies_are_doubted() -> None:
     assert "only 10 steps" in Transitions(**line(10)).doubts()[0]
     data = pendulum()
-    assert "rows occur more than once" in (data + data).doubts()[0]
+    assert "60 of 120 steps are copies" in (data + data).doubts()[0]
 
 
 def test_mixed_units_are_noticed() -> None:
@@ -366,7 +367,47 @@ def test_degrees_of_an_angle_are_noticed_though_it_wraps_around() -> None:
         low=[-180, None],
         high=[180, None],
     )
-    assert len(right.doubts()) == 1  # the rate is still in radians
+    # Nothing is wrong with a rate in radians: the ends say that the angle is in degrees.
+    assert right.doubts() == []
+
+
+def pendulum_in_units(degrees_from: int, degrees_to: int, noise: float) -> Transitions:
+    """A pendulum whose angular velocity is in degrees per second in some steps."""
+    rng, x, states = np.random.default_rng(0), np.array([3.0, 0.0]), []
+    u = np.repeat(rng.integers(-1, 2, 80), 5).astype(float)
+    for each in u:
+        states.append(x)
+        for _ in range(20):
+            speed = 10.0 * np.sin(x[0]) - 0.5 * x[1] + 8.0 * each
+            x = x + 0.0025 * np.array([x[1], speed])
+    rows = np.array(states)
+    rows = rows + noise * rng.standard_normal(rows.shape)
+    rows[degrees_from:degrees_to, 1] *= 180.0 / np.pi
+    return Transitions(rows[:-1], u[:-1], rows[1:], circular=[0], sampling_time=0.05)
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.005])
+@pytest.mark.parametrize("first", [100, 200, 333])
+def test_units_that_change_within_a_recording_are_noticed(
+    first: int, noise: float, tmp_path: Path
+) -> None:
+    assert pendulum_in_units(0, 0, noise).doubts() == []
+    data = pendulum_in_units(first, 400, noise)
+    (doubt,) = data.doubts()
+    assert "degrees instead of radians in a part of the recording" in doubt
+    (step,) = re.findall(r"from about step (\d+) on", doubt)
+    assert abs(int(step) - first) <= 80  # two parts of ten
+    # The doubt is kept by a file; a file that was written before it was, has none.
+    assert Transitions.load(data.save(tmp_path / "run")).doubts() == [doubt]
+
+
+def test_doubts_about_an_angle_are_kept_by_files(tmp_path: Path) -> None:
+    """Its turns are no longer in the file, since angles are brought back."""
+    angle = np.linspace(0.0, 36_000.0, 200)
+    u = np.arange(200.0) % 2
+    data = Transitions(angle, u, angle + 10.0, circular=[0])
+    assert "turns of 6.283; if it is in degrees" in data.doubts()[0]
+    assert Transitions.load(data.save(tmp_path / "run")).doubts() == data.doubts()
 
 
 def test_inputs_must_be_numbers_of_actions() -> None:
@@ -380,10 +421,13 @@ def test_inputs_must_be_numbers_of_actions() -> None:
         ([np.nan, 0.0], 0.0, r"finite numbers, got \[nan, 0\.0\]"),
         ([0.0, 0.0], np.inf, "with reward inf"),
         ([0.0], 0.0, r"observations of shape \(1, 2\)"),
+        ([0.0, 0.0], np.zeros(2), "rewards with one number for each of 1 slots"),
+        ([0.0, 0.0], "0", "rewards with one number for each of 1 slots"),
+        ([0.0, 0.0], None, "rewards with one number for each of 1 slots"),
     ],
 )
 def test_what_a_plant_returns_is_checked(
-    observation: Any, reward: float, message: str
+    observation: Any, reward: Any, message: str
 ) -> None:
     class Broken(gym.Wrapper[Any, Any, Any, Any]):
         def step(self, action: Any) -> Any:
@@ -391,3 +435,16 @@ def test_what_a_plant_returns_is_checked(
 
     with pytest.raises(ValueError, match=message):
         Transitions.record(Broken(gym.make("acl_gym/Pendulum-v0")), 5, seed=0)
+
+
+def test_a_reward_may_be_an_array_of_one_number() -> None:
+    class Boxed(gym.Wrapper[Any, Any, Any, Any]):
+        def step(self, action: Any) -> Any:
+            found, reward, terminated, truncated, info = super().step(action)
+            return found, np.array([reward]), np.array([terminated]), truncated, info
+
+    env = gym.make("acl_gym/Pendulum-v0", max_episode_steps=10)
+    boxed = Transitions.record(Boxed(env), 30, hold=3, seed=0)
+    assert same(boxed, Transitions.record(env, 30, hold=3, seed=0))
+    assert boxed.rewards is not None
+    assert boxed.rewards.shape == (30,)

@@ -68,7 +68,14 @@ class Improving:
     def restore(
         self, agent_file: Path, best_file: Path, model: LearnedVectorEnv
     ) -> None:
-        """Take over an agent and its best policy from files of a run that was killed."""
+        """Take over an agent and its best policy from files of a run that was killed.
+
+        Args:
+            agent_file: of the agent.
+            best_file: of the agent when its policy was the best; it need not exist.
+            model: what the agent has learned in.
+        """
+        self._model = model
         if self.agent is None:
             self.agent = self._made(model)
         kind = type(self.agent)

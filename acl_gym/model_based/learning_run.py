@@ -221,7 +221,9 @@ class LearningRun:
         """
         if self._journal is None or self._learned_at < 0 or self._too_few():
             return
-        self._model = self._fitted(self._recorded(), None)
+        # As it was when the colony learned in it: what came later may contradict it.
+        known = self._learned_at + (0 if self._data is None else len(self._data))
+        self._model = self._fitted(self._recorded()[:known], None)
         files = self._journal.path(AGENT), self._journal.path(BEST)
         if files[0].exists():
             self._improving.restore(*files, self._model)

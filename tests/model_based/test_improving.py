@@ -11,6 +11,7 @@ import pytest
 from acl_gym import (
     LearnedVectorEnv,
     QLearning,
+    ReturningACL,
     Transitions,
     VectorEnvAdapter,
     evaluate_policy_cost,
@@ -125,3 +126,56 @@ def test_of_an_agent_of_stable_baselines_the_networks_are_kept(
     assert any((a != b).any() for a, b in zip(before, now, strict=True))
     assert all((a == b).all() for a, b in zip(before, best.parameters(), strict=True))
     assert best.predict(STATES)[0].shape == (50,)
+
+
+def learned_model(steps: int, *, heavier: bool = False) -> LearnedVectorEnv:
+    """A model of the pendulum, or of one that falls twice as fast."""
+    recorded = Transitions.record(pendulum(), steps, hold=3, seed=0)
+    after = recorded.next_states
+    if heavier:
+        after = np.stack(
+            [after[:, 0], 2.0 * after[:, 1] - recorded.states[:, 1]], axis=1
+        )
+    recorded = Transitions(recorded.states, recorded.inputs, after, circular=[0])
+    return LearnedVectorEnv(
+        recorded,
+        20,
+        goal=[np.pi, 0.0],
+        tolerance=[0.1, 0.1],
+        cost=([1.0, 0.1], 0.05),
+        low=[-np.pi, -9.0],
+        high=[np.pi, 9.0],
+    )
+
+
+def test_a_colony_goes_on_in_a_model_that_agrees_with_the_one_before() -> None:
+    improving = Improving(lambda env: ReturningACL(env, seed=0), None)
+    improving.improve(learned_model(80), STATES, LEAST_CHUNK)
+    colony = improving.agent
+    improving.improve(learned_model(120), STATES, LEAST_CHUNK)
+    assert improving.agent is colony
+    assert colony.num_timesteps >= 2 * LEAST_CHUNK
+
+
+def test_a_new_colony_learns_in_a_model_that_contradicts_the_one_before() -> None:
+    improving = Improving(lambda env: ReturningACL(env, seed=0), None)
+    improving.improve(learned_model(80), STATES, LEAST_CHUNK)
+    colony = improving.agent
+    other = learned_model(80, heavier=True)
+    steps = improving.improve(other, STATES, 4 * LEAST_CHUNK)
+    assert improving.agent is not colony
+    assert improving.agent.env is other
+    # It begins, so that no round of its own ends early.
+    assert steps == 4 * LEAST_CHUNK
+
+
+def test_a_colony_that_was_given_forgets_its_paths_in_a_model_that_was_wrong() -> None:
+    first = learned_model(80)
+    colony = ReturningACL(first, seed=0)
+    improving = Improving(colony, None)
+    improving.improve(first, STATES, LEAST_CHUNK)
+    forgot = []
+    colony.forget = lambda: forgot.append(True)  # type: ignore[method-assign]
+    improving.improve(learned_model(80, heavier=True), STATES, LEAST_CHUNK)
+    assert improving.agent is colony
+    assert forgot

@@ -27,6 +27,7 @@ from acl_gym import (
 )
 from acl_gym.model_based.arguments import round_ends
 from acl_gym.model_based.journal import DATA
+from acl_gym.model_based.learning_run import CAUTION
 from tests.model_based.plants import QUICK, pendulum, quick
 
 J_STAR = 38.4  # of the pendulum, by value iteration on a fine grid
@@ -525,3 +526,16 @@ class TestAsynchronous:
             learn_from_plant(
                 Broken(pendulum()), interactions=100, asynchronous=True, seed=0, **QUICK
             )
+
+
+def test_with_many_variables_ants_avoid_what_the_model_does_not_know() -> None:
+    def learned(env: Any, **arguments: Any) -> Any:
+        quickly = {"agent": quick, "model_steps": 400, "seed": 0, **arguments}
+        return learn_from_plant(env, interactions=30, **quickly).model.system
+
+    vehicle = gym.make("acl_gym/Navigation-v0")
+    system = learned(vehicle)
+    assert system.max_stage_cost > 0
+    assert system.pessimism == pytest.approx(CAUTION * system.max_stage_cost)
+    assert learned(vehicle, model={"pessimism": 0.5}).pessimism == 0.5
+    assert learned(pendulum()).pessimism == 0

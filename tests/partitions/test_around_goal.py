@@ -19,9 +19,16 @@ def test_centres_are_at_the_goal_and_its_ends_and_at_the_bounds() -> None:
     assert [len(axis) for axis in found.centres] == [CELLS[4]] * 4
     for axis, bound, half in zip(found.centres, BOUND, HALF, strict=True):
         np.testing.assert_allclose(axis, -axis[::-1], rtol=1e-12)
-        assert axis[[0, 4, 8]].tolist() == [-bound, 0.0, bound]
-        assert axis[5] == pytest.approx(half)
+        assert axis[[0, 2, 4]].tolist() == [-bound, 0.0, bound]
+        assert axis[3] == pytest.approx(half)
+
+
+def test_distances_from_the_goal_grow_by_equal_factors() -> None:
+    found = partition_around_goal([-9.0] * 3, [9.0] * 3, [-0.5] * 3, [0.5] * 3)
+    assert found is not None
+    for axis in found.centres:
         factors = axis[6:] / axis[5:-1]
+        assert len(factors) == CELLS[3] // 2 - 1
         np.testing.assert_allclose(factors, factors[0])
 
 

@@ -270,6 +270,7 @@ def test_a_table_without_rewards_does_not_tell_a_cost(corridor: list[str]) -> No
     assert "must have a column 'gain'" in refused(2, *corridor, "--reward", "gain")
 
 
+@pytest.mark.slow
 def test_variables_of_another_package_may_wrap_around(corridor: list[str]) -> None:
     """By the names of columns or by numbers; a corridor bent into a ring of 2 m."""
     found = [

@@ -30,6 +30,10 @@ ALIKE = 0.1
 """Two models may differ by this share of the deviation of a step's change, and what ants
 remember of the older one is still good enough."""
 
+DOUBT, MOST_DOUBT = 3.0, 0.1
+"""The share by which a later policy may cost more in the model and is preferred still: a
+multiple of the model's largest error in cross-validation, and the most."""
+
 BETTER = 0.005
 """The share by which a cost must fall to count as better."""
 
@@ -100,6 +104,9 @@ class Improving:
         self.cost = np.inf if self.best is None else self._cost(self.best, states)
         # A colony that begins needs time before it can surpass the best of those before.
         patience = most_steps if begins else PATIENCE * most_steps
+        # Where the model errs, small differences between costs mean little. Then a later
+        # policy is preferred, which has learned from more.
+        doubt = min(DOUBT * max(model.dynamics.errors.values()), MOST_DOUBT)
         done, in_vain = 0, 0
         each = max(-(-most_steps // CHUNKS), LEAST_CHUNK)
         while done < most_steps and in_vain < patience:
@@ -110,7 +117,7 @@ class Improving:
             cost = self._cost(self.agent.policy if own else self.agent, states)
             in_vain = 0 if cost < (1.0 - BETTER) * self.cost else in_vain + chunk
             # Where the agent itself stands for its policy, the older one is lost.
-            if cost <= self.cost or self.best is self.agent:
+            if cost <= (1.0 + doubt) * self.cost or self.best is self.agent:
                 self.best, self.cost = self._snapshot(), cost
                 if self._best_file is not None and hasattr(self.agent, "save"):
                     self.agent.save(self._best_file)

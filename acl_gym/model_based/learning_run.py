@@ -50,10 +50,6 @@ COMPARED, MORE_COMPARED = 100, 300
 """States from which policies are compared in the model: with up to two variables, and
 with more, where few would make the choice a matter of luck."""
 
-CAUTION = 0.1
-"""What a step of which the model knows nothing costs more, as a share of the most that a
-step costs, where there are more than two variables."""
-
 Callback = Callable[[PlantLearning, Row], Any] | None
 
 
@@ -336,15 +332,21 @@ class LearningRun:
     def _compared(self, model: LearnedVectorEnv) -> FloatArray:
         """States from which policies are compared, `(n, n_variables)`.
 
-        Half of them where the plant has begun, from where it will be asked again.
+        Half of them where the plant has begun, from where it will be asked again. With
+        many variables these are a few points of a large space, and recorded states lie
+        along the ways to the goal; so the other half is spread evenly.
         """
         rng, system = np.random.default_rng(0), model.system
         n_variables = system.low.size
-        half = (COMPARED if n_variables <= 2 else MORE_COMPARED) // 2
-        anywhere = system.sample_states(rng, half).T[:, :n_variables]
+        if n_variables <= 2:
+            half = COMPARED // 2
+            others = system.sample_states(rng, half).T[:, :n_variables]
+        else:
+            half = MORE_COMPARED // 2
+            others = rng.uniform(system.low, system.high, (half, n_variables))
         begun = system.variables(model.transitions.starts)
         begun = begun[rng.integers(len(begun), size=half)]
-        return np.concatenate([anywhere, np.clip(begun, system.low, system.high)])
+        return np.concatenate([others, np.clip(begun, system.low, system.high)])
 
     def _fitted(
         self, recorded: Transitions, begin: LearnedDynamics | None
@@ -352,6 +354,7 @@ class LearningRun:
         arguments: dict[str, Any] = {
             "max_episode_steps": self._steps,
             "begin": begin,
+            "pessimism": None,
             **self._task,
             **self._arguments,
         }
@@ -363,12 +366,7 @@ class LearningRun:
             # That there are few steps is the point, and from one start a plant without
             # noise repeats itself.
             warnings.simplefilter("ignore", DataWarning)
-            model = LearnedVectorEnv(recorded, ANTS, **arguments)
-        if model.system.low.size > 2 and "pessimism" not in self._arguments:
-            # With more variables a model is never right everywhere, and a colony finds
-            # out where it promises too much.
-            model.system.pessimism = CAUTION * max(model.system.max_stage_cost, 0.0)
-        return model
+            return LearnedVectorEnv(recorded, ANTS, **arguments)
 
     def _result(self) -> PlantLearning:
         improving = self._improving

@@ -25,9 +25,9 @@ from acl_gym import (
     evaluate_policy_cost,
     learn_from_plant,
 )
+from acl_gym.envs.learned.system import CAUTION
 from acl_gym.model_based.arguments import round_ends
 from acl_gym.model_based.journal import DATA
-from acl_gym.model_based.learning_run import CAUTION
 from tests.model_based.plants import QUICK, pendulum, quick
 
 J_STAR = 38.4  # of the pendulum, by value iteration on a fine grid

@@ -71,7 +71,8 @@ class LearnedVectorEnv(ControlVectorEnv):
         uncertain: let each slot walk in its own function, drawn anew in each episode
             from all that fit the data, so that a policy is learned that works for all.
         pessimism: what a step costs more where the model is not sure, for a `spread` of
-            1, >= 0.
+            1, >= 0. None takes 0 with one or two state variables, and with more, where no
+            model is right everywhere, a tenth of the most that a step costs.
         most_spread: where the `spread` of a step is more than this, > 0, the episode
             ends in failure: the step costs as much as the dearest step does, for itself
             and for each step that was left. So no policy gains by leaving the data. None
@@ -120,7 +121,7 @@ class LearnedVectorEnv(ControlVectorEnv):
         per_action: bool = False,
         n_draws: int = 10,
         uncertain: bool = False,
-        pessimism: float = 0.0,
+        pessimism: float | None = 0.0,
         most_spread: float | None = None,
         dynamics: LearnedDynamics | None = None,
         begin: LearnedDynamics | None = None,

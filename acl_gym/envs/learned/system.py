@@ -18,6 +18,10 @@ from acl_gym.utils.typing import BoolArray, FloatArray, IntArray
 MEMBER = "member"
 """The name of the uncertain parameter that says which function a slot walks in."""
 
+CAUTION = 0.1
+"""What a step of which the model knows nothing costs more if nothing else is said, as a
+share of the most that a step costs; with more than two variables."""
+
 
 class LearnedSystem(Plant):
     """A plant in discrete time that was learned from data; see `LearnedVectorEnv`.
@@ -59,12 +63,13 @@ class LearnedSystem(Plant):
         initial: Any = None,
         evaluation_states: Any = None,
         evaluation_steps: int = 300,
-        pessimism: float = 0.0,
+        pessimism: float | None = 0.0,
         most_spread: float | None = None,
         uncertain: bool = False,
     ) -> None:
         self.dynamics = dynamics
-        self.pessimism = validation.number("pessimism", pessimism, at_least=0)
+        if pessimism is not None:
+            pessimism = validation.number("pessimism", pessimism, at_least=0)
         if most_spread is not None:
             most_spread = validation.number("most_spread", most_spread, above=0)
         self.most_spread = most_spread
@@ -96,6 +101,10 @@ class LearnedSystem(Plant):
             input_names=known.input_names,
             **ranges,
         )
+        if pessimism is None:
+            many = self.low.size > 2
+            pessimism = CAUTION * max(self.max_stage_cost, 0.0) if many else 0.0
+        self.pessimism = pessimism
         # As observed, which is what agents and pictures ask for: of an angle that is
         # shown as cosine and sine, neither wraps around.
         self.circular = known.circular

@@ -19,12 +19,11 @@ from acl_gym.plotting import style
 from acl_gym.swarm import (
     AggregatingAgents,
     Channel,
+    ConsensusAgents,
     Delayed,
-    DynamicAgents,
     Environment,
     Everyone,
     Field,
-    Inbox,
     Lossy,
     Nearest,
     Radius,
@@ -76,28 +75,6 @@ class Plane(Environment):
         self.x = self.x + u
 
 
-class Meeting(DynamicAgents):
-    """Agents that go a share of the way to the mean of those that they hear."""
-
-    def __init__(self, gain: float = 0.5) -> None:
-        self._gain = gain
-
-    def reset(self, n: int, rng: np.random.Generator) -> None:
-        self.own = self.aim = np.zeros((n, 2))
-
-    def observe(self, y: Any) -> None:
-        self.own = y
-
-    def send(self) -> dict[str, Any]:
-        return {"where": self.own}
-
-    def hear(self, inbox: Inbox) -> None:
-        self.aim = inbox.mean(inbox.messages["where"], default=self.own)
-
-    def decide(self, rng: np.random.Generator) -> Any:
-        return self._gain * (self.aim - self.own)
-
-
 def centre_moved(x: Any) -> Any:
     """How far the centre is from where it began, in each step."""
     centre = x.mean(axis=1)
@@ -113,7 +90,9 @@ def meetings(seed: int) -> list[dict[str, Any]]:
     """Where agents meet under each channel."""
     rows = []
     for channel in CHANNELS:
-        x = run(Meeting(), Plane(AGENTS), STEPS, seed, channel, record=("x",))["x"]
+        x = run(ConsensusAgents(), Plane(AGENTS), STEPS, seed, channel, record=("x",))[
+            "x"
+        ]
         rows.append(
             {
                 "channel": repr(channel),
@@ -128,7 +107,7 @@ def readings(seed: int) -> dict[str, Any]:
     """What both readings of Definition 6.2 come to, step by step."""
     found: dict[str, Any] = {}
     for name, stale in (("split", False), ("strict", True)):
-        agents, plane = Meeting(gain=1.0), Plane(RING)
+        agents, plane = ConsensusAgents(gain=1.0), Plane(RING)
         ring = run(agents, plane, RING_STEPS, seed, Ring(), stale=stale, record=("x",))
         # They attract each other, and repel those that are near: eq. (6.5).
         field = Field(20, bounds=(0.0, 1.0), time_step=0.002)

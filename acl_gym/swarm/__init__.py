@@ -26,6 +26,7 @@ from acl_gym.swarm.channel import (
     Lossy,
     Topology,
 )
+from acl_gym.swarm.consensus import ConsensusAgents
 from acl_gym.swarm.inbox import Inbox
 from acl_gym.swarm.links import Links
 from acl_gym.swarm.protocols import DynamicAgents, Environment
@@ -52,6 +53,7 @@ __all__ = [
     "AggregatingAgents",
     "Channel",
     "ChannelWrapper",
+    "ConsensusAgents",
     "Delayed",
     "DynamicAgents",
     "Environment",

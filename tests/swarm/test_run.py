@@ -13,6 +13,7 @@ import pytest
 
 from acl_gym.swarm import (
     Channel,
+    ConsensusAgents,
     Delayed,
     DynamicAgents,
     Environment,
@@ -48,27 +49,11 @@ class Plane(Environment):
         self.time += 1
 
 
-class Averaging(DynamicAgents):
-    """Agents that go a part of the way to the mean of what they hear."""
-
-    def __init__(self, gain: Any = 0.5, jitter: float = 0.0) -> None:
-        self.gain, self.jitter = gain, jitter
-
-    def reset(self, n: int, rng: np.random.Generator) -> None:
-        self.own = self.aim = np.zeros((n, 2))
-
-    def observe(self, y: Any) -> None:
-        self.own = y
-
-    def send(self) -> dict[str, Any]:
-        return {"x": self.own}
-
-    def hear(self, inbox: Inbox) -> None:
-        self.aim = inbox.mean(inbox.messages["x"], default=self.own)
+class Jittery(ConsensusAgents):
+    """Agents that draw random numbers to decide."""
 
     def decide(self, rng: np.random.Generator) -> Any:
-        coins = rng.normal(size=self.own.shape)
-        return self.gain * (self.aim - self.own) + self.jitter * coins
+        return super().decide(rng) + 0.1 * rng.normal(size=self.positions.shape)
 
 
 def averaged(x: np.ndarray, heard_x: np.ndarray, k: int) -> np.ndarray:
@@ -83,7 +68,7 @@ def averaged(x: np.ndarray, heard_x: np.ndarray, k: int) -> np.ndarray:
 @pytest.mark.parametrize("stale", [False, True])
 @pytest.mark.parametrize("k", [1, 2])
 def test_a_run_is_the_loop_over_agents(k: int, stale: bool) -> None:
-    history = run(Averaging(), Plane(), 8, 3, Ring(k), stale=stale, record=("x",))
+    history = run(ConsensusAgents(), Plane(), 8, 3, Ring(k), stale=stale, record=("x",))
     x = history["x"]
     assert x.shape == (9, 6, 2)
     np.testing.assert_array_equal(x[0], np.random.default_rng(3).normal(size=(6, 2)))
@@ -94,8 +79,8 @@ def test_a_run_is_the_loop_over_agents(k: int, stale: bool) -> None:
 
 def test_a_delay_of_one_step_is_what_stale_means_here() -> None:
     """Messages hold observations only, and neighbourhoods do not depend on positions."""
-    stale = run(Averaging(), Plane(), 8, 3, Ring(), stale=True, record=("x",))
-    late = run(Averaging(), Plane(), 8, 3, Delayed(Ring(), 1), record=("x",))
+    stale = run(ConsensusAgents(), Plane(), 8, 3, Ring(), stale=True, record=("x",))
+    late = run(ConsensusAgents(), Plane(), 8, 3, Delayed(Ring(), 1), record=("x",))
     np.testing.assert_array_equal(stale["x"], late["x"])
 
 
@@ -146,7 +131,7 @@ def test_strictly_agents_send_before_they_observe() -> None:
 def test_the_same_seed_gives_the_same_bits(stale: bool) -> None:
     def x(rng: Any) -> np.ndarray:
         channel = Delayed(Lossy(Radius(1.5), 0.3), 2)
-        agents, plane = Averaging(jitter=0.1), Plane(40, noise=0.1)
+        agents, plane = Jittery(), Plane(40, noise=0.1)
         return run(agents, plane, 20, rng, channel, stale=stale, record=("x",))["x"]
 
     assert x(7).tobytes() == x(7).tobytes() == x(np.random.default_rng(7)).tobytes()
@@ -155,7 +140,7 @@ def test_the_same_seed_gives_the_same_bits(stale: bool) -> None:
 
 
 def test_parts_are_reset_before_each_run() -> None:
-    agents, plane, channel = Averaging(), Plane(), Delayed(Everyone(), 3)
+    agents, plane, channel = ConsensusAgents(), Plane(), Delayed(Everyone(), 3)
     first = run(agents, plane, 5, 1, channel, record=("x",))
     again = run(agents, plane, 5, 1, channel, record=("x",))
     np.testing.assert_array_equal(first["x"], again["x"])
@@ -163,7 +148,7 @@ def test_parts_are_reset_before_each_run() -> None:
 
 def test_symmetric_links_keep_the_centre() -> None:
     def drift(channel: Channel) -> float:
-        x = run(Averaging(), Plane(60), 50, 0, channel, record=("x",))["x"]
+        x = run(ConsensusAgents(), Plane(60), 50, 0, channel, record=("x",))["x"]
         return float(np.abs(x[-1].mean(axis=0) - x[0].mean(axis=0)).max())
 
     for channel in (Everyone(), Ring(2), Lossy(Everyone(), 0.0)):
@@ -173,17 +158,17 @@ def test_symmetric_links_keep_the_centre() -> None:
 
 def test_each_agent_may_have_parameters_of_its_own() -> None:
     """Definition 6.8; those with gain 0 stand still, and the others come to them."""
-    gain = np.array([[0.0], [0.5], [1.0]])
-    x = run(Averaging(gain), Plane(3), 200, 0, record=("x",))["x"]
+    gain = np.array([0.0, 0.5, 1.0])
+    x = run(ConsensusAgents(gain), Plane(3), 200, 0, record=("x",))["x"]
     np.testing.assert_array_equal(x[-1, 0], x[0, 0])
     np.testing.assert_allclose(x[-1], np.tile(x[0, 0], (3, 1)), atol=1e-12)
 
 
 def test_the_environment_ends_the_run() -> None:
-    history = run(Averaging(), Plane(lasts=4), 10, 0, record=("x", "time"))
+    history = run(ConsensusAgents(), Plane(lasts=4), 10, 0, record=("x", "time"))
     assert (history.steps, history.done) == (4, True)
     assert history["time"].tolist() == [0, 1, 2, 3, 4]
-    at_once = run(Averaging(), Plane(lasts=0), 10, 0, record=["x"])
+    at_once = run(ConsensusAgents(), Plane(lasts=0), 10, 0, record=["x"])
     assert (at_once.steps, at_once.done) == (0, True)
     assert at_once["x"].shape == (1, 6, 2)
 
@@ -192,17 +177,17 @@ def test_the_environment_ends_the_run() -> None:
 def test_a_callback_sees_each_step_and_may_end_the_run(no: Any) -> None:
     seen = []
 
-    def callback(step: int, agents: Averaging, plane: Plane) -> Any:
-        seen.append((step, plane.time, np.array_equal(agents.own, plane.x)))
+    def callback(step: int, agents: ConsensusAgents, plane: Plane) -> Any:
+        seen.append((step, plane.time, np.array_equal(agents.positions, plane.x)))
         return no if step == 3 else None
 
-    history = run(Averaging(), Plane(), 10, 0, callback=callback)
+    history = run(ConsensusAgents(), Plane(), 10, 0, callback=callback)
     assert (history.steps, history.done) == (3, False)
     assert seen == [(1, 1, False), (2, 2, False), (3, 3, False)]
 
 
 def test_nothing_is_recorded_unless_asked_for() -> None:
-    history = run(Averaging(), Plane(), 0, 0)
+    history = run(ConsensusAgents(), Plane(), 0, 0)
     assert (history.steps, history.done, history.recorded) == (0, False, {})
 
 
@@ -236,7 +221,7 @@ class Passing(Channel):
 def test_what_a_channel_delivers_is_checked(delivered, error, words, wrapper) -> None:
     channel = Passing(delivered)
     with pytest.raises(error, match=words):
-        run(Averaging(), Plane(), 2, 0, wrapper(channel) if wrapper else channel)
+        run(ConsensusAgents(), Plane(), 2, 0, wrapper(channel) if wrapper else channel)
 
 
 def test_what_cannot_be_recorded_is_refused() -> None:
@@ -250,7 +235,7 @@ def test_what_cannot_be_recorded_is_refused() -> None:
         ("trail", r"keep their shape, got 'trail', whose shape was \(1,\) and is now"),
     ):
         with pytest.raises(ValueError, match=words):
-            run(Averaging(), Growing(), 3, 0, record=(name,))
+            run(ConsensusAgents(), Growing(), 3, 0, record=(name,))
 
 
 def test_states_are_there_after_the_first_reset() -> None:
@@ -279,7 +264,7 @@ class Vehicles(Plane):
 def test_channels_go_by_positions_not_by_states() -> None:
     counts = []
 
-    class Counting(Averaging):
+    class Counting(ConsensusAgents):
         def hear(self, inbox: Inbox) -> None:
             super().hear(inbox)
             counts.append(inbox.count.tolist())
@@ -297,7 +282,7 @@ def test_positions_that_diverge_end_in_one_clear_error(bad, channel) -> None:
             self.x[4, 1] = bad if self.time == 2 else self.x[4, 1]
 
     with pytest.raises(ValueError, match=r"positions must be numbers .* for agent 4"):
-        run(Averaging(), Broken(), 5, 0, channel)
+        run(ConsensusAgents(), Broken(), 5, 0, channel)
 
 
 def test_the_number_of_agents_must_not_change() -> None:
@@ -306,13 +291,17 @@ def test_the_number_of_agents_must_not_change() -> None:
             self.x = self.x[1:]
 
     with pytest.raises(ValueError, match=r"positions must be .* shape \(6, dim\)"):
-        run(Averaging(), Shrinking(), 5, 0)
+        run(ConsensusAgents(), Shrinking(), 5, 0)
 
 
 @pytest.mark.parametrize(
     ("changes", "error", "words"),
     [
-        ({"agents": Averaging}, TypeError, "subclass of DynamicAgents, got <class"),
+        (
+            {"agents": ConsensusAgents},
+            TypeError,
+            "subclass of DynamicAgents, got <class",
+        ),
         ({"environment": None}, TypeError, "subclass of Environment, got None"),
         ({"channel": Ring}, TypeError, "subclass of Channel, got <class"),
         ({"steps": -1}, ValueError, "steps must be at least 0, got -1"),
@@ -325,7 +314,11 @@ def test_the_number_of_agents_must_not_change() -> None:
     ],
 )
 def test_arguments_of_the_wrong_kind_are_refused(changes, error, words) -> None:
-    arguments = {"agents": Averaging(), "environment": Plane(), "steps": 1} | changes
+    arguments = {
+        "agents": ConsensusAgents(),
+        "environment": Plane(),
+        "steps": 1,
+    } | changes
     with pytest.raises(error, match=words.replace("(", r"\(").replace(")", r"\)")):
         run(**arguments)
 

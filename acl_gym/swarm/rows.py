@@ -50,6 +50,26 @@ def checked_positions(positions: Any, n: int | None = None) -> FloatArray:
     return rows
 
 
+def checked_rows(name: str, values: Any, shape: tuple[int, int]) -> FloatArray:
+    """Check that there is a row of real numbers for each agent; they need not be finite.
+
+    Args:
+        name: of the argument, for the message.
+        values: `(n, dim)`.
+        shape: what it must be.
+
+    Raises:
+        ValueError: `values` does not have this shape, or holds no real numbers.
+    """
+    array = validation.as_array(values)
+    if array is None or array.dtype.kind not in "iuf" or array.shape != shape:
+        raise ValueError(
+            f"{name} must be an array of numbers of shape {shape}, a row for each agent, "
+            f"got {validation.shown(values)}."
+        )
+    return np.ascontiguousarray(array, dtype=np.float64)
+
+
 @njit
 def _first_beyond(rows: FloatArray, limit: float) -> int:
     """The first row with an entry that is NaN or larger than the limit; -1: none."""

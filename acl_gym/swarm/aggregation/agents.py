@@ -15,6 +15,7 @@ from acl_gym.swarm.aggregation.interaction import (
 )
 from acl_gym.swarm.inbox import Inbox
 from acl_gym.swarm.protocols import DynamicAgents
+from acl_gym.swarm.rows import checked_positions, checked_rows
 from acl_gym.utils.typing import FloatArray
 
 
@@ -52,7 +53,7 @@ class AggregatingAgents(DynamicAgents):
                 `Field`; or the positions alone.
 
         Raises:
-            ValueError: there are no positions.
+            ValueError: there are no positions, or they or slopes are no rows of numbers.
         """
         seen = y if isinstance(y, dict) else {"position": y}
         if "position" not in seen:
@@ -60,8 +61,11 @@ class AggregatingAgents(DynamicAgents):
                 "observations must have a 'position', as those of a Field have, got "
                 f"{sorted(map(str, seen))}; use another environment."
             )
-        self._position = np.asarray(seen["position"], dtype=np.float64)
-        self._slope = seen.get("slope")
+        self._position = checked_positions(seen["position"])
+        slope = seen.get("slope")
+        if slope is not None:
+            slope = checked_rows("slope", slope, self._position.shape)
+        self._slope = slope
 
     def send(self) -> dict[str, NDArray[Any]]:
         """Say where each agent is: `"position"`, `(n, dim)`."""

@@ -12,7 +12,7 @@ from acl_gym.swarm.aggregation.obstacles import Obstacles
 from acl_gym.swarm.aggregation.particles import Kinematic, Particles
 from acl_gym.swarm.aggregation.profiles import Profile
 from acl_gym.swarm.protocols import Environment
-from acl_gym.swarm.rows import FARTHEST, checked_positions
+from acl_gym.swarm.rows import FARTHEST, checked_positions, checked_rows
 from acl_gym.utils import validation
 from acl_gym.utils.typing import FloatArray
 
@@ -140,12 +140,7 @@ class Field(Environment):
         Raises:
             ValueError: an input is not a finite number.
         """
-        inputs = np.asarray(u, dtype=np.float64)
-        if inputs.shape != (self._count, self._dim):
-            raise ValueError(
-                f"u must have shape ({self._count}, {self._dim}), a row for each agent, "
-                f"got {inputs.shape}."
-            )
+        inputs = checked_rows("u", u, (self._count, self._dim))
         if not np.isfinite(inputs).all():
             agent = int(np.flatnonzero(~np.isfinite(inputs).all(axis=1))[0])
             raise ValueError(

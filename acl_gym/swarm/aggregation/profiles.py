@@ -17,6 +17,9 @@ from acl_gym.utils import validation
 from acl_gym.utils.compiling import njit
 from acl_gym.utils.typing import FloatArray
 
+NARROWEST = 1e-150
+"""Squares of widths from this on are not rounded to 0."""
+
 
 class Profile(ABC):
     """A differentiable function of the position."""
@@ -113,8 +116,11 @@ class Gaussians(Profile):
         centres = validation.real_array("centres", self.centres, ndim=2)
         depths = for_each("depths", self.depths, len(centres))
         widths = for_each("widths", self.widths, len(centres))
-        if (widths <= 0).any():
-            raise ValueError(f"widths must be > 0, got {widths.min():g}.")
+        if not (widths >= NARROWEST).all():
+            raise ValueError(
+                f"widths must be > 0, and {NARROWEST:g} or more, as their squares are "
+                f"divided by, got {widths.min():g}."
+            )
         _set(self, centres=centres, depths=depths, widths=widths)
 
     def value(self, positions: FloatArray) -> FloatArray:

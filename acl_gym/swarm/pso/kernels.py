@@ -140,18 +140,17 @@ def move(
         boundary: `NONE`, `CLIP`, `ABSORB` or `REFLECT`.
         limit: largest absolute velocity, may be inf, `(d,)`.
         literal: move with the old velocity.
-        farthest: how far from 0 a position may be if `boundary` is `NONE`.
+        farthest: how far from 0 a position may be, after the bounds.
 
     Returns:
         Whether all states are finite, and no position is farther away. Where they are
         not, no particle is to be used any more.
     """
     n, d = u.shape
-    reach = min(farthest, LARGEST) if boundary == NONE else LARGEST
     finite = True
     for i in range(n):
         w, theta, nu, added = inertia[i], x[i, :d], x[i, d:], u[i]
-        inside = True
+        inside = near = True
         # Without a branch, so that compilers make vector instructions of it.
         for k in range(d):
             old = nu[k]
@@ -161,16 +160,19 @@ def move(
             new = -limit[k] if new < -limit[k] else new
             place = theta[k] + (old if literal else new)
             nu[k], theta[k] = new, place
-            finite &= (abs(place) <= reach) & (abs(new) <= LARGEST)
+            finite &= (abs(place) <= LARGEST) & (abs(new) <= LARGEST)
+            near &= abs(place) <= farthest
             inside &= (lower[k] <= place) & (place <= upper[k])
         if inside or boundary == NONE or not finite:
+            finite &= near
             continue
         for k in range(d):
             if lower[k] <= theta[k] <= upper[k]:
+                finite &= abs(theta[k]) <= farthest  # a bound may be infinite
                 continue
             if boundary == REFLECT:
                 theta[k], nu[k] = mirror(theta[k], nu[k], lower[k], upper[k])
-                finite &= math.isfinite(theta[k])
+                finite &= abs(theta[k]) <= farthest
             else:
                 theta[k] = min(max(theta[k], lower[k]), upper[k])
                 if boundary == ABSORB:

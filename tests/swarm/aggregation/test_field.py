@@ -98,7 +98,8 @@ def test_an_obstacle_repels_within_its_reach_and_stops_what_enters() -> None:
         (lambda: Quadratic([0.0], math.inf), "curvature must lie in"),
         (lambda: Gaussians([0.0, 0.0]), "centres must be an array of 2 axes"),
         (lambda: Gaussians([[0, 0]], [1, 2]), "depths must be a number or have one"),
-        (lambda: Gaussians([[0, 0]], 1, 0), "widths must be > 0, got 0"),
+        (lambda: Gaussians([[0, 0]], 1, 0), "widths must be > 0.* got 0"),
+        (lambda: Gaussians([[0, 0]], 1, 1e-200), "1e-150 or more.* got 1e-200"),
         (lambda: Obstacles([[0, 0]], -1), "radii must be > 0, got -1"),
         (lambda: Obstacles([[0, 0]], 1, reach=-1), "reach must lie in"),
         (
@@ -276,7 +277,9 @@ def test_no_room_beside_the_obstacles() -> None:
 @pytest.mark.parametrize(
     ("u", "message"),
     [
-        (np.zeros((3, 2)), r"u must have shape \(2, 2\)"),
+        (np.zeros((3, 2)), r"u must be an array of numbers of shape \(2, 2\)"),
+        ("abc", "u must be an array of numbers"),
+        (np.zeros((2, 2), complex), "u must be an array of numbers"),
         (np.full((2, 2), np.nan), "inputs must be finite, got .* for agent 0"),
         ([[0.0, 0.0], [np.inf, 0.0]], "inputs must be finite, got .* for agent 1"),
     ],

@@ -520,3 +520,26 @@ def test_bad_arguments_are_refused(
 ) -> None:
     with pytest.raises(error, match=message):
         quickly(**arguments)
+
+
+@pytest.mark.parametrize("boundary", ["none", "clip", "absorb", "reflect"])
+@pytest.mark.parametrize("topology", ["global", Radius(1.0)], ids=["global", "radius"])
+@pytest.mark.parametrize("upper", [np.inf, 1.0], ids=["no bounds", "one bound"])
+def test_bounds_that_are_infinite_hold_no_swarm_back(
+    boundary: str, topology: Any, upper: float
+) -> None:
+    start = np.random.default_rng(0).uniform(-1.0, 1.0, (40, 3))
+    found = minimize(
+        sphere,
+        [(-np.inf, upper)] * 3,
+        x0=start,
+        order="literal",
+        boundary=boundary,
+        topology=topology,
+        max_iterations=1_500,
+        seed=0,
+    )
+    assert np.isfinite(found.x).all()
+    assert found.success != ("the swarm has exploded" in found.message)
+    if upper == np.inf:
+        assert not found.success

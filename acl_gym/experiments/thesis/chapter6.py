@@ -7,7 +7,6 @@ from typing import Any
 
 from acl_gym.experiments.study import Experiment
 from acl_gym.experiments.swarms.study import AGGREGATION, ANTS, PSO, SwarmStudy
-from acl_gym.experiments.thesis.common import fewer
 from acl_gym.swarm.pso.benchmark_functions import BENCHMARK_FUNCTIONS
 
 AGENTS, TIME_STEP, STEPS = 50, 0.002, 2_000
@@ -128,12 +127,10 @@ def _pso_channels(largest: float) -> dict[str, dict[str, Any]]:
 
 
 SWARMS = {
-    function: fewer(
-        {
-            label: particles(function, channel)
-            for label, channel in _pso_channels(benchmark.largest).items()
-        }
-    )
+    function: {
+        label: particles(function, channel)
+        for label, channel in _pso_channels(benchmark.largest).items()
+    }
     for function, benchmark in BENCHMARK_FUNCTIONS.items()
 }
 

@@ -135,7 +135,7 @@ def test_what_takes_long_beside_the_thesis_has_fewer_runs() -> None:
     long = {name for name, most in by_runs.items() if most == {FEWER}}
     assert long == {
         *("navigation-long", "omega-max", "local-update"),
-        *("pendulum-long", "fuzzy-ants", "fig6.optimum"),
+        *("pendulum-long", "fuzzy-ants"),
     }
     assert all(most == {None} for name, most in by_runs.items() if name not in long)
 

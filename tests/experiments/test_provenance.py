@@ -163,6 +163,7 @@ def test_nothing_that_runs_is_forgotten() -> None:
         "acl_gym.evaluation.trajectory",
         "acl_gym.swarm.aggregation.bounds",
         "acl_gym.swarm.aggregation.flow",
+        "acl_gym.swarm.consensus",
         "acl_gym.swarm.pso.stability",
     )
     by_packages = {n for n in forgotten if n.startswith(of_packages)}

@@ -212,11 +212,7 @@ def _by_sender(
         order: the receivers in that order.
     """
     n = order.size
-    begin = np.zeros(n + 1, np.int64)
-    for j in sender:
-        begin[j + 1] += 1
-    for j in range(n):
-        begin[j + 1] += begin[j]
+    begin = _begins(sender, n)
     free = begin[:-1].copy()
     receivers = np.empty_like(sender)
     link = 0
@@ -230,14 +226,29 @@ def _by_sender(
 
 
 @njit
+def _begins(agents: IntArray, n: int) -> IntArray:
+    """Where the links of each of `n` agents begin, if they stand one agent after another.
+
+    Args:
+        agents: whose each link is, in any order.
+        n: the number of agents.
+
+    Returns:
+        `(n + 1,)`; the last entry is the number of links.
+    """
+    begin = np.zeros(n + 1, np.int64)
+    for i in agents:
+        begin[i + 1] += 1
+    for i in range(n):
+        begin[i + 1] += begin[i]
+    return begin
+
+
+@njit
 def _transposed(receivers: IntArray, begin: IntArray) -> tuple[IntArray, IntArray]:
     """The senders of each receiver, in ascending order."""
     n = begin.size - 1
-    offsets = np.zeros(n + 1, np.int64)
-    for i in receivers:
-        offsets[i + 1] += 1
-    for i in range(n):
-        offsets[i + 1] += offsets[i]
+    offsets = _begins(receivers, n)
     free = offsets[:-1].copy()
     senders = np.empty_like(receivers)
     for j in range(n):

@@ -102,6 +102,9 @@ class Improving:
         """
         begins = self._enter(model)
         self.cost = np.inf if self.best is None else self._cost(self.best, states)
+        # Kept apart from the cost of the policy last taken: that may be higher by the
+        # doubt, and shares of shares would let it rise without end.
+        least = self.cost
         # A colony that begins needs time before it can surpass the best of those before.
         patience = most_steps if begins else PATIENCE * most_steps
         # Where the model errs, small differences between costs mean little. Then a later
@@ -115,12 +118,13 @@ class Improving:
             done += chunk
             own = isinstance(self.agent, TabularAgent)
             cost = self._cost(self.agent.policy if own else self.agent, states)
-            in_vain = 0 if cost < (1.0 - BETTER) * self.cost else in_vain + chunk
+            in_vain = 0 if cost < (1.0 - BETTER) * least else in_vain + chunk
             # Where the agent itself stands for its policy, the older one is lost.
-            if cost <= (1.0 + doubt) * self.cost or self.best is self.agent:
+            if cost <= (1.0 + doubt) * least or self.best is self.agent:
                 self.best, self.cost = self._snapshot(), cost
                 if self._best_file is not None and hasattr(self.agent, "save"):
                     self.agent.save(self._best_file)
+            least = min(least, cost)
         return done
 
     def _enter(self, model: LearnedVectorEnv) -> bool:

@@ -179,3 +179,23 @@ def test_a_colony_that_was_given_forgets_its_paths_in_a_model_that_was_wrong() -
     improving.improve(learned_model(80, heavier=True), STATES, LEAST_CHUNK)
     assert improving.agent is colony
     assert forgot
+
+
+def test_what_a_later_policy_may_cost_more_does_not_add_up(
+    model: LearnedVectorEnv, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("acl_gym.model_based.improving.DOUBT", 1e6)  # the most: 10%
+    costs = iter([100.0, 109.0, 118.0, 109.9, 111.0, 99.9])
+    monkeypatch.setattr(Improving, "_cost", lambda *_: next(costs))
+    improving = Improving(Turning, None)
+    taken: list[int] = []
+    snapshot = improving._snapshot
+
+    def taking() -> Any:
+        taken.append(improving.agent.chunks)
+        return snapshot()
+
+    monkeypatch.setattr(improving, "_snapshot", taking)
+    improving.improve(model, STATES, 6 * LEAST_CHUNK)
+    assert taken == [1, 2, 4, 6]
+    assert improving.cost == 99.9

@@ -64,14 +64,33 @@ WARM = 40
 """The most interactions of a run whose only purpose is that kernels are compiled."""
 
 LOOKS: dict[str, dict[str, Any]] = {
-    "model": {"color": "#D55E00", "marker": "o", "markersize": 3},
-    "model-acl": {"color": "black", "marker": "^", "markersize": 3},
-    "model-q": {"color": "#009E73", "marker": "s", "markersize": 3},
-    "returning": {"color": "#D55E00", "linestyle": "--"},
-    "q-learning": {"color": "#009E73", "linestyle": "--"},
-    "q-replay": {"color": "#CC79A7", "linestyle": "--"},
-    "dqn": {"color": "#0072B2", "linestyle": "--"},
-    "pets": {"color": "#56B4E9", "linestyle": "-."},
+    "model": {
+        "label": "returning colony in a model",
+        "color": "#D55E00",
+        "marker": "o",
+        "markersize": 3,
+    },
+    "model-acl": {
+        "label": "ACL in a model",
+        "color": "black",
+        "marker": "^",
+        "markersize": 3,
+    },
+    "model-q": {
+        "label": "Q(λ) in a model",
+        "color": "#009E73",
+        "marker": "s",
+        "markersize": 3,
+    },
+    "returning": {"label": "returning colony", "color": "#D55E00", "linestyle": "--"},
+    "q-learning": {"label": "Q(λ)", "color": "#009E73", "linestyle": "--"},
+    "q-replay": {
+        "label": "Q-learning with replay",
+        "color": "#CC79A7",
+        "linestyle": "--",
+    },
+    "dqn": {"label": "DQN", "color": "#0072B2", "linestyle": "--"},
+    "pets": {"label": "PETS", "color": "#56B4E9", "linestyle": "-."},
 }
 """Of the methods in a figure; those without a model are dashed."""
 
@@ -174,7 +193,7 @@ def figure(rows: Sequence[Row], best: float | None, path: Path) -> None:
 
     entries = summary(rows, best)
     with style.in_style():
-        drawing = style.new_figure(3.6)
+        drawing = style.new_figure(4.6)
         ax = drawing.add_subplot()
         for method in dict.fromkeys(each["method"] for each in entries):
             # Of numbers that are passed in one trial the last.
@@ -184,14 +203,15 @@ def figure(rows: Sequence[Row], best: float | None, path: Path) -> None:
                 }.values()
             )
             made = [each["made"] for each in mine]
-            look = LOOKS[method]
+            look = dict(LOOKS[method])
+            label = look.pop("label")
             ends = [[each[end] for each in mine] for end in ("lowest", "highest")]
             ax.fill_between(made, *ends, color=look["color"], alpha=0.15, linewidth=0)
             runs = max(each["runs"] for each in mine)
             ax.plot(
                 made,
                 [each["median"] for each in mine],
-                label=f"{method}, {runs} {'run' if runs == 1 else 'runs'}",
+                label=f"{label}, {runs} {'run' if runs == 1 else 'runs'}",
                 **look,
             )
         ax.set_xscale("log")
@@ -202,9 +222,17 @@ def figure(rows: Sequence[Row], best: float | None, path: Path) -> None:
         if best is not None:
             ax.axhline(best, **style.BOUND)
             for more in NEAR:
-                ax.axhline((1 + more) * best, **{**style.BOUND, "linestyle": ":"})
+                bound = (1 + more) * best
+                ax.axhline(bound, **{**style.BOUND, "linestyle": ":"})
+                ax.annotate(
+                    f" +{more:.0%}",
+                    (1.0, bound),
+                    xycoords=ax.get_yaxis_transform(),
+                    va="center",
+                    fontsize="small",
+                )
         ax.set(xlabel="interactions with the plant", ylabel="cost of the policy")
-        ax.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
+        ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=2)
         drawing.savefig(path, dpi=150)
 
 

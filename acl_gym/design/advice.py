@@ -25,7 +25,8 @@ TURNS = (2.0 * math.pi, 360.0)
 """A full turn in radians and in degrees."""
 
 ANGLE = re.compile(
-    r"\bangle|\b(theta|phi|psi)\b|[θφψ]|(\b(rad|deg|degrees?)\b|°)(?!\s*/)", re.IGNORECASE
+    r"\bangle|\b(theta|phi|psi)\b|[θφψ]|(\b(rad|deg|degrees?)\b|°)(?!\s*/)",
+    re.IGNORECASE,
 )
 """What the name of a variable that is an angle says, but not the name of a rate."""
 

@@ -13,8 +13,8 @@ import acl_gym
 from acl_gym.design.advice import (
     advice,
     advice_on_model,
-    forgotten_angles,
     fault_of_model,
+    forgotten_angles,
     state_in_words,
 )
 from acl_gym.design.learning import Choice, Learned, Quality
@@ -217,7 +217,7 @@ def test_an_angle_that_was_not_named_in_circular_comes_first(
     failed = measure(respond([1] * 20, [[4.0, 0.0]]), plant)
     assert failed.success_rate == 0.0
     first, *_, last = advice(learned("converged"), failed, plant)
-    short = name.split(", ")[0]
+    short = name.split(", ", maxsplit=1)[0]
     assert first.startswith(f"Name {short} in circular=") == suspected
     assert ("Name the angles" in last) != suspected
     assert forgotten_angles(integrator(circular=[1], **far).system) == []

@@ -6,7 +6,6 @@ import re
 import shutil
 import subprocess
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -33,7 +32,7 @@ def blocks(language: str) -> list[str]:
 
 
 @pytest.fixture(scope="module")
-def section(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, Any]]:
+def section(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     """What the Python of the section defines, run in a folder with pendulum.py."""
     folder = tmp_path_factory.mktemp("take-over")
     (folder / "pendulum.py").write_text(example("pendulum"))
@@ -46,7 +45,7 @@ def section(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, Any]
         for block in blocks("python"):
             exec(compile(block, str(PAGE), "exec"), names)
         sys.modules.pop("pendulum", None)
-    yield {**names, "folder": folder}
+    return {**names, "folder": folder}
 
 
 def test_the_figures_are_those_of_the_page(section: dict[str, Any]) -> None:

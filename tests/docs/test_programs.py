@@ -74,9 +74,9 @@ def test_continuous_actions() -> None:
     assert cost_of(names["agent"]) == pytest.approx(42.7, abs=0.1)
     (torque,) = names["policy"].predict([3.3, 0.1])[0]
     assert torque == pytest.approx(-0.8)
-    assert "swing_up_input(const float x[2], float u[1])" in Path(
-        "swing_up.h"
-    ).read_text(encoding="utf-8")
+    assert "policy_input(const float x[2], float u[1])" in Path("swing_up.h").read_text(
+        encoding="utf-8"
+    )
 
 
 def test_learning_from_data(capsys: pytest.CaptureFixture[str]) -> None:

@@ -43,6 +43,15 @@ def test_asynchronous() -> None:
     assert walking["synchronous"] < walking["asynchronous"] == 1.0
 
 
+def test_how_many_ants() -> None:
+    arguments = ["--ants", "2", "5", "--seeds", "2", "--interactions", "4000"]
+    rows = output_of("how_many_ants.py", *arguments)["rows"]
+    assert [row["ants"] for row in rows] == [2, 5]
+    for row in rows:
+        assert 300 <= row["good after"] <= row["slowest"] <= 4_500
+        assert 38.0 < row["last cost"] <= row["highest"] < 100.0
+
+
 def test_numbered_actions() -> None:
     rows = output_of("numbered_actions.py", "--steps", "20", "--seeds", "2")["rows"]
     assert len(rows) == 3

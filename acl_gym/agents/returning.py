@@ -256,8 +256,11 @@ class ReturningACL(InformedAgent, ColonyAgent):
     ) -> Self:
         """Let the ants walk, remember, walk back and, where it may, the partition grow.
 
-        A trial is one episode in every slot, or more, see `schedule`. Called again, it
-        continues from the levels and the memory as they are.
+        In a trial every ant sets out, walks until its episode ends, and waits for the
+        others. Two arguments change this: after `restart_after` steps, at first 60, all
+        set out anew, so that a trial may be shorter than an episode; and with an
+        asynchronous `schedule` ants do not wait. Called again, it continues from the
+        levels and the memory as they are.
 
         Args:
             total_timesteps: stop after the trial that reaches this many steps of all

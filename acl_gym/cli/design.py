@@ -35,7 +35,8 @@ FILE describes the plant by equations (PLANT.py) or by measurements (DATA.csv).
 PLANT.py is a Python file that calls acl_gym.plant(...) and keeps what it returns in a
 name, such as env = acl_gym.plant(...); or defines make(num_envs), which returns it. The
 file is run. A colony of ants then learns the plant until the goal is reached from 95% of
-the starts and the cost no longer falls, or the time is up.
+the starts and the cost no longer falls, or the time is up. There are as many ants as
+num_envs= of the file says; 5, or 10 for three variables and more, if it is 1 or left out.
 
 DATA.csv (or .parquet) has a row for each moment, and names of columns in its first row:
 those of --state, and those of --input, which are held from one row to the next. A model

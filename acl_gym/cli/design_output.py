@@ -76,8 +76,8 @@ def print_design(made: Design) -> None:
     lines = [
         f"The goal is reached from {measures.success_rate:.1%} of {measures.starts:,} "
         f"random starts; {measures.settled_rate:.1%} stay there.",
-        f"Learned from {made.learned.interactions:,} interactions in "
-        f"{made.learned.seconds:.1f} s; {made.summary['seconds']:.1f} s in all.",
+        f"{made.learned.ants} ants learned from {made.learned.interactions:,} interactions "
+        f"in {made.learned.seconds:.1f} s; {made.summary['seconds']:.1f} s in all.",
     ]
     for line in lines:
         screen.print(line, markup=False, highlight=False, soft_wrap=True)

@@ -40,7 +40,7 @@ def train(
         typer.Option(
             min=1,
             metavar="K",
-            help="Number of trials; in each, every ant makes one episode. With --resume: "
+            help="Number of trials; in each, every ant sets out once. With --resume: "
             "that many more.  [default: 100; with --resume: what an interrupted run had "
             "left, or 100 more]",
             show_default=False,

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import re
 from collections.abc import Mapping
 from typing import Any
 
@@ -19,6 +21,15 @@ MOSTLY = 0.5
 NOTHING = 0.95
 """The error in cross-validation from which on a variable is not predicted at all."""
 
+TURNS = (2.0 * math.pi, 360.0)
+"""A full turn in radians and in degrees."""
+
+ANGLE = re.compile(
+    r"\bangle|\b(theta|phi|psi)\b|[θφψ]|(\b(rad|deg|degrees?)\b|°)(?!\s*/)",
+    re.IGNORECASE,
+)
+"""What the name of a variable that is an angle says, but not the name of a rate."""
+
 _MORE = {
     "time": "Give it more time, --seconds with a larger number",
     "steps": "Give it more interactions, --steps with a larger number",
@@ -27,6 +38,7 @@ _MORE = {
 
 
 _OPTIONS = {
+    "circular=": "--circular",
     "max_episode_steps=": "--max-steps",
     "tolerance=": "--tolerance",
     "inputs=": "--actions",
@@ -112,7 +124,13 @@ def advice(learned: Learned, measures: Measures, plant: Plant) -> list[str]:
     ]
     if from_data:
         finer = ["Record more, in particular where the report shows an unsure model."]
-    found = []
+    found = [
+        f"Name {plant.variable_names[axis].split(', ')[0]} in circular= if it is an angle: "
+        f"it is not named there, so that {digits(plant.low[axis])} and "
+        f"{digits(plant.high[axis])} count as far apart."
+        for axis in forgotten_angles(plant)
+    ]
+    none_round = not found and not plant.circular
     if learned.ended in _MORE:
         found.append(
             f"{_MORE[learned.ended]}: learning had not come to its end after "
@@ -143,8 +161,35 @@ def advice(learned: Learned, measures: Measures, plant: Plant) -> list[str]:
             "Begin with easier starts (initial=), if the plant never is in all states "
             "between low and high."
         )
+    if none_round:
+        found.append(
+            "Name the angles that can turn all the way round in circular=, if there are "
+            "any: now no variable wraps around."
+        )
     if from_data:
         found = [_as_options(each) for each in found]
+    return found
+
+
+def forgotten_angles(plant: Plant) -> list[int]:
+    """Variables that look like angles of a full turn, and do not wrap around.
+
+    They have a range of one or more full turns, to within 1%, or a range of at least one
+    turn and the name or the unit of an angle.
+
+    Args:
+        plant: the system.
+    """
+    found = []
+    for axis, name in enumerate(plant.variable_names):
+        turns = [(plant.high[axis] - plant.low[axis]) / turn for turn in TURNS]
+        whole = any(
+            round(count) >= 1 and abs(count / round(count) - 1.0) <= 0.01
+            for count in turns
+        )
+        named = ANGLE.search(name) is not None and turns[0] >= 0.99
+        if axis not in plant.circular and (whole or named):
+            found.append(axis)
     return found
 
 

@@ -1,4 +1,4 @@
-"""Which colony learns a plant, so that nobody need choose."""
+"""Which colony learns a plant, so that nobody needs to choose."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from acl_gym.partitions import Partition
 from acl_gym.partitions.automatic import automatic_partition
 
 FEW_ANTS, MORE_ANTS = 5, 10
+"""Ants for a plant of at most two variables, and of more, unless the plant says."""
 
 # Found on the cart-pole swing-up, as were the cells: with the settings for few variables
 # 100,000 steps take 25 s and more, for most of the time goes into walking back.
@@ -35,7 +36,8 @@ def colony_for(env: ControlVectorEnv, seed: int) -> ReturningACL:
     """Make a colony for a plant: few ants, and their settings by its number of variables.
 
     Args:
-        env: the plant; its slots do not matter.
+        env: the plant. If it has two slots or more, there are as many ants. One slot is
+            what a plant has if nobody has chosen, and leaves the number to this function.
         seed: of the colony.
 
     Returns:
@@ -46,10 +48,15 @@ def colony_for(env: ControlVectorEnv, seed: int) -> ReturningACL:
     """
     system = env.system
     if not isinstance(system, Plant) or system.low.size <= 2:
-        return ReturningACL(env.with_slots(FEW_ANTS), seed=seed)
-    own = env.with_slots(MORE_ANTS)
+        return ReturningACL(_with_ants(env, FEW_ANTS), seed=seed)
+    own = _with_ants(env, MORE_ANTS)
     partition = first_cells(own, system)
     return ReturningACL(own, partition, grows=True, seed=seed, **_MANY_VARIABLES)
+
+
+def _with_ants(env: ControlVectorEnv, count: int) -> ControlVectorEnv:
+    """A copy with a slot for each ant, `count` of them where the plant has a single one."""
+    return env.with_slots(env.num_envs if env.num_envs > 1 else count)
 
 
 def first_cells(env: ControlVectorEnv, plant: Plant) -> Partition:

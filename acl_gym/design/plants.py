@@ -122,7 +122,9 @@ def _run(file: Path) -> ModuleType:
         code = compile(file.read_bytes(), str(file.absolute()), "exec")
     except SyntaxError as error:
         line = f", line {error.lineno}" if error.lineno else ""
-        raise PlantFileError(f"{file}{line} is not Python: {error.msg}.") from error
+        # Some of Python's messages end in a question, "Perhaps you forgot a comma?".
+        end = "" if error.msg.endswith((".", "?", "!")) else "."
+        raise PlantFileError(f"{file}{line} is not Python: {error.msg}{end}") from error
     except ValueError as error:  # such as null bytes
         raise PlantFileError(f"{file} is not Python: {error}.") from error
     module = ModuleType(f"plant_file_{file.stem}")

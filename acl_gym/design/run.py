@@ -89,7 +89,9 @@ def design(
 
     Args:
         plant: what `acl_gym.plant` returns, or a `LearnedVectorEnv`; or the path of a
-            Python file that makes one, see `load_plant`. The file is run.
+            Python file that makes one, see `load_plant`. The file is run. Its slots, if
+            there are two or more, are the ants; else there are 5, or 10 for three
+            variables and more.
         out: the folder; it is made if it does not exist, and files of these names in it
             are replaced.
         seed: >= 0; the same seed and number of interactions give the same controller.

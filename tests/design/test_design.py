@@ -174,6 +174,16 @@ def test_a_goal_out_of_reach_is_said_with_what_to_try(tmp_path: Path) -> None:
     assert json.loads((made.folder / "summary.json").read_text())["advice"]
 
 
+@pytest.mark.parametrize(("slots", "ants"), [(None, 5), (1, 5), (3, 3)])
+def test_the_ants_are_as_many_as_the_plant_says(
+    tmp_path: Path, slots: int | None, ants: int
+) -> None:
+    made = design(plant(num_envs=slots), tmp_path / "ants", steps=300)
+    assert made.learned.ants == made.summary["ants"] == ants
+    page = (made.folder / "report.html").read_text()
+    assert f"A colony of {ants} ants" in page
+
+
 def test_over_uncertain_parameters(tmp_path: Path) -> None:
     env = plant(
         dynamics=lambda x, u, p: [x[1], u[0] / p.mass],

@@ -14,6 +14,7 @@ from acl_gym.design.advice import (
     advice,
     advice_on_model,
     fault_of_model,
+    forgotten_angles,
     state_in_words,
 )
 from acl_gym.design.learning import Choice, Learned, Quality
@@ -191,6 +192,35 @@ def test_advice_names_the_worst_start_and_what_to_try() -> None:
     first, *_ = advice(learned("converged"), late, plant)
     assert "max_episode_steps=" in first
     assert "reached later" in first
+
+
+@pytest.mark.parametrize(
+    ("name", "low", "high", "suspected"),
+    [
+        ("q", -np.pi, np.pi, True),
+        ("q", 0.0, 6.28, True),
+        ("q", -180.0, 180.0, True),
+        ("q", -np.pi / 2, np.pi / 2, False),
+        ("q", -4.0, 4.0, False),
+        ("shaft angle, rad", -4.0, 4.0, True),
+        ("q, rad", -4.0, 4.0, True),
+        ("q, rad/s", -4.0, 4.0, False),
+        ("rectangle", -4.0, 4.0, False),
+        ("theta, rad", -0.5, 0.5, False),
+    ],
+)
+def test_an_angle_that_was_not_named_in_circular_comes_first(
+    name: str, low: float, high: float, suspected: bool
+) -> None:
+    far = {"low": [-5.0, low], "high": [5.0, high], "state_names": ["place, m", name]}
+    plant = integrator(circular=[], **far).system
+    failed = measure(respond([1] * 20, [[4.0, 0.0]]), plant)
+    assert failed.success_rate == 0.0
+    first, *_, last = advice(learned("converged"), failed, plant)
+    short = name.split(", ", maxsplit=1)[0]
+    assert first.startswith(f"Name {short} in circular=") == suspected
+    assert ("Name the angles" in last) != suspected
+    assert forgotten_angles(integrator(circular=[1], **far).system) == []
 
 
 def model(unsure: float, *errors: float) -> dict[str, Any]:

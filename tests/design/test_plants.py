@@ -70,6 +70,8 @@ def test_a_main_block_is_not_run(tmp_path: Path) -> None:
     ("text", "message"),
     [
         ("x = (", "line 2 is not Python: '\\(' was never closed"),
+        ("x = [1 2]", "line 2 is not Python: .*Perhaps you forgot a comma\\?$"),
+        ("a b", "line 2 is not Python: invalid syntax\\.$"),
         ("\0", "is not Python"),
         ("x = 1", "must make a plant and keep it in a name"),
         ("\n1 / 0", "line 3, raised ZeroDivisionError: division by zero"),

@@ -120,7 +120,7 @@ def test_links_between_pages_lead_somewhere() -> None:
                 assert target.is_file(), f"{page} links to {link}"
 
 
-@pytest.mark.parametrize("name", ["first-colony", "questions"])
+@pytest.mark.parametrize("name", ["first-colony", "questions", "which-agent"])
 def test_programs_for_newcomers_run(
     name: str,
     tmp_path: Path,
@@ -135,6 +135,8 @@ def test_programs_for_newcomers_run(
     said = capsys.readouterr().out.splitlines()
     if name == "questions":
         assert said == ["10"]
+    elif name == "which-agent":
+        assert said == ["13.0"]
     else:
         cost = float(said[0].split()[1].rstrip(","))
         assert 38.0 < cost < 1.25 * 38.4

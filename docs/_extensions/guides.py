@@ -32,10 +32,9 @@ KERNEL = """\
 c = get_config()
 c.IPKernelApp.log_level = "ERROR"
 c.InteractiveShellApp.exec_lines = [
-    "import logging, warnings",
+    "import logging",
     "logging.getLogger('acl_gym').setLevel('ERROR')  # kernels are compiled",
-    "warnings.filterwarnings('ignore', message='IProgress not found')",
-    "del logging, warnings",
+    "del logging",
 ]
 """
 

@@ -14,6 +14,8 @@ from __future__ import annotations
 import importlib
 import inspect
 import sys
+from collections.abc import Iterator
+from typing import Any
 
 from docutils import nodes
 from sphinx.application import Sphinx
@@ -21,7 +23,11 @@ from sphinx.ext import autosummary
 from sphinx.pycode import ModuleAnalyzer
 from sphinx.util.docutils import SphinxDirective
 from sphinx.util.parsing import nested_parse_to_nodes
+from sphinx.util.rst import escape
 from sphinx.util.typing import ExtensionMetadata
+
+LONGEST_VALUE = 80
+"""Characters of a value that is shown."""
 
 
 class PublicNames(SphinxDirective):
@@ -38,7 +44,7 @@ class PublicNames(SphinxDirective):
         lines = [f".. currentmodule:: {name_of_module}", "", ".. autosummary::"]
         lines += ["   :nosignatures:", "", *(f"   {name}" for name in names), ""]
         for name in names:
-            lines += [f".. {_directive(getattr(module, name))}:: {name}", ""]
+            lines += description(name, getattr(module, name))
         source, line = self.get_source_info()
         found: list[nodes.Node] = nested_parse_to_nodes(
             self.state, "\n".join(lines), source=source, offset=line
@@ -46,12 +52,52 @@ class PublicNames(SphinxDirective):
         return found
 
 
+def description(name: str, value: object) -> list[str]:
+    """The directive that documents a name, as lines of reStructuredText.
+
+    A constant shows its value only if that is short. A collection of claims or of
+    experiments shows a table instead, because its value would fill a megabyte.
+    """
+    directive = _directive(value)
+    lines = [f".. {directive}:: {name}"]
+    if directive == "autodata" and not is_short(value):
+        lines.append("   :no-value:")
+    return [*lines, "", *(f"   {line}".rstrip() for line in _records(value)), ""]
+
+
+def is_short(value: object) -> bool:
+    """Whether a value, as Python writes it, says something in half a line."""
+    written = repr(value)
+    return len(written) <= LONGEST_VALUE and "<" not in written
+
+
 def _directive(value: object) -> str:
     if inspect.isclass(value) and hasattr(value, "__mro__"):
         return "autoexception" if issubclass(value, BaseException) else "autoclass"
-    if inspect.isfunction(value):
+    # A compiled kernel has the function that it is made of.
+    if inspect.isfunction(getattr(value, "py_func", value)):
         return "autofunction"
     return "automodule" if inspect.ismodule(value) else "autodata"
+
+
+def _records(value: object) -> Iterator[str]:
+    """A table of the records in a collection; nothing for any other value."""
+    records = list(value.values()) if isinstance(value, dict) else value
+    if not isinstance(records, list | tuple) or not records:
+        return
+    if not all(hasattr(one, "name") and hasattr(one, "section") for one in records):
+        return
+    rows = [("Name", "Content", "Section"), *map(_row, records)]
+    yield from [".. list-table::", "   :header-rows: 1", ""]
+    for row in rows:
+        for number, cell in enumerate(row):
+            yield f"   {'  -' if number else '* -'} {escape(cell)}"
+    yield ""
+
+
+def _row(record: Any) -> tuple[str, str, str]:
+    content = record.title if hasattr(record, "title") else record.text
+    return record.name, " ".join(content.split()), record.section
 
 
 def _documentation_of_data(

@@ -262,10 +262,17 @@ def test_the_page_appears_complete_or_not_at_all(
     assert (tmp_path / "report.html").read_text() == old
 
 
-def test_the_claims_as_text(tmp_path: Path) -> None:
-    report.write_claims(tmp_path / "claims.md", [CLAIM], {"trial"}, "3 runs")
-    text = (tmp_path / "claims.md").read_text()
-    assert "| C1 | holds | **A claim.** §3; trial | | |" in text
+@pytest.mark.parametrize("drawn", [True, False])
+def test_the_claims_as_text(tmp_path: Path, summed: Outcome, drawn: bool) -> None:
+    figures = tmp_path / "figures"
+    figures.mkdir()
+    if drawn:
+        (figures / "trial.png").write_bytes(PNG)
+    path = tmp_path / "claims.md"
+    report.write_claims(path, [CLAIM], [summed], figures, "3 runs")
+    text = path.read_text()
+    trial = "[trial](figures/trial.png)" if drawn else "trial"
+    assert f"| C1 | holds | **A claim.** §3; {trial} | | |" in text
     rows = [line for line in text.splitlines() if line.startswith("|")]
     assert {line.count("|") for line in rows} == {6}
 

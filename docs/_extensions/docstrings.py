@@ -100,8 +100,7 @@ def _protected(text: list[str]) -> list[str]:
     """Text in which signs stand for themselves and pages are links, outside code."""
     pieces = CODE.split("\n".join(text))
     pieces[::2] = [
-        PAGE.sub(r":doc:`/\1`", SPECIAL.sub(r"\\\g<0>", piece))
-        for piece in pieces[::2]
+        PAGE.sub(r":doc:`/\1`", SPECIAL.sub(r"\\\g<0>", piece)) for piece in pieces[::2]
     ]
     return "".join(pieces).split("\n") if text else []
 

@@ -34,7 +34,8 @@ def _add_tags(
     tags = {
         "og:type": "website",
         "og:site_name": app.config.html_title,
-        "og:title": Markup(context.get("title", "")).striptags() or app.config.html_title,
+        "og:title": Markup(context.get("title", "")).striptags()
+        or app.config.html_title,
         "og:description": description,
         "og:url": f"{app.config.html_baseurl}{page}.html",
         "og:image": f"{app.config.html_baseurl}{app.config.page_picture}",
@@ -61,4 +62,7 @@ def shortened(text: str) -> str:
     """At most `LONGEST` characters of a text, whole words, with dots if it goes on."""
     if len(text) <= LONGEST:
         return text
-    return text[: LONGEST - 1].rpartition(" ")[0].rstrip(" ,;:") + "\N{HORIZONTAL ELLIPSIS}"
+    return (
+        text[: LONGEST - 1].rpartition(" ")[0].rstrip(" ,;:")
+        + "\N{HORIZONTAL ELLIPSIS}"
+    )

@@ -13,11 +13,13 @@ from __future__ import annotations
 
 import importlib
 import inspect
+import re
 import sys
 from collections.abc import Iterator
 from typing import Any
 
 from docutils import nodes
+from sphinx.addnodes import desc_annotation, desc_signature
 from sphinx.application import Sphinx
 from sphinx.ext import autosummary
 from sphinx.pycode import ModuleAnalyzer
@@ -55,20 +57,28 @@ class PublicNames(SphinxDirective):
 def description(name: str, value: object) -> list[str]:
     """The directive that documents a name, as lines of reStructuredText.
 
-    A constant shows its value only if that is short. A collection of claims or of
-    experiments shows a table instead, because its value would fill a megabyte.
+    A collection of claims or of experiments shows a table instead of its value, which
+    would fill a megabyte.
     """
-    directive = _directive(value)
-    lines = [f".. {directive}:: {name}"]
-    if directive == "autodata" and not is_short(value):
-        lines.append("   :no-value:")
-    return [*lines, "", *(f"   {line}".rstrip() for line in _records(value)), ""]
+    records = [f"   {line}".rstrip() for line in _records(value)]
+    lines = [f".. {_directive(value)}:: {name}"]
+    return [*lines, *["   :no-value:" for _ in records[:1]], "", *records, ""]
 
 
-def is_short(value: object) -> bool:
-    """Whether a value, as Python writes it, says something in half a line."""
-    written = repr(value)
-    return len(written) <= LONGEST_VALUE and "<" not in written
+def _hide_values(app: Sphinx, document: nodes.document) -> None:
+    """Remove a value that is long, or that only says where an object lies in memory."""
+    for signature in document.findall(desc_signature):
+        for shown in list(signature.findall(desc_annotation)):
+            text = shown.astext().strip()
+            if text.startswith("=") and not says_something(text[1:].strip()):
+                signature.remove(shown)
+
+
+def says_something(value: str) -> bool:
+    """Whether a value, as Python writes it, is short and is not an address."""
+    return len(value) <= LONGEST_VALUE and not re.search(
+        r"<\w+.* at 0x|<function", value
+    )
 
 
 def _directive(value: object) -> str:
@@ -128,4 +138,5 @@ def setup(app: Sphinx) -> ExtensionMetadata:
     )
     app.add_directive("public-names", PublicNames)
     app.connect("autodoc-process-docstring", _documentation_of_data, priority=50)
+    app.connect("doctree-read", _hide_values)
     return {"version": "1", "parallel_read_safe": True, "parallel_write_safe": True}

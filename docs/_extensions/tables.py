@@ -39,7 +39,7 @@ def holds_text(table: nodes.table) -> bool:
         for body in table.findall(nodes.tbody)
         for row in body.findall(nodes.row)
     ]
-    if not rows or any("morecols" in cell or "morerows" in cell for cell in sum(rows, [])):
+    if any("morecols" in cell or "morerows" in cell for row in rows for cell in row):
         return False
     columns = list(zip(*rows, strict=False))
     return 2 <= len(columns) <= MOST_COLUMNS and any(

@@ -17,6 +17,7 @@ from acl_gym.experiments.claims import Claim, Part
 from acl_gym.experiments.outcome import POINTS, Outcome
 from acl_gym.experiments.results import Results
 from acl_gym.experiments.study import Experiment
+from tests.browser import chromium, needs_chromium, new_tab
 from tests.experiments.synthetic import (
     TRIALS,
     make_experiment,
@@ -277,33 +278,18 @@ def test_the_claims_as_text(tmp_path: Path, summed: Outcome, drawn: bool) -> Non
     assert {line.count("|") for line in rows} == {6}
 
 
-CHROMIUM = next(
-    filter(Path.exists, map(Path, ("/usr/bin/chromium", "/usr/bin/chromium-browser"))),
-    None,
-)
-
-
-@pytest.mark.skipif(CHROMIUM is None, reason="needs chromium (apt install chromium)")
+@needs_chromium
 @pytest.mark.parametrize(("width", "scheme"), [(1280, "dark"), (390, "light")])
 def test_the_page_in_a_browser(
     tmp_path: Path, summed: Outcome, width: int, scheme: str
 ) -> None:
     """No errors, no scrolling sideways; the mouse, the keyboard and no script work."""
-    sync = pytest.importorskip("playwright.sync_api")
     reference = next(each for each in summed["studies"] if each["label"] == "J*")
     del reference["curves"]["sensitivity"]
     write(tmp_path, summed, claims=[CLAIM])
     wrong: list[str] = []
-    with sync.sync_playwright() as playwright:
-        browser = playwright.chromium.launch(
-            executable_path=str(CHROMIUM), args=["--no-sandbox", "--disable-gpu"]
-        )
-        tab = browser.new_page(
-            viewport={"width": width, "height": 800}, color_scheme=scheme
-        )
-        tab.on("pageerror", lambda error: wrong.append(str(error)))
-        tab.on("console", lambda message: wrong.append(message.text))
-        tab.on("requestfailed", lambda request: wrong.append(request.url))
+    with chromium() as browser:
+        tab = new_tab(browser, width, scheme, wrong)
         address = (tmp_path / "report.html").as_uri()
         tab.goto(address)
         assert tab.evaluate("document.documentElement.scrollWidth") <= width
@@ -347,4 +333,3 @@ def test_the_page_in_a_browser(
         alone.goto(address)
         lost = alone.get_by_text("There is no curves/trial.js beside this page.")
         lost.wait_for()
-        browser.close()

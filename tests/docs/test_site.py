@@ -26,6 +26,7 @@ from tests.browser import chromium, needs_chromium, new_tab
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 GENERATED = DOCS / "environments" / "generated"
+SENTENCE = "A sentence that is long enough to be text."
 MODULES = ("acl_gym.costs", "acl_gym.deposits", "acl_gym.schedules")
 
 pytestmark = pytest.mark.skipif(
@@ -213,8 +214,11 @@ def test_constants_show_a_short_value_or_a_table() -> None:
 
 @pytest.mark.parametrize(
     ("cells", "expected"),
-    [(["C1", "a sentence that is long enough to be text"], True), (["x", "3.1"], False)]
-    + [(["a sentence that is long enough to be text"] * 6, False)],
+    [
+        (["C1", SENTENCE], True),
+        (["x", "3.1"], False),
+        ([SENTENCE] * 6, False),
+    ],
 )
 def test_tables_of_text_are_told_from_tables_of_figures(
     cells: list[str], expected: bool

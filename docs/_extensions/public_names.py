@@ -16,7 +16,6 @@ import inspect
 import re
 import sys
 from collections.abc import Iterator
-from typing import Any
 
 from docutils import nodes
 from sphinx.addnodes import desc_annotation, desc_signature
@@ -97,17 +96,16 @@ def _records(value: object) -> Iterator[str]:
         return
     if not all(hasattr(one, "name") and hasattr(one, "section") for one in records):
         return
-    rows = [("Name", "Content", "Section"), *map(_row, records)]
+    content = "title" if hasattr(records[0], "title") else "text"
+    rows = [("Name", content.capitalize(), "Section of the thesis")]
+    for record in records:
+        text = " ".join(getattr(record, content).split())
+        rows.append((record.name, text, record.section))
     yield from [".. list-table::", "   :header-rows: 1", ""]
     for row in rows:
         for number, cell in enumerate(row):
             yield f"   {'  -' if number else '* -'} {escape(cell)}"
     yield ""
-
-
-def _row(record: Any) -> tuple[str, str, str]:
-    content = record.title if hasattr(record, "title") else record.text
-    return record.name, " ".join(content.split()), record.section
 
 
 def _documentation_of_data(

@@ -2,7 +2,7 @@
 
 A table of figures must keep its columns, and scrolls in a box where it is too wide. A
 table of text is easier to read one cell below the other. `_static/site.css` and
-`_static/tables.js` do both.
+`_static/wide.js` do both.
 """
 
 from __future__ import annotations
@@ -22,14 +22,17 @@ CLASS = "text-table"
 def setup(app: Sphinx) -> ExtensionMetadata:
     """Mark tables when a page has been read; load the script on each page."""
     app.connect("doctree-read", _mark)
-    app.add_js_file("tables.js", loading_method="defer")
+    app.add_js_file("wide.js", loading_method="defer")
     return {"version": "1", "parallel_read_safe": True, "parallel_write_safe": True}
 
 
 def _mark(app: Sphinx, document: nodes.document) -> None:
     for table in document.findall(nodes.table):
-        if holds_text(table):
+        if holds_text(table) or not _heads(table):
             table["classes"].append(CLASS)
+            for cell in table.findall(nodes.entry):
+                if not _length(cell):
+                    cell["classes"].append("empty")
 
 
 def holds_text(table: nodes.table) -> bool:
@@ -47,5 +50,10 @@ def holds_text(table: nodes.table) -> bool:
     )
 
 
+def _heads(table: nodes.table) -> str:
+    """The text of the headings; there is none where the first column names the rows."""
+    return "".join(head.astext() for head in table.findall(nodes.thead)).strip()
+
+
 def _length(cell: nodes.entry) -> int:
-    return LONG if next(cell.findall(nodes.image), None) else len(cell.astext())
+    return LONG if next(cell.findall(nodes.image), None) else len(cell.astext().strip())

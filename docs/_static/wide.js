@@ -1,4 +1,4 @@
-// Tables on narrow screens.
+// Tables and pictures on narrow screens.
 "use strict";
 
 // A table of text is stacked there (site.css): each cell is told its heading.
@@ -10,8 +10,10 @@ for (const table of document.querySelectorAll("table.text-table")) {
     });
 }
 
-// A table that is too wide scrolls in a box, which the keyboard can reach.
-function heading(box) {
+// What is too wide scrolls in a box, which the keyboard can reach.
+function name(box) {
+  const picture = box.querySelector(":scope > img");
+  if (picture) return picture.alt;
   const caption = box.querySelector("caption");
   if (caption) return caption.textContent.trim();
   const section = box.closest("section");
@@ -28,14 +30,32 @@ function mark(box) {
   if (wide) {
     box.tabIndex = 0;
     box.setAttribute("role", "region");
-    box.setAttribute("aria-label", `Table, scrolls sideways: ${heading(box)}`);
+    const kind = box.classList.contains("picture-box") ? "Figure" : "Table";
+    box.setAttribute("aria-label", `${kind}, scrolls sideways: ${name(box)}`);
   } else {
-    for (const name of ["tabindex", "role", "aria-label"]) box.removeAttribute(name);
+    for (const attribute of ["tabindex", "role", "aria-label"]) box.removeAttribute(attribute);
   }
 }
 
 const observer = new ResizeObserver(entries => entries.forEach(entry => mark(entry.target)));
-for (const box of document.querySelectorAll(".table-wrapper, .cell_output .output.text_html")) {
+function watch(box) {
   box.addEventListener("scroll", () => mark(box), {passive: true});
   observer.observe(box);
 }
+
+for (const box of document.querySelectorAll(".table-wrapper, .cell_output .output.text_html"))
+  if (box.querySelector("table")) watch(box);
+
+// A picture of several panels side by side would be too small on a phone.
+function enlarge(picture) {
+  if (picture.naturalWidth < 1.9 * picture.naturalHeight) return;
+  const box = document.createElement("div");
+  box.className = "picture-box";
+  picture.replaceWith(box);
+  box.append(picture);
+  watch(box);
+}
+
+for (const picture of document.querySelectorAll(".cell_output img"))
+  if (picture.complete) enlarge(picture);
+  else picture.addEventListener("load", () => enlarge(picture), {once: true});

@@ -48,7 +48,7 @@ for (const box of document.querySelectorAll(".table-wrapper, .cell_output .outpu
 
 // A picture of several panels side by side would be too small on a phone.
 function enlarge(picture) {
-  if (picture.naturalWidth < 1.9 * picture.naturalHeight) return;
+  if (picture.naturalWidth < 1.63 * picture.naturalHeight) return;
   const box = document.createElement("div");
   box.className = "picture-box";
   picture.replaceWith(box);

@@ -343,7 +343,9 @@ class QuietHandler(http.server.SimpleHTTPRequestHandler):
         """Keep what is served out of the output of the tests."""
 
 
-UNREACHABLE = """() => new Promise(requestAnimationFrame).then(() =>
+# After two frames, because sizes are observed at the end of one.
+UNREACHABLE = """() => new Promise(done => requestAnimationFrame(() =>
+    requestAnimationFrame(done))).then(() =>
     [...document.querySelectorAll(".table-wrapper, .output.text_html, .picture-box")]
     .filter(box => box.scrollWidth > box.clientWidth + 1)
     .filter(box => box.tabIndex !== 0 || box.getAttribute("role") !== "region"

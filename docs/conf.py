@@ -37,9 +37,12 @@ extensions = [
     "environment_pages",
     "guides",
     "mathml",
+    "page_meta",
+    "pictures",
     "public_names",
     "repository_links",
     "signatures",
+    "tables",
 ]
 exclude_patterns = ["_build", "_extensions", "environments/generated/table.txt"]
 
@@ -102,8 +105,13 @@ napoleon_use_rtype = False
 # Looks
 html_theme = "furo"
 html_title = "acl-gym"
+html_favicon = "_static/favicon.svg"
 html_static_path = ["_static"]
 html_css_files = ["site.css"]
+page_picture = "_images/hero.gif"  # on the first page, so it is there
+page_description = (
+    "acl-gym: colonies of ants learn control policies for Gymnasium environments."
+)
 html_copy_source = False
 html_show_sourcelink = False
 copybutton_prompt_text = r">>> |\.\.\. |\$ "

@@ -8,7 +8,7 @@ from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from tqdm.auto import tqdm
+from tqdm import tqdm
 
 from acl_gym.agents.base import TabularAgent
 from acl_gym.callbacks.base import Callbacks, as_callbacks, is_stop

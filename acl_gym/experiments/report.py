@@ -90,18 +90,32 @@ def write_report(
 
 
 def write_claims(
-    path: Path, claims: Sequence[Outcome], names: set[str], facts: str
+    path: Path,
+    claims: Sequence[Outcome],
+    experiments: Sequence[Outcome],
+    figures: Path,
+    facts: str,
 ) -> None:
-    """Write the claims as a table in Markdown.
+    """Write the claims as a table in Markdown, with links to the figures.
 
     Args:
         path: where; the file appears complete or not at all.
         claims: see `write_report`.
-        names: of the experiments that were run.
+        experiments: those that were run, see `write_report`. The name of one becomes a
+            link to its first figure, if that is there.
+        figures: see `write_report`.
         facts: how much was run.
     """
-    page = _rendered("claims.md.j2", claims=claims, names=names, facts=facts)
+    shown = {each["name"]: _first_figure(each, figures, path) for each in experiments}
+    page = _rendered("claims.md.j2", claims=claims, figures=shown, facts=facts)
     write_atomically(path, page.encode())
+
+
+def _first_figure(experiment: Outcome, figures: Path, page: Path) -> str:
+    """The address of the first figure of an experiment from a page; "" if none."""
+    files = (figure["file"] for figure in experiment["figures"])
+    images = (_image(figures / f"{f}.png", page) for f in files if _is_file_name(f))
+    return next((str(image["source"]) for image in images if image), "")
 
 
 def _rendered(template: str, **values: Any) -> str:

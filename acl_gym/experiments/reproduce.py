@@ -242,7 +242,13 @@ def write_pages(directory: Path) -> Path:
         for each in found["claims"]
         if not set(names).isdisjoint(each["experiments"] + each["trials"])
     ]
-    write_claims(directory / CLAIMS_TABLE, claims, set(names), facts)
+    write_claims(
+        directory / CLAIMS_TABLE,
+        claims,
+        found["experiments"],
+        directory / _FIGURES,
+        facts,
+    )
     asked_for = "all" if len(names) == len(EXPERIMENTS) else " ".join(names)
     runs_made = {f"runs, {name}": each for name, each in found["runs_made"].items()}
     write_report(

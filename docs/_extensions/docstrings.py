@@ -4,6 +4,7 @@ The docstrings of this package are read in editors and by `help()`. They hold pl
 code in single backquotes, lists and examples, which Markdown and reStructuredText write
 alike. What differs is translated here: headings, tables and blocks of code; and the signs
 that have a meaning in reStructuredText alone, such as the bars of |x|, are protected.
+The file of a page, such as docs/design.md, becomes a link to that page.
 Napoleon then translates the sections of Google's style (Args, Returns, Raises).
 """
 
@@ -18,6 +19,7 @@ from sphinx.ext.napoleon import GoogleDocstring
 from sphinx.util.typing import ExtensionMetadata
 
 CODE = re.compile(r"(``.*?``|`[^`]*`_*)", re.DOTALL)
+PAGE = re.compile(r"\bdocs/([\w/-]+)\.md\b")
 SPECIAL = re.compile(r"\*(?=\S)|\||(?<=\w)_(?!\w)")
 
 
@@ -95,9 +97,11 @@ def to_restructuredtext(lines: list[str]) -> Iterator[str]:
 
 
 def _protected(text: list[str]) -> list[str]:
-    """Text in which signs stand for themselves, outside code."""
+    """Text in which signs stand for themselves and pages are links, outside code."""
     pieces = CODE.split("\n".join(text))
-    pieces[::2] = [SPECIAL.sub(r"\\\g<0>", piece) for piece in pieces[::2]]
+    pieces[::2] = [
+        PAGE.sub(r":doc:`/\1`", SPECIAL.sub(r"\\\g<0>", piece)) for piece in pieces[::2]
+    ]
     return "".join(pieces).split("\n") if text else []
 
 

@@ -4,12 +4,16 @@ A page is a guide if its head says `file_format: mystnb`. MyST-NB runs it and ke
 outputs in a cache, which is asked for by the text of the cells alone. What the cells
 print depends on the package too, so the cache here belongs to one state of the package.
 
+A cell that draws says what its picture shows, in its options:
+`:mystnb: {"image": {"alt": "..."}}`.
+
 Each guide begins with a link to its notebook, and that notebook has links to the site.
 """
 
 from __future__ import annotations
 
 import hashlib
+import html
 import json
 import os
 import posixpath
@@ -17,6 +21,7 @@ import re
 import shutil
 from pathlib import Path
 
+from docutils import nodes
 from sphinx.application import Sphinx
 from sphinx.config import Config
 from sphinx.util.typing import ExtensionMetadata
@@ -32,18 +37,18 @@ KERNEL = """\
 c = get_config()
 c.IPKernelApp.log_level = "ERROR"
 c.InteractiveShellApp.exec_lines = [
-    "import logging, warnings",
+    "import logging",
     "logging.getLogger('acl_gym').setLevel('ERROR')  # kernels are compiled",
-    "warnings.filterwarnings('ignore', message='IProgress not found')",
-    "del logging, warnings",
+    "del logging",
 ]
 """
 
 
 def setup(app: Sphinx) -> ExtensionMetadata:
-    """Prepare the kernel and its cache; put links into pages and notebooks."""
+    """Prepare the kernel and its cache; describe pictures; put links into pages."""
     app.connect("config-inited", _prepare_kernel)
     app.connect("source-read", _add_download)
+    app.connect("doctree-read", _describe_pictures)
     app.connect("build-finished", _link_to_site)
     return {"version": "1", "parallel_read_safe": True, "parallel_write_safe": True}
 
@@ -84,6 +89,18 @@ def _add_download(app: Sphinx, page: str, source: list[str]) -> None:
     if is_guide(source[0]):
         link = DOWNLOAD.format(name=posixpath.basename(page))
         source[0] = TITLE.sub(lambda title: f"{title[0]}\n{link}", source[0], count=1)
+
+
+def _describe_pictures(app: Sphinx, document: nodes.document) -> None:
+    """MyST-NB gives an alt text to PNG outputs; those in HTML outputs get it here."""
+    for cell in document.findall(nodes.container):
+        options = cell.get("cell_metadata", {}).get("mystnb", {})
+        alt = html.escape(options.get("image", {}).get("alt", ""))
+        for output in cell.findall(nodes.raw) if alt else ():
+            before, tag, after = output.astext().partition('<img alt="')
+            rest = after.partition('"')[2]
+            if tag:
+                output.children = [nodes.Text(f'{before}{tag}{alt}"{rest}')]
 
 
 def _link_to_site(app: Sphinx, error: Exception | None) -> None:

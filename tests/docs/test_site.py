@@ -11,6 +11,7 @@ import re
 import subprocess
 import sys
 import threading
+import types
 from collections.abc import Iterator
 from pathlib import Path
 from types import ModuleType
@@ -21,9 +22,11 @@ import pytest
 import acl_gym
 from acl_gym.cli.envs import parameters
 from acl_gym.envs import ENVIRONMENTS
+from tests.browser import chromium, needs_chromium, new_tab
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 GENERATED = DOCS / "environments" / "generated"
+SENTENCE = "A sentence that is long enough to be text."
 MODULES = ("acl_gym.costs", "acl_gym.deposits", "acl_gym.schedules")
 
 pytestmark = pytest.mark.skipif(
@@ -173,6 +176,8 @@ def test_docstrings_become_restructuredtext() -> None:
             "```",
             ">>> x_ | y",
             "1",
+            "",
+            "See docs/versus.md, not `docs/a.md`.",
         ]
     )
     assert [line for line in translated if line] == [
@@ -189,7 +194,56 @@ def test_docstrings_become_restructuredtext() -> None:
         "   a |= b",
         ">>> x_ | y",
         "1",
+        "See :doc:`/versus`, not `docs/a.md`.",
     ]
+
+
+def test_constants_show_a_short_value_or_a_table() -> None:
+    module = extension("public_names")
+    assert module.description("N", 3) == [".. autodata:: N", "", ""]
+    claim = types.SimpleNamespace(name="C1", text="A * b.", section="§3")
+    table = "\n".join(module.description("CLAIMS", (claim,)))
+    assert ":no-value:" in table
+    assert r"* - C1" in table
+    assert r"- A \* b." in table
+    kernel = types.SimpleNamespace(py_func=module.description)
+    assert module.description("f", kernel)[0] == ".. autofunction:: f"
+    assert module.says_something("30")
+    assert not module.says_something("<object at 0x7f00>")
+    assert not module.says_something("CPUDispatcher(<function f at 0x7f00>)")
+    assert not module.says_something("1" * 100)
+
+
+@pytest.mark.parametrize(
+    ("cells", "expected"),
+    [
+        (["C1", SENTENCE], True),
+        (["x", "3.1"], False),
+        ([SENTENCE] * 6, False),
+    ],
+)
+def test_tables_of_text_are_told_from_tables_of_figures(
+    cells: list[str], expected: bool
+) -> None:
+    parser = pytest.importorskip("myst_parser.parsers.docutils_").Parser()
+    core = pytest.importorskip("docutils.core")
+    rows = [["head"] * len(cells), ["-"] * len(cells), cells]
+    text = "\n".join(f"| {' | '.join(row)} |" for row in rows)
+    document = core.publish_doctree(text, parser=parser)
+    module = extension("tables")
+    (table,) = document.findall(pytest.importorskip("docutils.nodes").table)
+    assert module.holds_text(table) is expected
+
+
+def test_a_description_is_the_first_sentence_and_not_too_long() -> None:
+    parser = pytest.importorskip("myst_parser.parsers.docutils_").Parser()
+    core = pytest.importorskip("docutils.core")
+    module = extension("page_meta")
+    document = core.publish_doctree("# A\n\nnote\n\nIt *is*\nso.\n", parser=parser)
+    assert module.first_paragraph(document) == "It is so."
+    short = module.shortened("word " * 100)
+    assert len(short) <= module.LONGEST
+    assert short.endswith("word\N{HORIZONTAL ELLIPSIS}")
 
 
 def test_an_equation_that_cannot_be_drawn_is_one_clear_error() -> None:
@@ -234,6 +288,46 @@ def test_the_site_builds_and_loads_nothing_from_elsewhere(site: Path) -> None:
         assert not re.search(r"(@import|url\()\s*[\"']?(https?:|//)", path.read_text())
 
 
+@pytest.mark.slow
+def test_every_picture_says_what_it_shows(site: Path) -> None:
+    for path in sorted(site.rglob("*.html")):
+        for image in re.findall(r"<img\b[^>]*>", path.read_text(encoding="utf-8")):
+            if 'class="toggler"' in image:  # the sign that opens a list
+                continue
+            alt = re.search(r'\balt="([^"]*)"', image)
+            assert alt is not None, f"{path}: {image[:200]}"
+            assert len(alt[1].split()) >= 3, f"{path}: {alt[0]}"
+            assert not re.search(r"\w+\.(png|gif|svg)|[0-9a-f]{20}", alt[1]), path
+
+
+@pytest.mark.slow
+def test_every_page_has_an_icon_and_a_description(site: Path) -> None:
+    for path in sorted(site.rglob("*.html")):
+        text = path.read_text(encoding="utf-8")
+        assert re.search(r'<link rel="shortcut icon" href="[^"]*favicon.svg', text), (
+            path
+        )
+        for name in ('name="description"', 'property="og:title"', 'property="og:url"'):
+            assert re.search(rf'<meta {name} content="[^"]+"', text), f"{path}: {name}"
+    picture = re.search(r'og:image" content="([^"]+)"', text)
+    assert picture is not None
+    assert (site / "_images" / picture[1].rpartition("/")[2]).is_file()
+
+
+@pytest.mark.slow
+def test_the_reference_shows_no_long_values(site: Path) -> None:
+    page = site / "reference" / "experiments.html"
+    text = page.read_text(encoding="utf-8")
+    assert len(text) < 200_000
+    for name in ("C34", "fig5.4", "versus-noise"):
+        assert f"<p>{name}</p>" in text, name
+    for path in (site / "reference").glob("*.html"):
+        text = path.read_text(encoding="utf-8")
+        assert "CPUDispatcher(" not in text, path
+        assert " at 0x" not in text, path
+        assert not re.search(r"\bdocs/[\w/-]+\.md", text), path
+
+
 @pytest.fixture(scope="module")
 def address(site: Path) -> Iterator[str]:
     """The site as `make docs-serve` serves it."""
@@ -251,28 +345,25 @@ class QuietHandler(http.server.SimpleHTTPRequestHandler):
         """Keep what is served out of the output of the tests."""
 
 
-CHROMIUM = next(
-    filter(Path.exists, map(Path, ("/usr/bin/chromium", "/usr/bin/chromium-browser"))),
-    None,
-)
+# After two frames, because sizes are observed at the end of one.
+UNREACHABLE = """() => new Promise(done => requestAnimationFrame(() =>
+    requestAnimationFrame(done))).then(() =>
+    [...document.querySelectorAll(".table-wrapper, .output.text_html, .picture-box")]
+    .filter(box => box.scrollWidth > box.clientWidth + 1)
+    .filter(box => box.tabIndex !== 0 || box.getAttribute("role") !== "region"
+        || !box.getAttribute("aria-label") || !box.classList.contains("scrolls"))
+    .map(box => "the keyboard cannot reach " + box.outerHTML.slice(0, 99)))
+"""
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(CHROMIUM is None, reason="needs chromium (apt install chromium)")
+@needs_chromium
 @pytest.mark.parametrize(("width", "scheme"), [(1280, "dark"), (390, "light")])
 def test_pages_in_a_browser(site: Path, address: str, width: int, scheme: str) -> None:
     """No errors, nothing from elsewhere, no scrolling sideways; equations and search."""
-    sync = pytest.importorskip("playwright.sync_api")
     wrong: list[str] = []
-    with sync.sync_playwright() as playwright:
-        browser = playwright.chromium.launch(
-            executable_path=str(CHROMIUM), args=["--no-sandbox", "--disable-gpu"]
-        )
-        tab = browser.new_page(
-            viewport={"width": width, "height": 800}, color_scheme=scheme
-        )
-        tab.on("pageerror", lambda error: wrong.append(str(error)))
-        tab.on("console", lambda said: said.type == "error" and wrong.append(said.text))
+    with chromium() as browser:
+        tab = new_tab(browser, width, scheme, wrong)
         tab.on(
             "request",
             lambda asked: (
@@ -287,6 +378,7 @@ def test_pages_in_a_browser(site: Path, address: str, width: int, scheme: str) -
                 wrong.append(f"{page} scrolls sideways")
             missing = "[...document.images].filter(i => i.complete && !i.naturalWidth)"
             wrong += tab.evaluate(f"{missing}.map(i => i.src)")
+            wrong += [f"{page}: {text}" for text in tab.evaluate(UNREACHABLE)]
         tab.goto(f"{address}/background/index.html")
         equation = tab.locator(".math-block math").first.bounding_box()
         assert equation is not None
@@ -294,5 +386,4 @@ def test_pages_in_a_browser(site: Path, address: str, width: int, scheme: str) -
         tab.goto(f"{address}/search.html?q=evaporation")
         tab.locator("#search-results li a").first.wait_for(timeout=20_000)
         tab.wait_for_load_state("networkidle")
-        browser.close()
     assert wrong == []

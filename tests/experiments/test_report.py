@@ -17,6 +17,7 @@ from acl_gym.experiments.claims import Claim, Part
 from acl_gym.experiments.outcome import POINTS, Outcome
 from acl_gym.experiments.results import Results
 from acl_gym.experiments.study import Experiment
+from tests.browser import chromium, needs_chromium, new_tab
 from tests.experiments.synthetic import (
     TRIALS,
     make_experiment,
@@ -262,41 +263,33 @@ def test_the_page_appears_complete_or_not_at_all(
     assert (tmp_path / "report.html").read_text() == old
 
 
-def test_the_claims_as_text(tmp_path: Path) -> None:
-    report.write_claims(tmp_path / "claims.md", [CLAIM], {"trial"}, "3 runs")
-    text = (tmp_path / "claims.md").read_text()
-    assert "| C1 | holds | **A claim.** §3; trial | | |" in text
+@pytest.mark.parametrize("drawn", [True, False])
+def test_the_claims_as_text(tmp_path: Path, summed: Outcome, drawn: bool) -> None:
+    figures = tmp_path / "figures"
+    figures.mkdir()
+    if drawn:
+        (figures / "trial.png").write_bytes(PNG)
+    path = tmp_path / "claims.md"
+    report.write_claims(path, [CLAIM], [summed], figures, "3 runs")
+    text = path.read_text()
+    trial = "[trial](figures/trial.png)" if drawn else "trial"
+    assert f"| C1 | holds | **A claim.** §3; {trial} | | |" in text
     rows = [line for line in text.splitlines() if line.startswith("|")]
     assert {line.count("|") for line in rows} == {6}
 
 
-CHROMIUM = next(
-    filter(Path.exists, map(Path, ("/usr/bin/chromium", "/usr/bin/chromium-browser"))),
-    None,
-)
-
-
-@pytest.mark.skipif(CHROMIUM is None, reason="needs chromium (apt install chromium)")
+@needs_chromium
 @pytest.mark.parametrize(("width", "scheme"), [(1280, "dark"), (390, "light")])
 def test_the_page_in_a_browser(
     tmp_path: Path, summed: Outcome, width: int, scheme: str
 ) -> None:
     """No errors, no scrolling sideways; the mouse, the keyboard and no script work."""
-    sync = pytest.importorskip("playwright.sync_api")
     reference = next(each for each in summed["studies"] if each["label"] == "J*")
     del reference["curves"]["sensitivity"]
     write(tmp_path, summed, claims=[CLAIM])
     wrong: list[str] = []
-    with sync.sync_playwright() as playwright:
-        browser = playwright.chromium.launch(
-            executable_path=str(CHROMIUM), args=["--no-sandbox", "--disable-gpu"]
-        )
-        tab = browser.new_page(
-            viewport={"width": width, "height": 800}, color_scheme=scheme
-        )
-        tab.on("pageerror", lambda error: wrong.append(str(error)))
-        tab.on("console", lambda message: wrong.append(message.text))
-        tab.on("requestfailed", lambda request: wrong.append(request.url))
+    with chromium() as browser:
+        tab = new_tab(browser, width, scheme, wrong)
         address = (tmp_path / "report.html").as_uri()
         tab.goto(address)
         assert tab.evaluate("document.documentElement.scrollWidth") <= width
@@ -340,4 +333,3 @@ def test_the_page_in_a_browser(
         alone.goto(address)
         lost = alone.get_by_text("There is no curves/trial.js beside this page.")
         lost.wait_for()
-        browser.close()

@@ -32,6 +32,7 @@ EXPERIMENTS: tuple[Experiment[Any], ...] = (
     *chapter5.EXPERIMENTS,
     *chapter6.EXPERIMENTS,
 )
+"""What `acl-gym reproduce` can run of the thesis, with what was tried beside it."""
 
 CLAIMS: tuple[Claim, ...] = (
     *chapter3_claims.CLAIMS,
@@ -40,3 +41,4 @@ CLAIMS: tuple[Claim, ...] = (
     *theory.CLAIMS,
     *chapter6_claims.CLAIMS,
 )
+"""The claims of the thesis, C1 to C34, each with the statements that decide it."""

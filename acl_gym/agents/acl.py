@@ -16,7 +16,8 @@ from acl_gym.agents.pheromone_agent import PheromoneAgent
 from acl_gym.agents.saving import with_prefix
 from acl_gym.agents.training import Training
 from acl_gym.callbacks.base import Callbacks
-from acl_gym.colony.costs import Cost, as_cost, cost_from_settings, solution_costs
+from acl_gym.colony.cost import Cost
+from acl_gym.colony.costs import as_cost, cost_from_settings, solution_costs
 from acl_gym.colony.deposits import (
     Deposit,
     as_deposit,

@@ -10,7 +10,8 @@ import numpy as np
 from gymnasium.vector import VectorEnv
 from numpy.typing import NDArray
 
-from acl_gym.colony.costs import Cost, as_cost, solution_costs
+from acl_gym.colony.cost import Cost
+from acl_gym.colony.costs import as_cost, solution_costs
 from acl_gym.colony.episodes import Episode
 from acl_gym.envs.control.environments import ControlVectorEnv
 from acl_gym.envs.control.single import ControlEnv

@@ -296,7 +296,7 @@ class AntAgent(PheromoneAgent):
 
     @property
     def policy(self) -> TablePolicy:
-        """The policy of §2.5.1, the action with the largest tau^alpha eta^beta, as it is now.
+        """The policy of §2.5.1: the action with the largest tau^alpha eta^beta now.
 
         Its table is tau eta^(beta / alpha), a copy, which does not follow learning. On
         the travelling salesman problem it needs the masks, to know where it has been.

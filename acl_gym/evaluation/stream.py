@@ -37,7 +37,7 @@ class _Back(NamedTuple):
 
 
 class _Anew(NamedTuple):
-    """Where slots stand that the environment has reset in the step that was the last."""
+    """The slots that the environment has reset in the last step, and where they stand."""
 
     slots: BoolArray
     observation: Any

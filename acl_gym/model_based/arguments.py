@@ -22,7 +22,7 @@ FIRST_ROUNDS = (20, 40, 60, 90, 120, 160, 200)
 """Interactions after which the colony learns, if nothing else is said."""
 
 GROWTH = 1.5
-"""By which factor there are more of them in each later round."""
+"""The factor by which each later round has more of them."""
 
 VALUES = 5
 """Values of each continuous input, if none are given."""

@@ -110,7 +110,7 @@ class Host:
             env.close()
 
     def ready(self) -> None:
-        """Nothing; the answer comes when the environments are made."""
+        """Do nothing; the answer comes once the environments are made."""
 
     def describe(self) -> Description:
         """What the slots have in common.

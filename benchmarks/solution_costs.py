@@ -17,7 +17,7 @@ from gymnasium.wrappers.vector import TransformReward
 from tqdm.auto import tqdm
 
 from acl_gym import ACL, QLearning, evaluate_policy_cost
-from acl_gym.colony.costs import Cost, Overshoot, RiseTime, SettlingTime, Steps
+from acl_gym.costs import Cost, Overshoot, RiseTime, SettlingTime, Steps
 from acl_gym.partitions.automatic import thesis_partition
 from acl_gym.utils.text import replace_unprintable_letters
 

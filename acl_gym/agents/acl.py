@@ -16,7 +16,9 @@ from acl_gym.agents.pheromone_agent import PheromoneAgent
 from acl_gym.agents.saving import with_prefix
 from acl_gym.agents.training import Training
 from acl_gym.callbacks.base import Callbacks
-from acl_gym.colony.costs import Cost, as_cost, cost_from_settings, solution_costs
+from acl_gym.colony.batches import Batches
+from acl_gym.colony.cost import Cost
+from acl_gym.colony.costs import as_cost, cost_from_settings, solution_costs
 from acl_gym.colony.deposits import (
     Deposit,
     as_deposit,
@@ -204,8 +206,6 @@ class ACL(PheromoneAgent, ColonyAgent):
         if levels is not None:
             self.pheromone.set_levels(levels)
         self._rule = self._update  # of the trial under way; see `watched`
-        # How many have come back of M ants; once they all have, others count.
-        self._in_batch, self._batch_is_full = 0, True
         self._check_tau0()
 
     def learn(
@@ -255,7 +255,7 @@ class ACL(PheromoneAgent, ColonyAgent):
                 observation = rollout.start(seed=self._next_seed(), record=record)
                 rule.start_trial(pheromone, self.trials)
                 costs: list[FloatArray] = []
-                self._in_batch, self._batch_is_full = 0, True
+                self._batches.start_trial()
                 while rollout._ants.size:  # 7, 17: repeat until t = T or C is empty
                     ants = rollout._ants
                     # 8: fuzzify the states
@@ -294,9 +294,7 @@ class ACL(PheromoneAgent, ColonyAgent):
     @cost.setter
     def cost(self, value: Cost | Callable[[Episode], float] | None) -> None:
         self._cost = as_cost(value)
-        # Of the last ants that came back, at most M, to compare the next with; kept by an
-        # asynchronous colony only.
-        self._latest_costs: FloatArray = np.empty(0)
+        self._batches = Batches()  # those of another cost are not to be compared with
 
     @property
     def deposit(self) -> Deposit:
@@ -406,7 +404,7 @@ class ACL(PheromoneAgent, ColonyAgent):
         if self.heuristic is not None:
             arrays["heuristic"] = self.heuristic
         if self.is_asynchronous:
-            arrays["latest_costs"] = self._latest_costs
+            arrays["latest_costs"] = self._batches.costs
         return arrays
 
     def _restore(
@@ -414,10 +412,9 @@ class ACL(PheromoneAgent, ColonyAgent):
     ) -> None:
         super()._restore(header, arrays)
         if self.is_asynchronous and "latest_costs" in arrays:
-            latest = validation.real_array(
+            self._batches.costs = validation.real_array(
                 "latest_costs", arrays["latest_costs"], ndim=1
             )
-            self._latest_costs = latest
         memory = with_prefix("update_", arrays)
         if memory:
             saved = update_from_settings(header["parameters"]["update"])
@@ -435,7 +432,7 @@ class ACL(PheromoneAgent, ColonyAgent):
         if memory:
             self.update.restore(memory)
         if self.is_asynchronous:
-            self._latest_costs = arrays["latest_costs"]
+            self._batches.costs = arrays["latest_costs"]
 
     def measures(self, policy: IntArray) -> Row:
         """The mean sensitivity of the policy (3.48) over the cells, in [0, 1]."""
@@ -462,13 +459,8 @@ class ACL(PheromoneAgent, ColonyAgent):
             costs = solution_costs(self.cost, episodes)
         compared, begins = costs, None
         if self.is_asynchronous:
-            begins = self._batch_is_full
-            self._in_batch += ants.size
-            self._batch_is_full = self._in_batch >= self.num_envs
-            if self._batch_is_full:
-                self._in_batch -= self.num_envs
-            compared = np.concatenate([self._latest_costs, costs])[-self.num_envs :]
-            self._latest_costs = compared
+            begins = self._batches.add(costs, self.num_envs)
+            compared = self._batches.costs
         deposits = checked_deposits(self._deposit(compared, self.tau0), compared.size)
         return TrialResult(
             solutions.of(ants),

@@ -10,7 +10,7 @@ from gymnasium import spaces
 from gymnasium.vector import VectorEnv
 from numpy.typing import ArrayLike, NDArray
 
-from acl_gym.agents.base import TabularAgent, time_limit
+from acl_gym.agents.base import TabularAgent
 from acl_gym.agents.pheromone_agent import PheromoneAgent
 from acl_gym.agents.saving import with_prefix
 from acl_gym.colony.ant_rule import AntRule
@@ -24,6 +24,7 @@ from acl_gym.colony.schedules import Setting, schedule_from_settings
 from acl_gym.colony.selection import choose_actions
 from acl_gym.envs.graph.cities import TravellingSalesmanInstance
 from acl_gym.envs.graph.travelling_salesman.lookup import salesman_of
+from acl_gym.envs.limits import time_limit
 from acl_gym.partitions import Partition
 from acl_gym.policies import TablePolicy
 from acl_gym.utils import validation
@@ -295,7 +296,7 @@ class AntAgent(PheromoneAgent):
 
     @property
     def policy(self) -> TablePolicy:
-        """The policy of §2.5.1, the action with the largest tau^alpha eta^beta, as it is now.
+        """The policy of §2.5.1: the action with the largest tau^alpha eta^beta now.
 
         Its table is tau eta^(beta / alpha), a copy, which does not follow learning. On
         the travelling salesman problem it needs the masks, to know where it has been.

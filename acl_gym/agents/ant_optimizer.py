@@ -11,7 +11,6 @@ from gymnasium.vector import VectorEnv
 from numpy.typing import NDArray
 
 from acl_gym.agents.ant_agent import UNKNOWN_TAU0, AntAgent
-from acl_gym.agents.base import time_limit
 from acl_gym.agents.salesman_checks import check_instance, check_steps, fitness_error
 from acl_gym.agents.same_task import is_same_task, same_wrappers
 from acl_gym.agents.training import Training
@@ -24,6 +23,7 @@ from acl_gym.colony.update_rule import TrialResult
 from acl_gym.envs.graph.instances import TravellingSalesmanInstance
 from acl_gym.envs.graph.lengths import tour_lengths
 from acl_gym.envs.graph.travelling_salesman.lookup import Salesman, salesman_of
+from acl_gym.envs.limits import time_limit
 from acl_gym.evaluation.steps import Outcome
 from acl_gym.partitions import Partition
 from acl_gym.utils import validation

@@ -172,7 +172,7 @@ class AntSystem(AntOptimizer):
 
 
 class AntColonySystem(AntOptimizer):
-    """Ant Colony System (Dorigo and Gambardella, 1997; §2.5.2): greedy ants that avoid each other.
+    """Ant Colony System (Dorigo and Gambardella, 1997; §2.5.2): ants avoid each other.
 
     It differs from `AntSystem` in three ways. With probability q0 an ant takes the action
     of the largest tau^alpha eta^beta, and only else draws one by (2.2). After each step

@@ -15,8 +15,8 @@ from acl_gym.agents.notebook import name_of, page_of
 from acl_gym.agents.saving import SavedAgent
 from acl_gym.callbacks.base import Callbacks
 from acl_gym.colony.greedy import greedy_actions
-from acl_gym.envs.control.environments import ControlVectorEnv
 from acl_gym.envs.control.lookup import signals_of
+from acl_gym.envs.limits import usual_max_steps
 from acl_gym.evaluation.rollout import Rollout
 from acl_gym.evaluation.steps import Outcome
 from acl_gym.export import Source
@@ -41,9 +41,6 @@ logger = logging.getLogger("acl_gym")
 
 BYTES_PER_PAIR = 20
 """Memory of an entry of a table at least: value, probability and rank."""
-
-DEFAULT_MAX_STEPS = 300
-"""T of Table 5.2, used if neither agent nor environment sets a limit."""
 
 
 class TabularAgent(SavedAgent):
@@ -103,7 +100,7 @@ class TabularAgent(SavedAgent):
             partition = automatic_partition(env)
         self.partition = checked_partition(partition)
         if max_steps is None:
-            max_steps = time_limit(env) or DEFAULT_MAX_STEPS
+            max_steps = usual_max_steps(env)
         self._max_steps = validation.integer("max_steps", max_steps, at_least=1)
         self.env: VectorEnv[Any, Any, Any] | None = None
         self._rollout: Rollout | None = None
@@ -432,19 +429,3 @@ class _Located:
         if len(self._rows[0]) != count:
             self._rows = self._index[:count], self._degree[:count]
         return self._rows
-
-
-def time_limit(env: Any) -> int | None:
-    """The time limit that an environment was made or registered with, or None."""
-    base = getattr(env, "unwrapped", None)
-    limit = getattr(base, "max_episode_steps", None)
-    if limit is None and isinstance(base, ControlVectorEnv):
-        return None  # it was made without the limit that its id has
-    # A vector of single environments may know its limit by those only; its own spec has
-    # the limit of the id, and what the caller said beside it.
-    for each in (*getattr(base, "envs", ())[:1], env):
-        spec = getattr(each, "spec", None)
-        if spec is not None:
-            given = spec.kwargs.get("max_episode_steps", spec.max_episode_steps)
-            limit = limit or given
-    return int(limit) if limit and limit > 0 else None

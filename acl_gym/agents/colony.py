@@ -6,7 +6,8 @@ from typing import Any, ClassVar
 
 from gymnasium.vector import VectorEnv
 
-from acl_gym.agents.base import TabularAgent, time_limit
+from acl_gym.agents.base import TabularAgent
+from acl_gym.envs.limits import time_limit
 from acl_gym.evaluation.rollout import Rollout
 from acl_gym.evaluation.stream import Stream
 from acl_gym.partitions import Partition

@@ -108,7 +108,7 @@ class RememberingAgent(TabularAgent):
 
     @property
     def memory_size(self) -> int:
-        """How many states are remembered; the oldest beyond that are forgotten at the next walk."""
+        """How many states are remembered; the next walk forgets the oldest beyond that."""
         return self._memory_size
 
     @memory_size.setter

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from acl_gym.callbacks.base import Agent, Callback
+from acl_gym.utils import validation
 from acl_gym.utils.typing import Row
 
 # Column of a row -> tag; TensorBoard groups tags by the part before the slash.
@@ -38,11 +39,12 @@ class TensorBoardLog(Callback):
         directory: receives the event files; made if missing. Use one per run.
 
     Raises:
+        TypeError: `directory` is not a path.
         ModuleNotFoundError: tensorboard is not installed.
     """
 
     def __init__(self, directory: str | Path) -> None:
-        self.directory = Path(directory)
+        self.directory = validation.path("directory", directory)
         _tensorboard()  # if it is missing, that is said before learning
         self._writer: Any = None
         self._written: Row = {}

@@ -10,8 +10,9 @@ import acl_gym
 from acl_gym.cli.common import DebugOption
 from acl_gym.cli.compare import HELP as COMPARE_HELP
 from acl_gym.cli.compare import CompareCommand, compare
-from acl_gym.cli.design import HELP as DESIGN_HELP
-from acl_gym.cli.design import DesignCommand, design
+from acl_gym.cli.design import design
+from acl_gym.cli.design_help import HELP as DESIGN_HELP
+from acl_gym.cli.design_help import DesignCommand
 from acl_gym.cli.envs import HELP as ENVS_HELP
 from acl_gym.cli.envs import envs
 from acl_gym.cli.errors import Command, Group

@@ -236,8 +236,9 @@ def _print_summary(experiment: Experiment, results: Results, terminal: Console) 
     from rich.text import Text
 
     from acl_gym.experiments import tables
+    from acl_gym.experiments.references import reference
 
-    known = tables.reference(experiment, results)
+    known = reference(experiment, results)
     cost = tables.number("cost", known.cost)
     shown = tables.summary(experiment, results, brief=True)
     table = Table(

@@ -245,13 +245,13 @@ class Environment:
 
 def default_steps(env: VectorEnv[Any, Any, Any]) -> int:
     """T: the limit of the environment, or 300 if it has none."""
-    from acl_gym.agents.base import DEFAULT_MAX_STEPS, time_limit
     from acl_gym.envs.control.environments import ControlVectorEnv
+    from acl_gym.envs.limits import usual_max_steps
 
     base = env.unwrapped
     if isinstance(base, ControlVectorEnv):
         return base.system.evaluation_steps
-    return time_limit(env) or DEFAULT_MAX_STEPS
+    return usual_max_steps(env)
 
 
 def from_metadata(file: str, metadata: dict[str, Any]) -> Environment | None:

@@ -35,8 +35,8 @@ from acl_gym.envs.learned.description import described_by
 from acl_gym.evaluation import policy_measures
 from acl_gym.model_based import PlantLearning, learn_from_plant
 from acl_gym.model_based.arguments import VALUES, task_of
+from acl_gym.model_based.default_agent import default_agent
 from acl_gym.model_based.journal import AGENT, BEST
-from acl_gym.model_based.learning_run import default_agent
 from acl_gym.model_based.plant_facts import CLOSE
 from acl_gym.utils import files
 from acl_gym.utils.typing import FloatArray, Row

@@ -18,10 +18,10 @@ from collections.abc import Iterable, Mapping
 from dataclasses import MISSING, Field, fields
 from typing import Any
 
+from acl_gym import costs, deposits, schedules
 from acl_gym.cli.agents import AGENTS, CHOICES, Declared, parameters
 from acl_gym.cli.common import check_name, did_you_mean
 from acl_gym.cli.errors import BadArgumentError, in_words
-from acl_gym.colony import costs, deposits, schedules
 
 Kinds = Mapping[str, type[Any]]
 

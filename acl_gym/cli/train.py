@@ -289,7 +289,7 @@ def train(
     as_json: JsonOption = False,
     debug: DebugOption = False,
 ) -> None:
-    """Learn; see `HELP`."""
+    """Learn; see `acl_gym.cli.train_help`."""
     from acl_gym.cli.settings import agent_with, parse_parameters, parse_settings
 
     # Names first: a wrong one is answered before anything slow is imported.

@@ -13,8 +13,9 @@ HELP = """Learn in an environment, print the progress, and save the agent.
 The agent is the returning colony: its ants walk back and remember, and its partition is
 chosen and grows. --agent acl is the colony of the thesis, --agent q-learning is
 Q-learning and Q(lambda); --agent ant-system, ant-colony-system and max-min look for one
-best solution, such as a shortest tour, where states are numbered. Without --agent, a parameter may choose: --param deposit=rank:5
-takes the colony of the thesis, the first that has deposits.
+best solution, such as a shortest tour, where states are numbered. Without --agent, a
+parameter may choose: --param deposit=rank:5 takes the colony of the thesis, the first
+that has deposits.
 
 ENV_ID is the id of any Gymnasium environment; "module:id" imports a module first, which
 may be in the working directory. Two files are written: NAME.npz, the agent as it is at

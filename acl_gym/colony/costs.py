@@ -8,39 +8,18 @@ reward per step expresses, such as a short rise time or little overshoot (§3.5.
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from acl_gym.colony.cost import Constant, Cost, Sum, Weighted
 from acl_gym.colony.episodes import Episode, Episodes
+from acl_gym.colony.response_costs import Overshoot, RiseTime, SettlingTime
 from acl_gym.utils import validation
-from acl_gym.utils.serialization import Savable, Unsaved, from_settings, make_plain
+from acl_gym.utils.serialization import Unsaved, from_settings, make_plain
 from acl_gym.utils.typing import FloatArray
-
-
-class Cost(Savable, ABC):
-    """A cost of complete solutions; lower is better."""
-
-    @abstractmethod
-    def __call__(self, episodes: Episodes) -> FloatArray:
-        """Return J of each ant, `(n,)`."""
-
-    def __add__(self, other: Cost | float) -> Cost:
-        """The sum of two costs, or of a cost and a constant."""
-        term = other if isinstance(other, Cost) else Constant(other)
-        # One sum of many terms, not sums in sums, which Python limits.
-        return Sum((*self.terms, term) if type(self) is Sum else (self, term))
-
-    __radd__ = __add__
-
-    def __mul__(self, factor: float) -> Cost:
-        """The cost times a factor > 0."""
-        return Weighted(factor, self)
-
-    __rmul__ = __mul__
 
 
 @dataclass(frozen=True)
@@ -125,192 +104,6 @@ class Quadratic(Cost):
                 of_action = np.einsum("ui,ij,uj->u", inputs, weight, inputs)
                 stage += of_action[actions]
         return np.asarray(np.sum(stage, axis=0, where=episodes.taken()))
-
-
-@dataclass(frozen=True)
-class _Response(Cost):
-    """A measure of how one state variable goes from where it was to a target.
-
-    Attributes:
-        variable: index of the state variable.
-        target: its desired value.
-    """
-
-    variable: int
-    target: float
-
-    @property
-    @abstractmethod
-    def period(self) -> float | None:
-        """The period of a circular variable, > 0; else None."""
-
-    def __post_init__(self) -> None:
-        make_plain(self)
-        validation.integer("variable", self.variable, at_least=0)
-        validation.number("target", self.target)
-        if self.period is not None:
-            validation.number("period", self.period, above=0)
-
-    def _error(self, episodes: Episodes) -> FloatArray:
-        """Target less value, `(longest + 1, n)`; circular: to the nearest target."""
-        period = self.period
-        values = episodes.variable(self.variable, period)
-        target = np.full(len(episodes), self.target)
-        if period is not None:
-            # Unwrapped, the target lies at every period: the one where the ant ends.
-            target += period * np.round((values[-1] - target) / period)
-        return np.asarray(target - values)
-
-
-@dataclass(frozen=True)
-class RiseTime(_Response):
-    """The time from `low` to `high` of the way to the target.
-
-    Crossings are interpolated between samples. A solution that never gets as far as
-    `high` costs its whole duration; one that begins at the target costs 0.
-
-    Attributes:
-        low: fraction of the way, in [0, 1).
-        high: fraction of the way, in (low, 1].
-        sampling_time: s, the time of a step.
-        period: of a circular variable.
-    """
-
-    low: float = 0.1
-    high: float = 0.9
-    sampling_time: float = 1.0
-    period: float | None = None
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        validation.number("low", self.low, at_least=0, below=1)
-        validation.number("high", self.high, above=self.low, at_most=1)
-        validation.number("sampling_time", self.sampling_time, above=0)
-
-    def __call__(self, episodes: Episodes) -> FloatArray:
-        """See `Cost`."""
-        error = self._error(episodes)
-        span = error[0]
-        with np.errstate(divide="ignore", invalid="ignore"):
-            progress = np.where(span == 0.0, 1.0, 1.0 - error / span)
-        begin = _first_crossing(progress, self.low)
-        end = _first_crossing(progress, self.high)
-        steps = episodes.lengths.astype(np.float64)
-        np.subtract(end, begin, out=steps, where=np.isfinite(end))
-        return np.asarray(self.sampling_time * steps)
-
-
-@dataclass(frozen=True)
-class SettlingTime(_Response):
-    """The time after which the variable stays within a band around the target.
-
-    A solution that ends outside the band costs its whole duration, as does one that
-    enters it with its last step.
-
-    Attributes:
-        tolerance: half-width of the band, > 0, in units of the variable.
-        sampling_time: s, the time of a step.
-        period: of a circular variable.
-    """
-
-    tolerance: float = 0.05
-    sampling_time: float = 1.0
-    period: float | None = None
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        validation.number("tolerance", self.tolerance, above=0)
-        validation.number("sampling_time", self.sampling_time, above=0)
-
-    def __call__(self, episodes: Episodes) -> FloatArray:
-        """See `Cost`."""
-        outside = np.abs(self._error(episodes)) > self.tolerance
-        times = np.arange(len(outside))[:, None]
-        # The first time of those after which it is inside for good.
-        settled = np.max(np.where(outside, times + 1, 0), axis=0)
-        return np.asarray(self.sampling_time * np.minimum(settled, episodes.lengths))
-
-
-@dataclass(frozen=True)
-class Overshoot(_Response):
-    """How far the variable goes beyond the target, seen from where it began.
-
-    In units of the variable; 0 without overshoot, so that it cannot be used alone,
-    because 1 / J would be infinite: add another cost or a constant.
-
-    Attributes:
-        period: of a circular variable.
-    """
-
-    period: float | None = None
-
-    def __call__(self, episodes: Episodes) -> FloatArray:
-        """See `Cost`."""
-        error = self._error(episodes)
-        beyond = -np.sign(error[0]) * error
-        return np.asarray(np.max(beyond, axis=0, initial=0.0))
-
-
-@dataclass(frozen=True)
-class Constant(Cost):
-    """The same for every solution.
-
-    Attributes:
-        value: >= 0.
-    """
-
-    value: float
-
-    def __post_init__(self) -> None:
-        make_plain(self)
-        validation.number("value", self.value, at_least=0)
-
-    def __call__(self, episodes: Episodes) -> FloatArray:
-        """See `Cost`."""
-        return np.full(len(episodes), float(self.value))
-
-
-@dataclass(frozen=True)
-class Sum(Cost):
-    """The sum of costs.
-
-    Attributes:
-        terms: the costs.
-    """
-
-    terms: tuple[Cost, ...]
-
-    def __post_init__(self) -> None:
-        make_plain(self)
-        if not isinstance(self.terms, (tuple, list)) or not self.terms:
-            raise TypeError(f"terms must be Costs, got {validation.shown(self.terms)}.")
-        _check_costs("terms", self.terms)
-
-    def __call__(self, episodes: Episodes) -> FloatArray:
-        """See `Cost`."""
-        return np.asarray(sum(term(episodes) for term in self.terms))
-
-
-@dataclass(frozen=True)
-class Weighted(Cost):
-    """A cost times a factor.
-
-    Attributes:
-        factor: > 0.
-        cost: the cost.
-    """
-
-    factor: float
-    cost: Cost
-
-    def __post_init__(self) -> None:
-        make_plain(self)
-        validation.number("factor", self.factor, above=0)
-        _check_costs("cost", (self.cost,))
-
-    def __call__(self, episodes: Episodes) -> FloatArray:
-        """See `Cost`."""
-        return self.factor * self.cost(episodes)
 
 
 @dataclass(frozen=True)
@@ -400,27 +193,6 @@ def cost_from_settings(settings: Any) -> Cost | None:
     if cost is not None and not isinstance(cost, Cost):
         raise ValueError(f"cost must be a Cost, got {validation.shown(settings)}.")
     return cost
-
-
-def _first_crossing(progress: FloatArray, level: float) -> FloatArray:
-    """When each column first reaches `level`, interpolated; inf where it never does."""
-    above = progress >= level
-    step = np.argmax(above, axis=0)
-    columns = np.arange(progress.shape[1])
-    after, before = progress[step, columns], progress[np.maximum(step - 1, 0), columns]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        part = np.where(step > 0, (after - level) / (after - before), 0.0)
-    return np.where(above.any(axis=0), step - part, np.inf)
-
-
-def _check_costs(name: str, costs: Any) -> None:
-    for cost in costs if isinstance(costs, (tuple, list)) else (costs,):
-        if not isinstance(cost, Cost):
-            raise TypeError(
-                f"{name} must be made of Costs such as Steps(), got "
-                f"{validation.shown(cost)}; make "
-                "a Cost of a function with FunctionCost(function)."
-            )
 
 
 def _weight(name: str, values: Any, size: int) -> FloatArray:

@@ -1,8 +1,8 @@
 """Epsilon-greedy choices that are led by a heuristic where levels leave the choice open.
 
 The levels of the ants that return promise returns of any sign, so that a product
-tau^alpha eta^beta means nothing there. What is known beforehand leads the ants in the
-other way that is open: it says what they try, not what they think of it.
+tau^alpha eta^beta means nothing there. Prior knowledge leads these ants in another way:
+it decides what they try, not what they expect of it.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What a pair promises that no ant has tried: so much that ants go and see."""
+"""What a pair promises that no ant has tried: enough for ants to try it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What an engineer knows, said in one line: a controller, or what is to become less.
+"""Prior knowledge in one line: a controller, or a quantity that is to become less.
 
 Both classes make what `heuristic=` and `initial=` of the colonies take (§7.3): functions
 of an environment and a partition that give a number for each pair.
@@ -69,7 +69,7 @@ class Prior(ABC):
 
 @dataclass(frozen=True)
 class PolicyPrior(Prior):
-    """What a controller would do is preferred, in the centre of each cell.
+    """Prefers what a controller would do, in the centre of each cell.
 
     Args:
         rule: the controller: a function of the centres of all cells, `(n_cells, d)`. It
@@ -126,7 +126,7 @@ class PolicyPrior(Prior):
 
 @dataclass(frozen=True)
 class PotentialPrior(Prior):
-    """What brings the next state nearest to the goal is preferred.
+    """Prefers the action that brings the next state nearest to the goal.
 
     Each action is tried for one step in the centre of each cell, on a copy of the
     environment. The action after which the potential is least is preferred, and the

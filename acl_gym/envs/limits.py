@@ -4,10 +4,17 @@ from __future__ import annotations
 
 from typing import Any
 
+import gymnasium as gym
+from gymnasium.vector import VectorEnv
+from gymnasium.wrappers import TimeLimit
+
 from acl_gym.utils import validation
 
 NO_LIMIT = -1
 """What `gym.make` takes for "no limit"; `gym.make_vec` of this package takes it too."""
+
+DEFAULT_MAX_STEPS = 300
+"""T of Table 5.2, where nobody has set a limit."""
 
 
 class RegisteredLimit(int):
@@ -48,3 +55,51 @@ def trial_limit(own: int | None, trial: int | None) -> int:
     if trial is None or own is None:
         return int(own or trial or 0)  # kernels take plain integers only
     return trial if isinstance(own, RegisteredLimit) else min(own, trial)
+
+
+def usual_max_steps(env: Any) -> int:
+    """T where none is given: the time limit of the environment, or 300 if it has none.
+
+    Args:
+        env: a single or a vector environment, or None.
+    """
+    return time_limit(env) or DEFAULT_MAX_STEPS
+
+
+def time_limit(env: Any) -> int | None:
+    """The time limit that an environment was made or registered with, or None.
+
+    Args:
+        env: a single or a vector environment, or None.
+
+    Returns:
+        Steps, >= 1; None where there is no limit, or nothing tells it.
+    """
+    base = getattr(env, "unwrapped", None)
+    own = getattr(base, "max_episode_steps", None)
+    if isinstance(base, VectorEnv) and hasattr(base, "max_episode_steps"):
+        # It ends episodes itself. None: it was made without the limit that its id has.
+        return int(own) if own and own > 0 else None
+    # A vector of single environments may know its limit by those only; its own spec has
+    # the limit of the id, and what the caller said beside it.
+    for each in (*getattr(base, "envs", ())[:1], env):
+        own = own or _limit_of_spec(each) or _limit_of_wrappers(each)
+    return int(own) if own and own > 0 else None
+
+
+def _limit_of_spec(env: Any) -> int | None:
+    """The limit that `gym.make` or `gym.make_vec` was told, or that the id has."""
+    spec = getattr(env, "spec", None)
+    if spec is None:
+        return None
+    limit: int | None = spec.kwargs.get("max_episode_steps", spec.max_episode_steps)
+    return limit
+
+
+def _limit_of_wrappers(env: Any) -> int | None:
+    """The limit of the outermost `TimeLimit`, where a single environment has no spec."""
+    while isinstance(env, gym.Wrapper):
+        if isinstance(env, TimeLimit):
+            return env._max_episode_steps
+        env = env.env
+    return None

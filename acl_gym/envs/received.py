@@ -59,6 +59,22 @@ def parts(name: str, result: Any, count: int) -> Any:
     return result
 
 
+def step_result(result: Any, n_slots: int) -> tuple[Any, ...]:
+    """Return what `env.step` gave, part by part, each in the form that kernels take.
+
+    Raises:
+        ValueError: a part is not what it should be.
+    """
+    observation, reward, terminated, truncated, told = parts("step", result, 5)
+    return (
+        observations(observation, n_slots),
+        rewards(reward, n_slots),
+        flags("terminated", terminated, n_slots),
+        flags("truncated", truncated, n_slots),
+        infos(told, n_slots),
+    )
+
+
 def observations(value: Any, n_slots: int, name: str = "observations") -> Any:
     """Return observations with one row a slot, in a type that kernels take.
 

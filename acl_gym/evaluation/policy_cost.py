@@ -10,10 +10,12 @@ import numpy as np
 from gymnasium.vector import VectorEnv
 from numpy.typing import NDArray
 
-from acl_gym.colony.costs import Cost, as_cost, solution_costs
+from acl_gym.colony.cost import Cost
+from acl_gym.colony.costs import as_cost, solution_costs
 from acl_gym.colony.episodes import Episode
 from acl_gym.envs.control.environments import ControlVectorEnv
 from acl_gym.envs.control.single import ControlEnv
+from acl_gym.envs.limits import DEFAULT_MAX_STEPS
 from acl_gym.evaluation.inputs import walker
 from acl_gym.evaluation.predictions import require_predictor
 from acl_gym.evaluation.rows import rows_of
@@ -132,8 +134,8 @@ def evaluate_policy_cost(
     Raises:
         TypeError: `model` has no `predict`, `env` is not a vector environment, or `seed`
             is not an integer.
-        ValueError: `seed` is negative, `env` is wrapped and has not one slot per state, or is of another
-            package and `states` are given.
+        ValueError: `seed` is negative, `env` is wrapped and has not one slot per state,
+            or is of another package and `states` are given.
     """
     require_predictor(model)
     require_vector_env(env)
@@ -156,7 +158,9 @@ def evaluate_policy_cost(
             f"a wrapped env must have one slot for each of the {len(states)} states, "
             f"got {env.num_envs} slots."
         )
-    rollout, choose, real = walker(env, 300 if max_steps is None else max_steps)
+    rollout, choose, real = walker(
+        env, DEFAULT_MAX_STEPS if max_steps is None else max_steps
+    )
     episode_cost = as_cost(cost)
     observation = rollout.start(
         seed=seed, states=states, record=episode_cost is not None

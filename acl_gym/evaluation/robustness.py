@@ -57,7 +57,7 @@ class Robustness:
 
 
 def evaluate_over_range(
-    policy: Predictor,
+    model: Predictor,
     env: VectorEnv[Any, Any, Any],
     *,
     draws: int = 20,
@@ -73,7 +73,7 @@ def evaluate_over_range(
     half of the plants are corners drawn at random.
 
     Args:
-        policy: an agent or policy with `predict(observation, deterministic=True)`.
+        model: see `evaluate_policy_cost`.
         env: a vector environment of this package. One that is wrapped must have a slot
             for each initial state, see `evaluate_policy_cost`, and cannot be given
             `uncertain`.
@@ -89,11 +89,11 @@ def evaluate_over_range(
         Costs in all plants; the same for the same seed.
 
     Raises:
-        TypeError: `policy` has no `predict`, `env` is of another package, or a parameter
+        TypeError: `model` has no `predict`, `env` is of another package, or a parameter
             does not exist.
         ValueError: nothing is uncertain, a range is empty, or an argument is out of range.
     """
-    require_predictor(policy)
+    require_predictor(model)
     base = control_env(env)
     count = validation.integer("draws", draws, at_least=1)
     rng = np.random.default_rng(validation.integer("seed", seed, at_least=0))
@@ -108,10 +108,10 @@ def evaluate_over_range(
                 "uncertain can be given with an env that is not wrapped, got "
                 f"{type(env).__name__}; give the ranges to acl_gym.plant instead."
             )
-        results = _one_by_one(policy, base, starts, known, rows, max_steps)
+        results = _one_by_one(model, base, starts, known, rows, max_steps)
     else:
-        results = _in_slots(policy, env, starts, rows, max_steps)
-    nominal = evaluate_policy_cost(policy, env, starts, max_steps=max_steps, seed=0)
+        results = _in_slots(model, env, starts, rows, max_steps)
+    nominal = evaluate_policy_cost(model, env, starts, max_steps=max_steps, seed=0)
     costs = np.array([each.cost for each in results])
     at = int(np.argmax(costs))
     worst, where = results[at], rows[at].tolist()
@@ -169,7 +169,7 @@ def _plants(known: PlantParameters, count: int, rng: np.random.Generator) -> Flo
 
 
 def _one_by_one(
-    policy: Predictor,
+    model: Predictor,
     env: ControlVectorEnv,
     states: FloatArray,
     known: PlantParameters,
@@ -182,13 +182,13 @@ def _one_by_one(
         values = dict(zip(known.uncertain, row, strict=True))
         changed = env.with_parameters(**values)
         results.append(
-            evaluate_policy_cost(policy, changed, states, max_steps=max_steps, seed=0)
+            evaluate_policy_cost(model, changed, states, max_steps=max_steps, seed=0)
         )
     return results
 
 
 def _in_slots(
-    policy: Predictor,
+    model: Predictor,
     env: VectorEnv[Any, Any, Any],
     states: FloatArray,
     rows: FloatArray,
@@ -202,7 +202,7 @@ def _in_slots(
         some = rows[first : first + at_once]
         own = np.repeat(some, count, axis=0)
         starts = np.concatenate([np.tile(states, (len(some), 1)), own], axis=1)
-        found = evaluate_policy_cost(policy, env, starts, max_steps=max_steps, seed=0)
+        found = evaluate_policy_cost(model, env, starts, max_steps=max_steps, seed=0)
         for i in range(len(some)):
             each = slice(i * count, (i + 1) * count)
             success = None if found.success is None else found.success[each]

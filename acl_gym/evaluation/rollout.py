@@ -11,7 +11,6 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from gymnasium import spaces
 from gymnasium.vector import AutoresetMode, VectorEnv
 
 from acl_gym.colony.episodes import Episodes
@@ -20,11 +19,12 @@ from acl_gym.envs.control.environments import ControlVectorEnv
 from acl_gym.envs.control.native import is_native
 from acl_gym.envs.wrappers.partial_reset import reset_slots
 from acl_gym.envs.wrappers.waiting import WaitingSlots
-from acl_gym.evaluation.rows import fixed, require_array, set_row
+from acl_gym.evaluation.rows import fixed, require_array, with_final_rows
 from acl_gym.evaluation.steps import Outcome, Record, Step, account, spread_actions
+from acl_gym.evaluation.successes import Successes
 from acl_gym.utils import validation
 from acl_gym.utils.typing import BoolArray, FloatArray, IntArray
-from acl_gym.utils.vector_envs import require_vector_env
+from acl_gym.utils.vector_envs import require_discrete_actions, require_vector_env
 
 _INT = np.dtype(np.int64)
 
@@ -66,18 +66,7 @@ class Rollout:
 
     def __init__(self, env: VectorEnv[Any, Any, Any], max_steps: int) -> None:
         require_vector_env(env)
-        space = env.single_action_space
-        if not isinstance(space, spaces.Discrete):
-            remedy = "number its actions with gymnasium.wrappers.TransformAction"
-            if isinstance(space, spaces.Box):
-                remedy = (
-                    "wrap it in acl_gym.ActionGrid(env, 5), or each single environment "
-                    "in gymnasium.wrappers.DiscretizeAction(env, bins=5)"
-                )
-            raise ValueError(
-                "env must have Discrete actions, got "
-                f"{validation.shown(space)}; {remedy}."
-            )
+        space = require_discrete_actions(env)
         self.env = env
         self.max_steps = validation.integer("max_steps", max_steps, at_least=1)
         self.n_actions = int(space.n)
@@ -96,8 +85,7 @@ class Rollout:
         self._mask: BoolArray | None = None
         self._ants = self._all
         self._shown_of: IntArray | None = None  # what `_shown_ants` shows
-        self._reported_success: BoolArray | None = None
-        self._success_is_told = True  # else an end in a terminal state is one
+        self._successes = Successes(self._n_slots, env.unwrapped)
         self._stepping = False
         # The environment, in trials in which what it returns need not be checked.
         self._native: ControlVectorEnv | None = None
@@ -148,10 +136,6 @@ class Rollout:
         self._native = self.env if is_native(self.env) else None
         seed, n = validation.seed(seed), self.num_envs
         options: dict[str, Any] = {}
-        base = self.env.unwrapped
-        self._success_is_told = not (
-            isinstance(base, ControlVectorEnv) and not base.system.may_fail
-        )
         if self._asks_to_wait:
             options |= {"finished": "wait", "max_steps": self.max_steps}
         if states is not None:
@@ -165,8 +149,7 @@ class Rollout:
         self.cost = np.zeros(n)
         self.length = np.zeros(n, dtype=np.int64)
         self.terminated = np.zeros(n, dtype=np.bool_)
-        # In an environment of this package nobody has succeeded who has not said so.
-        self._reported_success = np.zeros(n, np.bool_) if self._asks_to_wait else None
+        self._successes.start()
         # Those that kernels change.
         self._totals = self.cost, self.length, self.terminated
         self.steps = 0
@@ -264,7 +247,7 @@ class Rollout:
         finally:
             self._stepping = False
         if native is None:
-            given = self._checked(given)
+            given = received.step_result(given, self._n_slots)
             self._read_mask(given[4])
         else:
             mask = given[4].get("action_mask")
@@ -287,8 +270,8 @@ class Rollout:
         )
         if bad >= 0:
             raise received.not_finite(reward, bad)
-        if self._success_is_told:
-            self._note_success(infos, ants)
+        if infos and self._successes.are_told:
+            self._successes.note(infos, ants)
         if self._mode is AutoresetMode.DISABLED and not self._waits:
             # Idle slots that finish another episode are reset with the others.
             done = np.logical_or(terminated, truncated)
@@ -383,7 +366,7 @@ class Rollout:
         `infos["is_success"]` said last; None if it was never there, as then nothing is
         known of success.
         """
-        return self._reported_success if self._success_is_told else self.terminated
+        return self._successes.reported if self._successes.are_told else self.terminated
 
     def release(self) -> None:
         """Leave the environment as after a reset.
@@ -426,20 +409,6 @@ class Rollout:
         allowed[~allowed.any(axis=1)] = True
         return allowed
 
-    def _note_success(self, infos: Any, ants: IntArray) -> None:
-        """Take over what the infos of a step say of the ants that took it."""
-        # Where slots are reset in the same step, the infos of their ends come last.
-        final = infos.get("final_info")
-        for part in (infos, received.infos(final, self.num_envs)) if infos else ():
-            told = received.success(part, self.num_envs)
-            if told is None:
-                continue
-            success, given = told
-            if self._reported_success is None:
-                self._reported_success = np.zeros(self.num_envs, dtype=np.bool_)
-            noted = ants[given[ants]]
-            self._reported_success[noted] = success[noted]
-
     def _check_idle(self, what: str) -> None:
         """Refuse calls from within `env.step`, which would disturb the step."""
         if self._stepping:
@@ -448,39 +417,13 @@ class Rollout:
                 "env.step return first."
             )
 
-    def _checked(self, given: Any) -> tuple[Any, ...]:
-        """What `env.step` of an environment of others returned, part by part."""
-        n = self._n_slots
-        observation, reward, terminated, truncated, infos = received.parts(
-            "step", given, 5
-        )
-        return (
-            received.observations(observation, n),
-            received.rewards(reward, n),
-            received.flags("terminated", terminated, n),
-            received.flags("truncated", truncated, n),
-            received.infos(infos, n),
-        )
-
     def _read_mask(self, infos: Any) -> None:
         """Take the action masks from checked infos."""
         self._mask = received.action_mask(infos, self.num_envs, self.n_actions)
 
     def _last_seen(self, stopped: IntArray, observation: Any, infos: Any) -> Any:
         """Observations; where an episode has just ended, its final observation."""
-        final = infos.get("final_obs")
-        if final is None or len(final) != self.num_envs:
-            raise ValueError(
-                "infos['final_obs'] must hold the last observation of each slot that has "
-                f"finished, as autoreset in the same step asks for, got {list(infos)}; "
-                'check the environment, or make it with autoreset_mode="NextStep".'
-            )
-        if isinstance(observation, dict):
-            shown = {key: part.copy() for key, part in observation.items()}
-        else:
-            shown = observation.copy()
-        for slot in stopped:
-            set_row(shown, int(slot), final[slot])
+        shown = with_final_rows(observation, infos, stopped, self.num_envs)
         if self.action_mask is not None:
             # The mask already belongs to the next episode.
             last = received.infos(infos.get("final_info"), self.num_envs)

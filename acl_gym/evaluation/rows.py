@@ -32,6 +32,12 @@ def set_row(observation: Any, slot: int, row: Any) -> None:
         for key, part in observation.items():
             set_row(part, slot, row[key])
         return
+    if isinstance(observation, tuple):
+        if not isinstance(row, tuple) or len(row) != len(observation):
+            raise _not_final(slot, f"a tuple of {len(observation)} parts", row)
+        for part, one in zip(observation, row, strict=True):
+            set_row(part, slot, one)
+        return
     array = validation.as_array(row)
     shape = observation.shape[1:]
     if (
@@ -41,6 +47,46 @@ def set_row(observation: Any, slot: int, row: Any) -> None:
     ):
         raise _not_final(slot, f"shape {shape} and type {observation.dtype}", row)
     observation[slot] = array
+
+
+def with_final_rows(
+    observation: Any, infos: Any, stopped: IntArray, n_slots: int
+) -> Any:
+    """Observations; where an episode has just ended, its final observation.
+
+    Args:
+        observation: of all slots, `(n_slots, ...)`, from an environment that resets
+            slots in the step in which they finish.
+        infos: of that step.
+        stopped: the slots that have finished, `(m,)`.
+        n_slots: how many slots there are.
+
+    Returns:
+        A copy.
+
+    Raises:
+        ValueError: `infos["final_obs"]` does not hold them.
+    """
+    final = infos.get("final_obs")
+    if final is None or len(final) != n_slots:
+        raise ValueError(
+            "infos['final_obs'] must hold the last observation of each slot that has "
+            f"finished, as autoreset in the same step asks for, got {list(infos)}; "
+            'check the environment, or make it with autoreset_mode="NextStep".'
+        )
+    shown = _copied(observation)
+    for slot in stopped:
+        set_row(shown, int(slot), final[slot])
+    return shown
+
+
+def _copied(observation: Any) -> Any:
+    """A copy, part by part."""
+    if isinstance(observation, dict):
+        return {key: _copied(part) for key, part in observation.items()}
+    if isinstance(observation, tuple):
+        return tuple(map(_copied, observation))
+    return observation.copy()
 
 
 def _not_final(slot: int, expected: str, row: Any) -> ValueError:

@@ -37,7 +37,7 @@ class _Back(NamedTuple):
 
 
 class _Anew(NamedTuple):
-    """Where slots stand that the environment has reset in the step that was the last."""
+    """The slots that the environment has reset in the last step, and where they stand."""
 
     slots: BoolArray
     observation: Any
@@ -207,8 +207,7 @@ class Stream(Rollout):
             return observation
         self.cost[back] = 0.0
         self.terminated[back] = False
-        if self._reported_success is not None:
-            self._reported_success[back] = False
+        self._successes.forget(back)
         self._begun[back] = self.steps
         if self._by_mask or anew is not None:
             observation = self._reset(back, observation, anew)

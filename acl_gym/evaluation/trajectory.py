@@ -61,7 +61,7 @@ def record_trajectory(
         ValueError: it has more than one slot.
     """
     require_predictor(model)
-    base = control_env(env)
+    control_env(env)  # refuses others
     if env.num_envs != 1:
         raise ValueError(f"env must have one slot, got {env.num_envs}.")
     states_of_one = np.asarray(state)[None]

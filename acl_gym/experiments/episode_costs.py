@@ -8,8 +8,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from acl_gym.colony.costs import Cost, Overshoot, SettlingTime, Steps
+from acl_gym.colony.cost import Cost
+from acl_gym.colony.costs import Steps
 from acl_gym.colony.episodes import Episodes
+from acl_gym.colony.response_costs import Overshoot, SettlingTime
 from acl_gym.utils.typing import FloatArray
 
 _STEP = 0.1

@@ -117,11 +117,6 @@ def _unclipped(value: float) -> float:
     return 0.0 if 0.0 < abs(value) < 1.0 / _HUGE else value
 
 
-def overlap(first: Estimate, second: Estimate) -> bool:
-    """Whether two intervals have a point in common."""
-    return max(first.low, second.low) <= min(first.high, second.high)
-
-
 def rank_correlation(x: ArrayLike, y: ArrayLike) -> float:
     """Spearman's, from -1 to 1; 0 if either is constant."""
     if np.ptp(x) == 0 or np.ptp(y) == 0:

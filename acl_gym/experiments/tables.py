@@ -1,50 +1,33 @@
-"""The tables beside the figures, and how a colony is compared with another method.
-
-A colony is compared with each rival by the ratio of interquartile means with its bootstrap
-interval. It wins or loses where the whole interval lies on one side of 1; otherwise these
-runs show no difference. ACL is a rival of the returning colony.
-"""
+"""The tables beside the figures."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
-from acl_gym.experiments.comparison.experiments import LABELS, LONG
+from acl_gym.experiments.comparison.experiments import LABELS
+from acl_gym.experiments.references import (
+    MARKS,
+    TIMES,
+    Reference,
+    measured,
+    reference,
+)
 from acl_gym.experiments.results import Results
-from acl_gym.experiments.statistics import Estimate, estimate, iqm, median, ratio
-from acl_gym.experiments.study import Experiment, Study
+from acl_gym.experiments.rivals import compared
+from acl_gym.experiments.statistics import estimate, iqm, median, ratio
+from acl_gym.experiments.study import Experiment
 from acl_gym.utils.typing import FloatArray
-
-MARKS = (25, 10)
-"""Percent above the reference that count as close, the wider first."""
-
-FEW = 5
-"""With fewer runs no method is said to win."""
-
-SLACK = 1e-3
-"""Ratios that are no farther from 1 are taken for 1."""
-
-WINS, LOSES, EVEN, OPEN = "wins", "loses", "no difference", "undecided"
-NEITHER = "neither"
-"""Of times: neither gets there in more than half of its runs."""
 
 NEVER = "never"
 _COSTS = {
     "final_policy_cost": "cost of the last policy",
     "best_policy_cost": "cost of the best policy",
 }
-_UNITS = {"env_steps": "interactions", "seconds": "seconds"}
-_TIMES = {
-    f"{x}_to_{mark}": f"{unit} to within {mark}%"
-    for mark in MARKS
-    for x, unit in _UNITS.items()
-}
-"""What it takes to come close to the reference, by its key."""
 
 
 @dataclass(frozen=True)
@@ -64,141 +47,11 @@ class Table:
     best: list[list[int]] = field(default_factory=list)
 
 
-class Reference(NamedTuple):
-    """What policies are measured against: a study, its cost, and whether that is J*.
-
-    Without a model there is no such study; the cost is then the lowest of all runs.
-    """
-
-    study: Study | None
-    cost: float
-    optimal: bool
-
-    @property
-    def symbol(self) -> str:
-        """What the cost is called."""
-        return "J*" if self.optimal else "best known"
-
-    def within(self, percent: float) -> float:
-        """The cost that is so much above this one; costs may be below 0."""
-        if self.cost >= 0.0:
-            return self.cost * (1 + percent / 100)
-        return self.cost * (1 - percent / 100)
-
-    def gap(self, costs: FloatArray) -> FloatArray:
-        """Percent above this cost; NaN where it is 0."""
-        if self.cost == 0.0:
-            return np.full_like(costs, np.nan)
-        gap = 100 * (costs / self.cost - 1)
-        return gap if self.cost > 0.0 else -gap
-
-
-def reference(experiment: Experiment, results: Results) -> Reference:
-    """The first reference; an option says whether it is the optimum.
-
-    Without one, the best policy of all runs.
-    """
-    for study in experiment.references.values():
-        cost = float(results.last(study)[0])
-        return Reference(study, cost, experiment.options["optimum"])
-    costs = [results.best(study).min() for study in experiment.studies.values()]
-    return Reference(None, float(min(costs)), optimal=False)
-
-
-class Comparison(NamedTuple):
-    """A method against a rival by one measure; less is better.
-
-    Attributes:
-        where: the task; "" where there is one.
-        measure: what is compared.
-        method: the name of the method.
-        rival: the name of the other one.
-        verdict: WINS, LOSES, EVEN, NEITHER or OPEN, of the method.
-        ratio: how many times the rival's figure that of the method is.
-    """
-
-    where: str
-    measure: str
-    method: str
-    rival: str
-    verdict: str
-    ratio: Estimate
-
-    def as_json(self) -> dict[str, Any]:
-        """JSON types: `ratio`, with its interval from `low` to `high`."""
-        return {**self._asdict(), **self.ratio.as_json("ratio")}
-
-
-def compare(
-    where: str, measure: str, names: tuple[str, str], values: Sequence[FloatArray]
-) -> Comparison:
-    """Compare a method with a rival, by the values of the runs of both.
-
-    Args:
-        where: see `Comparison`.
-        measure: what the values are.
-        names: of the method and of the rival.
-        values: one a run, > 0 or infinite, of either.
-    """
-    found = ratio(values[0], values[1])
-    if min(map(len, values)) < FEW:
-        verdict = OPEN
-    elif all(math.isinf(np.median(each)) for each in values):
-        verdict = NEITHER
-    elif found.low > 1 + SLACK:
-        verdict = LOSES
-    else:
-        verdict = WINS if found.high < 1 - SLACK else EVEN
-    return Comparison(where, measure, *names, verdict, found)
-
-
-def _compared(
-    where: str, measure: str, values: Mapping[str, FloatArray]
-) -> list[Comparison]:
-    """Each colony against each rival by the values under their labels."""
-    thesis, returning = LABELS["acl"], LABELS["returning"]
-    colonies = [name for name in values if name in (thesis, LABELS[LONG], returning)]
-    return [
-        compare(where, measure, (colony, name), (values[colony], values[name]))
-        for colony in colonies
-        for name in values
-        if name not in colonies or (colony, name) == (returning, thesis)
-    ]
-
-
-def _measured(
-    study: Study, results: Results, known: Reference
-) -> dict[str, FloatArray]:
-    """All that tables say of a study, one value a run.
-
-    NaN where nothing is known: of success in environments of other packages.
-    """
-    final, best = results.last(study), results.best(study)
-    rates = [np.full(len(final), np.nan)] * 2
-    if results.knows(study, "success_rate"):
-        rates = [f(study, "success_rate") for f in (results.last, results.best)]
-    return {
-        "final_policy_cost": final,
-        "final_gap_percent": known.gap(final),
-        "final_success_rate": rates[0],
-        "best_policy_cost": best,
-        "best_gap_percent": known.gap(best),
-        "best_success_rate": rates[1],
-        "env_steps": results.last(study, "env_steps"),
-        "seconds": results.last(study, "seconds"),
-        **{
-            f"{x}_to_{mark}": results.first_within(study, known.within(mark), x)
-            for mark in MARKS
-            for x in _UNITS
-        },
-    }
-
-
 def system(experiment: Experiment, results: Results) -> Table:
     """One system: costs, and what learning takes in interactions and in time."""
     known, rows = reference(experiment, results), []
     studies = experiment.studies.items()
-    found = {label: _measured(each, results, known) for label, each in studies}
+    found = {label: measured(each, results, known) for label, each in studies}
     for label, own in found.items():
         last, runs = own["final_policy_cost"], results.runs(experiment.studies[label])
         rows.append(
@@ -208,7 +61,7 @@ def system(experiment: Experiment, results: Results) -> Table:
                 f"{last.min():.4g} to {last.max():.4g}",
                 str(estimate(own["best_policy_cost"])),
                 f"{100 * own['final_success_rate'].mean():.0f}%",
-                *(_time(own[key], key) for key in _TIMES),
+                *(_time(own[key], key) for key in TIMES),
                 f"{own['env_steps'][0]:,.0f}",
                 f"{iqm(own['seconds']):.2g}",
                 str(sum(bool(run.failure) for run in runs) or "none"),
@@ -217,16 +70,16 @@ def system(experiment: Experiment, results: Results) -> Table:
     name = "J*" if known.optimal else "the best known cost"
     comparisons = [
         each.as_json()
-        for key, measure in (_COSTS | _TIMES).items()
-        for each in _compared(
+        for key, measure in (_COSTS | TIMES).items()
+        for each in compared(
             "",
-            f"{measure} of {name}" if key in _TIMES else measure,
+            f"{measure} of {name}" if key in TIMES else measure,
             {label: own[key] for label, own in found.items()},
         )
     ]
     headings = ["Method", "Cost of the last policy", "Range", "Cost of the best"]
     headings += ["Reach the goal"]
-    headings += [each.replace("within ", "").capitalize() for each in _TIMES.values()]
+    headings += [each.replace("within ", "").capitalize() for each in TIMES.values()]
     headings += ["Interactions of a run", "Seconds of a run", "Broke down"]
     return Table(headings, rows, comparisons)
 
@@ -246,7 +99,7 @@ def harder(experiment: Experiment, results: Results) -> Table:
     rows, comparisons, headings = [], [], [experiment.options["of"]]
     for where, row in experiment.options["rows"].items():
         last = {LABELS[name]: results.last(study) for name, study in row.items()}
-        own = _compared(where, _COSTS["final_policy_cost"], last)
+        own = compared(where, _COSTS["final_policy_cost"], last)
         cells = {name: str(estimate(values)) for name, values in last.items()}
         for each in own:
             cells[each.rival] += f"\n{each.method} {each.verdict}, {each.ratio} times"
@@ -262,12 +115,12 @@ def overview(experiment: Experiment, results: Results) -> Table:
     for where, row in experiment.options["rows"].items():
         cost = float(results.last(experiment.references[where])[0])
         known = Reference(experiment.references[where], cost, optimal=False)
-        found[where] = {LABELS[n]: _measured(row[n], results, known) for n in row}
-    for key, text in _TIMES.items():
+        found[where] = {LABELS[n]: measured(row[n], results, known) for n in row}
+    for key, text in TIMES.items():
         for where, row in found.items():
-            values = {name: own[key] for name, own in row.items()}
-            compared = _compared(where, f"{text} of the reference", values)
-            table.comparisons.extend(each.as_json() for each in compared)
+            values = {name: measures[key] for name, measures in row.items()}
+            own = compared(where, f"{text} of the reference", values)
+            table.comparisons.extend(each.as_json() for each in own)
     return table
 
 
@@ -330,12 +183,12 @@ def summarise(experiment: Experiment, results: Results) -> list[dict[str, Any]]:
             "label": label,
             "seeds": len(results.runs(study)),
         }
-        for key, values in _measured(study, results, known).items():
+        for key, values in measured(study, results, known).items():
             if np.isnan(values).any():
                 entry[key] = dict.fromkeys(("median", "low", "high"))
             else:
                 entry[key] = estimate(values, median).as_json("median")
-            if key in _TIMES:
+            if key in TIMES:
                 entry[key]["reached"] = int(np.isfinite(values).sum())
         summary.append(entry)
     return summary

@@ -12,6 +12,7 @@ from gymnasium.vector import VectorEnv
 from acl_gym.agents.base import TabularAgent
 from acl_gym.envs.control.lookup import system_of
 from acl_gym.envs.learned.description import described_by, rows_of_inputs
+from acl_gym.envs.limits import usual_max_steps
 from acl_gym.envs.wrappers.action_grid import grid_over
 from acl_gym.utils import validation
 from acl_gym.utils.boxes import declared_bounds
@@ -21,7 +22,7 @@ FIRST_ROUNDS = (20, 40, 60, 90, 120, 160, 200)
 """Interactions after which the colony learns, if nothing else is said."""
 
 GROWTH = 1.5
-"""By which factor there are more of them in each later round."""
+"""The factor by which each later round has more of them."""
 
 VALUES = 5
 """Values of each continuous input, if none are given."""
@@ -78,13 +79,7 @@ def episode_steps(env: Any, given: int | None) -> int:
     """T in the model: what is given, else the limit of the environment, else 300."""
     if given is not None:
         return validation.integer("max_episode_steps", given, at_least=1)
-    spec = getattr(env, "spec", None)
-    limits = (
-        getattr(spec, "max_episode_steps", None),
-        getattr(env, "max_episode_steps", None),
-    )
-    known = next((limit for limit in limits if limit is not None and limit > 0), 300)
-    return int(known)
+    return usual_max_steps(env)
 
 
 def usual_model_steps(n_variables: int) -> int:

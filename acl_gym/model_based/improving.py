@@ -27,8 +27,8 @@ PATIENCE = 0.4
 the colony goes on with what it has learned before."""
 
 ALIKE = 0.1
-"""Two models may differ by this share of the deviation of a step's change, and what ants
-remember of the older one is still good enough."""
+"""How much two models may differ, as a share of the standard deviation of a step's
+change, for what ants remember of the older one to be still good enough."""
 
 DOUBT, MOST_DOUBT = 3.0, 0.1
 """The share by which a later policy may cost more in the model and is preferred still: a
@@ -102,8 +102,8 @@ class Improving:
         """
         begins = self._enter(model)
         self.cost = np.inf if self.best is None else self._cost(self.best, states)
-        # Kept apart from the cost of the policy last taken: that may be higher by the
-        # doubt, and shares of shares would let it rise without end.
+        # The least cost of this round. Policies are not compared with the one taken last,
+        # which may cost more by `doubt`: the cost could then rise without end.
         least = self.cost
         # A colony that begins needs time before it can surpass the best of those before.
         patience = most_steps if begins else PATIENCE * most_steps

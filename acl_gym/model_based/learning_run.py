@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 
 from acl_gym.agents.base import TabularAgent
-from acl_gym.agents.returning import ReturningACL
 from acl_gym.envs.learned import (
     DataWarning,
     LearnedDynamics,
@@ -21,7 +20,6 @@ from acl_gym.envs.learned import (
     Transitions,
 )
 from acl_gym.envs.learned.regression import LEAST_STEPS
-from acl_gym.envs.learned.system import LearnedSystem
 from acl_gym.model_based.arguments import (
     check_actions,
     check_plant,
@@ -31,13 +29,12 @@ from acl_gym.model_based.arguments import (
     task_of,
     usual_model_steps,
 )
+from acl_gym.model_based.default_agent import default_agent
 from acl_gym.model_based.improving import Improving
 from acl_gym.model_based.journal import AGENT, BEST, Journal, State
 from acl_gym.model_based.plant_facts import arrays_of, facts_of_plant, joined
 from acl_gym.model_based.plant_runner import PlantRunner
 from acl_gym.model_based.result import PlantLearning
-from acl_gym.partitions.around_goal import partition_around_goal
-from acl_gym.partitions.grid import Fuzzy
 from acl_gym.utils import validation
 from acl_gym.utils.typing import FloatArray, Row
 
@@ -390,35 +387,3 @@ class LearningRun:
         self._improving.agent.save(self._journal.path(AGENT))
         state = State(self._learned_at, self._seconds, self._history)
         self._journal.keep_state(state)
-
-
-def default_agent(
-    seed: int | None, **settings: Any
-) -> Callable[[LearnedVectorEnv], ReturningACL]:
-    """What learns in a model if nothing else is said.
-
-    Args:
-        seed: of the agent.
-        **settings: parameters that are to differ.
-    """
-    # Steps in a model are cheap: fewer walks back make more of them in the same time.
-    chosen: dict[str, Any] = {"walks_back": 10, **settings}
-
-    def make(model: Any) -> ReturningACL:
-        own = dict(chosen)
-        if own.get("partition") is None:
-            own["partition"] = cells_of_goal(model)
-        return ReturningACL(model, seed=seed, **own)
-
-    return make
-
-
-def cells_of_goal(model: Any) -> Fuzzy | None:
-    """Cells for the goal of a model, where a grid that grows would be too coarse."""
-    system = getattr(model, "system", None)
-    if not isinstance(system, LearnedSystem) or system.goal_box is None:
-        return None
-    known = system.dynamics.description
-    if known.circular or known.shown_angles.pairs:
-        return None  # what is observed are not the variables of the goal
-    return partition_around_goal(system.low, system.high, *system.goal_box)

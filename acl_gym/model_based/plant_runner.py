@@ -1,4 +1,4 @@
-"""Running the plant with the policy of now and some exploration."""
+"""Running the plant with the present policy and some exploration."""
 
 from __future__ import annotations
 

@@ -2,7 +2,8 @@
 
 Every state belongs to k cells, to each with a degree >= 0, and the degrees of a state
 sum to 1. Plain discrete states (§3.2) and a crisp partition (§4.2) have k = 1, a fuzzy
-one (§4.3) k = 2^d, d counting the variables with several centres. Equations written over `(index, degree)` therefore hold for all.
+one (§4.3) k = 2^d, d counting the variables with several centres. Equations written over
+`(index, degree)` therefore hold for all.
 
 `base` defines what a partition is, `discrete` and `grid` hold the kinds of them, and
 `automatic` builds one for an environment: that of the thesis, or a general one.

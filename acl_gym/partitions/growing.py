@@ -193,8 +193,8 @@ def carried_over(table: ArrayLike, old: Partition, new: Partition) -> FloatArray
     policies. The cells of a crisp grid receive a copy of the cell that holds their
     centre.
 
-    Any agent goes on on finer cells so: a new one with `coarse.refined(0)`, whose
-    `set_table` takes what was carried over.
+    Any agent can go on learning with finer cells: make a new one with
+    `coarse.refined(0)`, and give its `set_table` the table that was carried over.
 
     Args:
         table: `(old.n_cells, n_actions)`.

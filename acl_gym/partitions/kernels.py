@@ -261,8 +261,8 @@ def locate(
     """Fill rows of `index` and `degree`; return -1.
 
     If a state is not finite, its slot is returned; `OUTSIDE` if a slot is not a row of
-    `states`. `axes` holds tuples, so that the number of axes is known when the kernel is compiled
-    and the loops over them are unrolled.
+    `states`. `axes` holds tuples, so that the number of axes is known when the kernel is
+    compiled and the loops over them are unrolled.
     """
     ends, reals = scratch_for(len(axes[0]))
     for block in range((slots.size + BLOCK - 1) // BLOCK):

@@ -17,8 +17,8 @@ _KINDS = (Crisp, Discrete, Fuzzy)
 _OWN = "own"
 
 _MOST_VARIABLES = 20
-"""Of a fuzzy partition in a file: a state has 2^20 cells then, which takes 12 MB. A file
-of a few bytes must not ask for more, as axes of one cell each would."""
+"""The most variables of a fuzzy partition in a file: a state then has 2^20 cells, which
+take 12 MB. A file of a few bytes must not ask for more, as axes of one cell each would."""
 
 
 class MissingPartition(Missing, Partition):

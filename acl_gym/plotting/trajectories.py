@@ -11,6 +11,7 @@ from gymnasium.vector import VectorEnv
 from matplotlib.axes import Axes
 
 from acl_gym.envs.control.system import ControlSystem
+from acl_gym.envs.limits import usual_max_steps
 from acl_gym.envs.navigation.system import Navigation
 from acl_gym.envs.pendulum.system import Pendulum
 from acl_gym.evaluation import Trajectory, record_trajectory
@@ -66,8 +67,9 @@ def plot_trajectory(
         start: the initial state, in environments of this package. None hangs the
             pendulum at rest, puts the vehicle at rest into a corner, and elsewhere
             takes the first of `evaluation_states`.
-        max_steps: the longest episode; None takes that of the environment, or the
-            agent's, or 300.
+        max_steps: the longest episode, >= 1. None takes the `evaluation_steps` of an
+            environment of this package; elsewhere T of the agent, or the time limit of
+            the environment, or 300.
         seed: of the reset; None continues the environment's stream. A copy of an
             environment of this package ignores it.
         axes: the two state variables of `kind="plane"`, by name or number.
@@ -93,7 +95,7 @@ def plot_trajectory(
         subject = subject_of(agent, env, labels, actions)
         limit = max_steps
         if limit is None and subject.vector_env() is None:
-            limit = getattr(agent, "max_steps", 300)
+            limit = getattr(agent, "max_steps", None)
         path = run(subject, start, limit, seed)
     if kind == "plane":
         return _plot_path(subject, path, ax, axes)
@@ -138,7 +140,9 @@ def run(subject: Subject, start: Any, max_steps: int | None, seed: Any) -> Traje
             "start can only be set in vector environments of acl_gym, got "
             f"{type(env.unwrapped).__name__}; use seed."
         )
-    steps = validation.integer("max_steps", max_steps or 300, at_least=1)
+    if max_steps is None:
+        max_steps = usual_max_steps(env)
+    steps = validation.integer("max_steps", max_steps, at_least=1)
     if isinstance(env, VectorEnv):
         return _run_slot(subject, env, steps, seed)
     return _run_single(subject, env, steps, seed)

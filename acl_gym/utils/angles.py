@@ -23,7 +23,7 @@ ROUNDING = 1e-4
 rounded to float32."""
 
 DIFFERENT = 10
-"""So many directions must have been seen before two numbers count as cosine and sine."""
+"""How many directions must have been seen before two numbers count as cosine and sine."""
 
 
 class Angles:

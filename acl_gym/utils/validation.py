@@ -324,8 +324,8 @@ def one_of(name: str, value: Any, allowed: Collection[str]) -> str:
     """Return `value` if it is one of the `allowed` strings.
 
     Raises:
-        ValueError: it is not; the message suggests the most similar one, if any, and then does not
-            list the others where they are many.
+        ValueError: it is not; the message suggests the most similar one, if any, and
+            then does not list the others where they are many.
     """
     if not isinstance(value, str) or value not in allowed:
         choices = ", ".join(repr(choice) for choice in allowed)

@@ -1,12 +1,15 @@
-"""Recognising a vector environment, and saying how to make one of what was given."""
+"""Recognising what agents learn in, and saying how to make it of what was given."""
 
 from __future__ import annotations
 
 from typing import Any
 
 import gymnasium as gym
+from gymnasium import spaces
 from gymnasium.envs.registration import EnvSpec, load_env_creator
 from gymnasium.vector import VectorEnv
+
+from acl_gym.utils import validation
 
 _MANY = 100
 """Slots proposed in place of a single environment."""
@@ -38,6 +41,26 @@ def require_vector_env(env: Any) -> None:
     else:
         kind, remedy = type(env).__name__, f"use {_line(None, None, _MANY)}"
     raise TypeError(f"env must be a gymnasium.vector.VectorEnv, got {kind}; {remedy}.")
+
+
+def require_discrete_actions(env: VectorEnv[Any, Any, Any]) -> spaces.Discrete:
+    """The action space of a slot, if its actions are numbered.
+
+    Raises:
+        ValueError: they are not.
+    """
+    space = env.single_action_space
+    if isinstance(space, spaces.Discrete):
+        return space
+    remedy = "number its actions with gymnasium.wrappers.TransformAction"
+    if isinstance(space, spaces.Box):
+        remedy = (
+            "wrap it in acl_gym.ActionGrid(env, 5), or each single environment in "
+            "gymnasium.wrappers.DiscretizeAction(env, bins=5)"
+        )
+    raise ValueError(
+        f"env must have Discrete actions, got {validation.shown(space)}; {remedy}."
+    )
 
 
 def has_independent_slots(env_id: str) -> bool:

@@ -20,14 +20,15 @@ from acl_gym import (
     WaitingVectorEnv,
 )
 from tests.agents.reference_colony import chains
-from tests.agents.test_q_learning import ROW, VALUES
-from tests.agents.test_returning import (
+from tests.agents.remembering import (
     J_STAR,
-    Corridor,
+    assert_same,
     crisp,
     gymnasium_env,
     pendulum,
 )
+from tests.agents.test_q_learning import ROW, VALUES
+from tests.agents.test_returning import Corridor
 from tests.planning.chains import corridor, vector
 
 SETTINGS: dict[str, tuple[Callable[[], Any], dict[str, Any]]] = {
@@ -48,18 +49,6 @@ EACH = pytest.mark.parametrize("name", SETTINGS)
 def make(name: str, seed: int = 3, **more: Any) -> QLearning:
     env, keywords = SETTINGS[name]
     return QLearning(env(), seed=seed, **(keywords | more))
-
-
-def assert_same(one: QLearning, other: QLearning) -> None:
-    assert one.table.tobytes() == other.table.tobytes()
-    assert one.num_timesteps == other.num_timesteps
-    assert np.array_equal(one._ranks, other._ranks)
-    assert np.array_equal(one._known, other._known)
-    assert one.rng.bit_generator.state == other.rng.bit_generator.state
-    assert np.array_equal(one._memory.evidence, other._memory.evidence)
-    assert [{**row, "seconds": 0} for row in one.history] == [
-        {**row, "seconds": 0} for row in other.history
-    ]
 
 
 @EACH

@@ -13,7 +13,6 @@ from gymnasium import spaces
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
 from acl_gym import (
-    Crisp,
     Discrete,
     Fuzzy,
     PolicyEvaluation,
@@ -22,22 +21,13 @@ from acl_gym import (
     evaluate_policy_cost,
 )
 from acl_gym.colony.starts import ENOUGH
-from acl_gym.partitions import Partition
-
-J_STAR = 38.4  # of the pendulum, by value iteration on a fine grid
-
-
-def pendulum(ants: int = 5) -> Any:
-    return gym.make_vec("acl_gym/Pendulum-v0", num_envs=ants)
-
-
-def gymnasium_env(env_id: str, ants: int = 5, **kwargs: Any) -> Any:
-    return WaitingVectorEnv([lambda: gym.make(env_id, **kwargs)] * ants)
-
-
-def crisp() -> Partition:
-    return Crisp([np.linspace(0, 6, 7), np.linspace(-9, 9, 7)], [2 * np.pi, None])
-
+from tests.agents.remembering import (
+    J_STAR,
+    assert_same,
+    crisp,
+    gymnasium_env,
+    pendulum,
+)
 
 SETTINGS: dict[str, tuple[Callable[[], Any], dict[str, Any]]] = {
     "pendulum": (pendulum, {}),
@@ -53,17 +43,6 @@ EACH = pytest.mark.parametrize("name", SETTINGS)
 def make(name: str, seed: int = 3, **more: Any) -> ReturningACL:
     env, keywords = SETTINGS[name]
     return ReturningACL(env(), seed=seed, **(keywords | more))
-
-
-def assert_same(one: ReturningACL, other: ReturningACL) -> None:
-    assert one.table.tobytes() == other.table.tobytes()
-    assert one.num_timesteps == other.num_timesteps
-    assert np.array_equal(one._ranks, other._ranks)
-    assert one.rng.bit_generator.state == other.rng.bit_generator.state
-    assert np.array_equal(one._memory.evidence, other._memory.evidence)
-    assert [{**row, "seconds": 0} for row in one.history] == [
-        {**row, "seconds": 0} for row in other.history
-    ]
 
 
 @EACH

@@ -426,3 +426,14 @@ def test_a_file_of_another_run_is_replaced_with_a_warning(tmp_path: Path) -> Non
     assert again.saved["policy_cost"] == min(
         row["policy_cost"] for row in agent.history[2:]
     )
+
+
+@pytest.mark.parametrize(
+    ("directory", "error"), [(3, TypeError), (None, TypeError), ("", ValueError)]
+)
+@pytest.mark.parametrize("kind", [Checkpoint, TensorBoardLog])
+def test_a_directory_that_is_none_is_refused(
+    kind: Any, directory: Any, error: type[Exception]
+) -> None:
+    with pytest.raises(error, match="directory must"):
+        kind(directory)

@@ -11,7 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from acl_gym.cli.design import EXAMPLES, _free_folder, example
+from acl_gym.cli.design import _free_folder
+from acl_gym.cli.design_help import EXAMPLES, example
 from acl_gym.cli.recorded import split_names
 from tests.cli.runner import STARTED, figures, invoke, refused, run
 

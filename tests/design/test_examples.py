@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from acl_gym.cli.design import EXAMPLES, example
+from acl_gym.cli.design_help import EXAMPLES, example
 from acl_gym.design.learning import CHOOSING, learn
 from acl_gym.design.run import draw_starts
 from tests.design.c_simulation import EQUATIONS, steps_in_c

@@ -6,11 +6,17 @@ import gymnasium as gym
 import numpy as np
 import pytest
 from gymnasium.vector import SyncVectorEnv
+from gymnasium.wrappers import TimeLimit
 
 from acl_gym import ACL, WaitingVectorEnv, evaluate_policy_cost
-from acl_gym.agents.base import time_limit
 from acl_gym.envs import ENVIRONMENTS
-from acl_gym.envs.limits import RegisteredLimit, checked_limit, trial_limit
+from acl_gym.envs.limits import (
+    RegisteredLimit,
+    checked_limit,
+    time_limit,
+    trial_limit,
+    usual_max_steps,
+)
 from acl_gym.evaluation.rollout import Rollout
 
 LIMITS = {
@@ -21,6 +27,7 @@ LIMITS = {
     "acl_gym/TwoState-v0": 2,
     "acl_gym/DoubleBridge-v0": 100,
 }
+PENDULUM = "acl_gym/Pendulum-v0"
 TOUR = "acl_gym/TravellingSalesman-v0"  # see tests/envs/graph
 SWARM = "acl_gym/SwarmAggregation-v0"  # whose slots share an episode, see tests/envs
 ROW = "acl_gym/GridSearch1D-v0"
@@ -175,6 +182,21 @@ def test_agents_take_the_limit_unless_they_are_given_t() -> None:
     unlimited = gym.make_vec(ROW, num_envs=1, max_episode_steps=-1)
     assert time_limit(unlimited) is None
     assert ACL(unlimited).max_steps == 300
+
+
+def test_the_limit_is_found_wherever_it_was_set() -> None:
+    single = gym.make("MountainCar-v0", max_episode_steps=50)
+    assert usual_max_steps(single) == 50
+    assert usual_max_steps(SyncVectorEnv([lambda: single])) == 50
+    assert usual_max_steps(gym.make_vec(PENDULUM, max_episode_steps=50)) == 50
+    sync = {"vectorization_mode": "sync", "max_episode_steps": 50}
+    assert usual_max_steps(gym.make_vec(PENDULUM, **sync)) == 50
+    # Without a spec, as a plant of a user's own, the wrapper alone knows it.
+    bare = TimeLimit(single.unwrapped, 70)
+    bare.unwrapped.spec = None
+    assert usual_max_steps(bare) == 70
+    assert usual_max_steps(SyncVectorEnv([lambda: bare])) == 70
+    assert usual_max_steps(bare.unwrapped) == 300
 
 
 def test_an_evaluation_is_as_long_as_asked() -> None:

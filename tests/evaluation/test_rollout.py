@@ -324,3 +324,37 @@ def test_continuous_actions_lead_to_the_wrapper_that_makes_them_discrete() -> No
         [lambda: DiscretizeAction(gym.make("Pendulum-v1"), 5)] * 2
     )
     assert Rollout(wrapped, 10).n_actions == 5
+
+
+class _TwoSteps(gym.Env):
+    """Counts its steps in observations of several parts; an episode has two."""
+
+    action_space = gym.spaces.Discrete(2)
+    observation_space = gym.spaces.Tuple(
+        (
+            gym.spaces.Box(0.0, 9.0, (1,), np.float64),
+            gym.spaces.Dict({"count": gym.spaces.Box(0.0, 9.0, (1,), np.float64)}),
+        )
+    )
+
+    def _seen(self) -> Any:
+        steps = np.array([float(self._steps)])
+        return steps, {"count": steps.copy()}
+
+    def reset(self, **_: Any) -> tuple[Any, dict[str, Any]]:
+        self._steps = 0
+        return self._seen(), {}
+
+    def step(self, action: Any) -> Any:
+        self._steps += 1
+        return self._seen(), -1.0, self._steps == 2, False, {}
+
+
+def test_last_observations_of_several_parts_are_recovered() -> None:
+    env = SyncVectorEnv([_TwoSteps] * 2, autoreset_mode=AutoresetMode.SAME_STEP)
+    rollout = Rollout(env, 5)
+    rollout.start()
+    rollout.step(np.zeros(2, np.int64))
+    first, second = rollout.step(np.zeros(2, np.int64)).observation
+    assert not rollout.ants.size
+    assert first.ravel().tolist() == second["count"].ravel().tolist() == [2.0, 2.0]

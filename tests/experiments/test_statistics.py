@@ -11,13 +11,11 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from acl_gym.experiments.statistics import (
-    Estimate,
     digits,
     estimate,
     interquartile_range,
     iqm,
     median,
-    overlap,
     rank_correlation,
     ratio,
 )
@@ -75,12 +73,6 @@ def test_a_ratio_draws_the_runs_of_each_separately() -> None:
     assert found.low < 2.0 < found.high, "the runs are not paired"
     assert ratio([math.inf] * 3, [1.0, 2.0, 3.0]).value == math.inf
     assert ratio([1.0, 2.0, 3.0], [math.inf] * 3).value == 0.0
-
-
-def test_overlap() -> None:
-    assert overlap(Estimate(1, 0, 2), Estimate(3, 2, 4))
-    assert not overlap(Estimate(1, 0, 2), Estimate(3, 2.1, 4))
-    assert not overlap(Estimate(1, math.nan, math.nan), Estimate(1, 0, 2))
 
 
 def test_small_ones() -> None:

@@ -103,6 +103,15 @@ def test_several_plants_run_side_by_side() -> None:
     assert [row["interactions"] for row in learned.history] == [12, 33]
 
 
+def test_episodes_in_the_model_last_as_long_as_those_of_the_plant() -> None:
+    def made() -> gym.Env[Any, Any]:
+        return gym.make("acl_gym/Pendulum-v0", max_episode_steps=40)
+
+    for env in (made(), SyncVectorEnv([made])):
+        learned = learn_from_plant(env, quick, 20, model_steps=400, seed=0)
+        assert learned.model.max_episode_steps == 40
+
+
 def test_what_was_recorded_before_is_used() -> None:
     data = Transitions.record(pendulum(), 25, seed=5)
     learned = learn_from_plant(pendulum(), interactions=10, data=data, seed=0, **QUICK)

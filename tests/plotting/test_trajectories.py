@@ -63,6 +63,15 @@ def test_environments_that_are_not_ours_are_run() -> None:
     assert len(single.lines[0].get_xdata()) == 11
 
 
+def test_a_policy_runs_to_the_time_limit_of_its_environment() -> None:
+    agent = q_learning("MountainCar-v0")
+    env = gym.make("MountainCar-v0", max_episode_steps=400)
+    panels = plot_trajectory(agent.policy, env=env, seed=3)
+    assert panels[0].get_title(loc="left") == "400 steps, return -400"
+    with pytest.raises(ValueError, match="max_steps must be at least 1, got 0"):
+        plot_trajectory(agent.policy, env=env, max_steps=0)
+
+
 def test_running_does_not_change_what_is_learned() -> None:
     one, other = q_learning("MountainCar-v0"), q_learning("MountainCar-v0")
     plot_trajectory(one, max_steps=5)

@@ -62,9 +62,11 @@ def _fill_nearest(distances: FloatArray, neighbours: CellArray) -> None:
 def fill_nearby(
     distances: FloatArray, neighbours: CellArray, nearby: FloatArray
 ) -> int:
-    """Fill in the distances of neighbours; -1, or the first city whose are wrong.
+    """Fill in the distances of neighbours.
 
-    They are wrong where they are no other cities or not in the order of distance.
+    Returns:
+        -1, or the first city with wrong neighbours: one that is not another city, or is
+        nearer than the one before it.
     """
     n, k = neighbours.shape
     for city in range(n):

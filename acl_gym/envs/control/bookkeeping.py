@@ -97,6 +97,59 @@ def checked_options(
     return dict(options or {})
 
 
+def checked_trial_steps(options: dict[str, Any], mask: BoolArray | None) -> int | None:
+    """T that reset options set, None where they set none.
+
+    Args:
+        options: of a reset.
+        mask: the slots to be reset, None for all.
+
+    Raises:
+        TypeError: it is not an integer.
+        ValueError: it is less than 1, or only some slots are reset.
+    """
+    if "max_steps" not in options:
+        return None
+    if mask is not None:
+        raise ValueError(
+            "options['max_steps'] is for a full reset, got it with 'reset_mask'; "
+            "leave one of them out."
+        )
+    return validation.integer("options['max_steps']", options["max_steps"], at_least=1)
+
+
+def check_new_states(
+    system: ControlSystem, states: Any, count: int, size: int | None
+) -> None:
+    """Check states that a system, perhaps of a user's own, gives slots to start in.
+
+    Args:
+        system: what gave them.
+        states: the candidate, `(state_size, count)`.
+        count: how many slots start.
+        size: of a state that other slots are in; None if there are none.
+
+    Raises:
+        ValueError: they are not what kernels rely on.
+    """
+    good = (
+        isinstance(states, np.ndarray)
+        and states.dtype == np.float64
+        and states.ndim == 2
+        and states.shape[1] == count
+        and size in (None, len(states))
+    )
+    if not good:
+        raise ValueError(
+            f"sample_states and checked_states of {type(system).__name__} must "
+            f"give float64 states of a fixed size for {count} slots, got "
+            f"{validation.shown(states)}."
+        )
+    if not of_this_package(type(system)):
+        # Kernels of this package address by them.
+        system.checked_states(states.T)
+
+
 @njit
 def count_step(
     limit: int, steps: IntArray, terminated: BoolArray, truncated: BoolArray

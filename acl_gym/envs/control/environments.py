@@ -3,52 +3,48 @@
 A system (`ControlSystem`) defines how states change. This module determines when a slot
 starts, how long its episode may last, what happens when it has finished, and which
 arrays are returned. Every array that `reset` or `step` returns is a new one. The single
-environment over the same systems is in `single`.
+environment over the same systems is in `single`; how a vector environment is made of a
+system is in `system_env`.
 """
 
 from __future__ import annotations
 
-import copy
-import math
-from typing import Any, ClassVar, Self
+from typing import Any
 
 import numpy as np
 from gymnasium.error import ResetNeeded
-from gymnasium.vector import AutoresetMode, VectorEnv
-from gymnasium.vector.utils import batch_space
+from gymnasium.vector import AutoresetMode
 from numpy.typing import ArrayLike, NDArray
 
-from acl_gym.envs.autoreset import ChoosesAutoreset
 from acl_gym.envs.control.bookkeeping import (
+    check_new_states,
     checked_actions,
     checked_inputs,
     checked_options,
-    checked_render_mode,
+    checked_trial_steps,
     count_step,
     draw_uniforms,
     drawn_action,
     final_infos,
     finish,
-    made_system,
     n_actions_of,
-    of_this_package,
     real_input_bounds,
     states_of_slots,
     warn_of_no_render_mode,
 )
-from acl_gym.envs.control.rendering import Frame, Renderer
+from acl_gym.envs.control.rendering import Frame
 from acl_gym.envs.control.stepping import PartialStep
 from acl_gym.envs.control.system import ControlSystem
+from acl_gym.envs.control.system_env import Observation, SystemVectorEnv
 from acl_gym.envs.limits import checked_limit, trial_limit
 from acl_gym.envs.reset_mask import checked_reset_mask
 from acl_gym.utils import validation
 from acl_gym.utils.typing import BoolArray, FloatArray, IntArray
 
-Observation = NDArray[Any]
 StepResult = tuple[Observation, FloatArray, BoolArray, BoolArray, dict[str, Any]]
 
 
-class ControlVectorEnv(ChoosesAutoreset, VectorEnv[Observation, Any, NDArray[Any]]):
+class ControlVectorEnv(SystemVectorEnv):
     """Native vector environment over a control system: one kernel call per step.
 
     Args:
@@ -69,14 +65,7 @@ class ControlVectorEnv(ChoosesAutoreset, VectorEnv[Observation, Any, NDArray[Any
         number of slots gives other initial states.
     """
 
-    metadata: dict[str, Any] = {  # noqa: RUF012
-        "render_modes": ["rgb_array"],
-        "render_fps": 10,
-        "autoreset_mode": AutoresetMode.NEXT_STEP,
-    }
-    system_type: ClassVar[type[ControlSystem]]
-    painter: ClassVar[str | None] = None
-    """"module:class" of what draws the system, see `Renderer`; None draws nothing."""
+    _trial_steps: int | None = None  # T of the trial under way
 
     def __init__(
         self,
@@ -87,24 +76,15 @@ class ControlVectorEnv(ChoosesAutoreset, VectorEnv[Observation, Any, NDArray[Any
         render_mode: str | None = None,
         **parameters: Any,
     ) -> None:
-        self._num_envs = validation.integer("num_envs", num_envs, at_least=1)
-        self._trial_steps: int | None = None  # T of the trial under way
-        self.max_episode_steps = max_episode_steps
-        self.set_autoreset_mode(autoreset_mode)
-        self.render_mode = checked_render_mode(render_mode, self.metadata)
-        self.parameters = copy.deepcopy(parameters)  # the caller may change a list
-        self._system = made_system(self.system_type, parameters)
-        self.single_observation_space = self.system.observation_space
-        self.single_action_space = self.system.action_space
-        self._check_memory()
-        self.observation_space = batch_space(
-            self.single_observation_space, self.num_envs
+        super().__init__(
+            num_envs,
+            max_episode_steps=max_episode_steps,
+            autoreset_mode=autoreset_mode,
+            render_mode=render_mode,
+            **parameters,
         )
-        self.action_space = batch_space(self.single_action_space, self.num_envs)
         self._input_bounds = real_input_bounds(self.system)
         self._n_actions = n_actions_of(self.system)
-        fps = self.metadata["render_fps"]
-        self._renderer = Renderer(self.system, self.painter, fps)
         self._actions: NDArray[Any] | None = None  # the last ones, to be drawn
 
         self._state: FloatArray | None = None  # (state_size, num_envs)
@@ -125,38 +105,6 @@ class ControlVectorEnv(ChoosesAutoreset, VectorEnv[Observation, Any, NDArray[Any
         self._max_episode_steps = checked_limit(value)
         self._limit = trial_limit(self._max_episode_steps, self._trial_steps)
 
-    def _check_memory(self) -> None:
-        """Refuse more slots than fit into memory, before any is taken."""
-        validation.check_memory(
-            f"{self.num_envs:,} slots",
-            self.num_envs * _least_bytes_a_slot(self.single_observation_space),
-            "use fewer ants or slots",
-        )
-
-    # Not to be replaced: kernels rely on arrays of these sizes.
-    @property
-    def num_envs(self) -> int:  # type: ignore[override]
-        """The number of slots."""
-        return self._num_envs
-
-    @property
-    def system(self) -> ControlSystem:
-        """The parameters and dynamics of the system."""
-        return self._system
-
-    def system_with(self, **values: Any) -> tuple[ControlSystem, dict[str, Any]]:
-        """The system with other values of some parameters, and the arguments of it.
-
-        Args:
-            values: see `with_parameters`.
-
-        Raises:
-            TypeError: see `with_parameters`.
-            ValueError: a value is not valid.
-        """
-        arguments = self._arguments_with(values)
-        return made_system(self.system_type, arguments), arguments
-
     def set_system(self, system: ControlSystem, arguments: dict[str, Any]) -> None:
         """Go on with another system, from the states where the slots are.
 
@@ -167,16 +115,8 @@ class ControlVectorEnv(ChoosesAutoreset, VectorEnv[Observation, Any, NDArray[Any
         Raises:
             ValueError: what can be observed or done there differs.
         """
-        for name in ("observation_space", "action_space"):
-            own, other = (getattr(each, name) for each in (self._system, system))
-            if own != other:
-                raise ValueError(
-                    f"the {name.replace('_', ' ')} must stay as it is, {own}, got "
-                    f"{other}; let other parameters change."
-                )
-        self._system, self.parameters = system, arguments
+        super().set_system(system, arguments)
         self._step_some = PartialStep(system, self.num_envs)
-        self._renderer.set_system(system)
 
     @property
     def num_walking(self) -> int:
@@ -228,7 +168,7 @@ class ControlVectorEnv(ChoosesAutoreset, VectorEnv[Observation, Any, NDArray[Any
         states = None if given is None else self._checked_states(given, slots)
         if "finished" in options:
             validation.one_of("options['finished']", options["finished"], ("wait",))
-        trial_steps = self._checked_trial_steps(options, mask)
+        trial_steps = checked_trial_steps(options, mask)
 
         super().reset(seed=seed)
         if mask is None:
@@ -362,55 +302,6 @@ class ControlVectorEnv(ChoosesAutoreset, VectorEnv[Observation, Any, NDArray[Any
             for slot in range(self.num_envs)
         )
 
-    def show_table(self, table: FloatArray | None) -> None:
-        """Draw a table over the frames from now on; see `ControlEnv.show_table`."""
-        self._renderer.show_table(table)
-
-    def with_slots(self, num_envs: int) -> Self:
-        """Make a new environment that differs only in the number of slots.
-
-        Its random numbers continue a copy of this environment's stream, if that was
-        seeded.
-        """
-        return self._made_anew(num_envs, self.parameters)
-
-    def with_parameters(self, **values: Any) -> Self:
-        """Make a new environment in which some parameters of the system differ.
-
-        Args:
-            values: of the parameters by their names, see the class of the system; of a
-                plant, those that its dynamics takes. A parameter that was uncertain is
-                known there.
-
-        Returns:
-            An environment with the same number of slots, see `with_slots`.
-
-        Raises:
-            TypeError: there is no parameter of that name, or a value has a wrong type.
-            ValueError: a value is not valid.
-        """
-        return self._made_anew(self.num_envs, self._arguments_with(values))
-
-    def _arguments_with(self, values: dict[str, Any]) -> dict[str, Any]:
-        """The arguments of the system if some of its parameters have other values."""
-        return {**self.parameters, **values}
-
-    def _made_anew(self, num_envs: int, parameters: dict[str, Any]) -> Self:
-        made = self._constructed(
-            num_envs,
-            max_episode_steps=self.max_episode_steps,
-            autoreset_mode=self.autoreset_mode,
-            render_mode=self.render_mode,
-            **parameters,
-        )
-        made._np_random = copy.deepcopy(self._np_random)
-        made._np_random_seed = self._np_random_seed
-        return made
-
-    def _constructed(self, num_envs: int, **arguments: Any) -> Self:
-        """Another environment of this class."""
-        return type(self)(num_envs, **arguments)
-
     def _slots_to_restart(self) -> IntArray | None:
         """The finished slots that this step must reset, None if there are none."""
         if self._walking is None or self._wait_when_finished:
@@ -427,7 +318,8 @@ class ControlVectorEnv(ChoosesAutoreset, VectorEnv[Observation, Any, NDArray[Any
         """Start `slots` in the given `(state_size, n)` states, or in random ones."""
         if states is None:
             states = self.system.sample_states(self.np_random, slots.size)
-        self._check_new(states, slots.size)
+        size = None if self._state is None else len(self._state)
+        check_new_states(self.system, states, slots.size, size)
         if slots.size == self.num_envs:
             self._state = states
         else:
@@ -436,25 +328,6 @@ class ControlVectorEnv(ChoosesAutoreset, VectorEnv[Observation, Any, NDArray[Any
         self._finished[slots] = False
         walking = np.flatnonzero(~self._finished)
         self._walking = None if walking.size == self.num_envs else walking
-
-    def _check_new(self, states: FloatArray, count: int) -> None:
-        """Hold what a system of a user's own has given to what kernels rely on."""
-        good = (
-            isinstance(states, np.ndarray)
-            and states.dtype == np.float64
-            and states.ndim == 2
-            and states.shape[1] == count
-            and (self._state is None or len(states) == len(self._state))
-        )
-        if not good:
-            raise ValueError(
-                f"sample_states and checked_states of {type(self.system).__name__} must "
-                f"give float64 states of a fixed size for {count} slots, got "
-                f"{validation.shown(states)}."
-            )
-        if not of_this_package(type(self._system)):
-            # Kernels of this package address by them.
-            self._system.checked_states(states.T)
 
     def _infos(self) -> dict[str, Any]:
         mask = self._system.action_mask(self._states)
@@ -478,20 +351,6 @@ class ControlVectorEnv(ChoosesAutoreset, VectorEnv[Observation, Any, NDArray[Any
             raise ResetNeeded("the slots have no states yet; call reset() first.")
         return self._state
 
-    def _checked_trial_steps(
-        self, options: dict[str, Any], mask: BoolArray | None
-    ) -> int | None:
-        if "max_steps" not in options:
-            return None
-        if mask is not None:
-            raise ValueError(
-                "options['max_steps'] is for a full reset, got it with 'reset_mask'; "
-                "leave one of them out."
-            )
-        return validation.integer(
-            "options['max_steps']", options["max_steps"], at_least=1
-        )
-
     def _observe(self) -> Observation:
         return self._system.observe(self._states)
 
@@ -499,12 +358,3 @@ class ControlVectorEnv(ChoosesAutoreset, VectorEnv[Observation, Any, NDArray[Any
         current = None if self._state is None else self._state.T
         rows = states_of_slots(given, slots, self.num_envs, current)
         return self.system.checked_states(rows)[slots].T.copy()
-
-
-def _least_bytes_a_slot(space: Any) -> int:
-    """What a slot takes at least: its part of the batched spaces, state and results."""
-    numbers = math.prod(space.shape)
-    # Bounds, whether they are finite, and the observation; and the state.
-    of_variables = numbers * (3 * space.dtype.itemsize + 2 + 8)
-    # Action, its space (two numbers), steps, index and reward; three flags.
-    return int(of_variables + 6 * 8 + 3)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -79,6 +79,44 @@ class Description:
             if ends != (other.low[axis], other.high[axis]):
                 return f"the ends of {self.state_names[axis]}"
         return None
+
+    def joined(self, other: Description) -> Description:
+        """The description of both recordings: the wider bounds, and what either knows.
+
+        Args:
+            other: of another recording of the same plant, without a `difference`.
+        """
+        values = self.values if self.values is not None else other.values
+        if other.values not in (None, values):
+            values = None  # each had other actions
+        return replace(
+            self,
+            low=tuple(map(min, self.low, other.low)),
+            high=tuple(map(max, self.high, other.high)),
+            values=values,
+            sampling_time=self.sampling_time or other.sampling_time,
+        )
+
+    def check_numbers(self, inputs: FloatArray) -> None:
+        """Check that inputs which are to number actions do so.
+
+        Args:
+            inputs: of the recording, `(n, n_inputs)`.
+
+        Raises:
+            ValueError: one is the number of no action.
+        """
+        if not self.numbered or self.values is None:
+            return
+        numbers = np.ravel(self.values)
+        strange = ~np.isin(inputs[:, 0], numbers)
+        if strange.any():
+            row = int(np.argmax(strange))
+            raise ValueError(
+                f"inputs must be numbers of actions, {validation.shown(numbers.tolist())}, "
+                f"got {inputs[row, 0]:g} in row {row}; record the actions, not what they "
+                "set."
+            )
 
 
 def described(

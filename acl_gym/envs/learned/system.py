@@ -84,7 +84,7 @@ class LearnedSystem(Plant):
                 "uncertain": {MEMBER: (0.0, float(dynamics.n_members))},
             }
         super().__init__(
-            dynamics=Predicted(dynamics, uncertain),
+            dynamics=Predicted(dynamics),
             low=low,
             high=high,
             circular=circular,
@@ -201,11 +201,10 @@ class Predicted:
 
     Args:
         dynamics: what was learned.
-        uncertain: whether slots differ.
     """
 
-    def __init__(self, dynamics: LearnedDynamics, uncertain: bool) -> None:
-        self._dynamics, self._uncertain = dynamics, uncertain
+    def __init__(self, dynamics: LearnedDynamics) -> None:
+        self._dynamics = dynamics
 
     def __call__(self, x: FloatArray, u: FloatArray, p: Any = None) -> FloatArray:
         """Predict the next states, `(n_variables, n)`."""

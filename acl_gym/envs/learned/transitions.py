@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import replace
 from typing import Any, Self
 
 import numpy as np
@@ -102,7 +101,7 @@ class Transitions:
             numbered=numbered,
             sampling_time=sampling_time,
         )
-        self._check_numbers(u)
+        self.description.check_numbers(u)
         # Before angles are brought back between their ends, which hides the unit.
         self._unit_doubts = unit_doubts(x, y, self.description)
         x, y = self.description.settled(x), self.description.settled(y)
@@ -120,20 +119,6 @@ class Transitions:
         )
         for array in self._arrays.values():
             array.setflags(write=False)
-
-    def _check_numbers(self, inputs: FloatArray) -> None:
-        """Refuse inputs that number no action, where they are to number them."""
-        known = self.description
-        if not known.numbered or known.values is None:
-            return
-        strange = ~np.isin(inputs[:, 0], np.ravel(known.values))
-        if strange.any():
-            row = int(np.argmax(strange))
-            raise ValueError(
-                "inputs must be numbers of actions, "
-                f"{validation.shown(np.ravel(known.values).tolist())}, got "
-                f"{inputs[row, 0]:g} in row {row}; record the actions, not what they set."
-            )
 
     @property
     def states(self) -> FloatArray:
@@ -253,7 +238,7 @@ class Transitions:
         after = self.episodes[-1] + 1 - other.episodes[0]
         joined["episodes"][len(self) :] += after
         either = list(dict.fromkeys(self._unit_doubts + other._unit_doubts))
-        return self._made(_both(self.description, other.description), joined, either)
+        return self._made(self.description.joined(other.description), joined, either)
 
     def doubts(self) -> list[str]:
         """What speaks against learning from this data, a sentence each; empty if nothing.
@@ -402,17 +387,3 @@ class Transitions:
         for array in arrays.values():
             array.setflags(write=False)
         return made
-
-
-def _both(one: Description, other: Description) -> Description:
-    """The wider bounds of two recordings, and what either knows."""
-    values = one.values if one.values is not None else other.values
-    if other.values not in (None, values):
-        values = None  # each had other actions
-    return replace(
-        one,
-        low=tuple(map(min, one.low, other.low)),
-        high=tuple(map(max, one.high, other.high)),
-        values=values,
-        sampling_time=one.sampling_time or other.sampling_time,
-    )

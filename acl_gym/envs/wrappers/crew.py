@@ -16,7 +16,7 @@ from acl_gym.envs.wrappers.hosting import Failure, Repeat, Request
 logger = logging.getLogger("acl_gym")
 
 MOST_LOSSES = 3
-"""So often in a row a worker may be lost at the same request."""
+"""How often in a row a worker may be lost at the same request."""
 
 STARTING_TIME = 60.0
 """Seconds in which a new worker must have made its environments, if there is a timeout."""

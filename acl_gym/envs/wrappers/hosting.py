@@ -16,6 +16,7 @@ import cloudpickle
 import gymnasium as gym
 from gymnasium import spaces
 
+from acl_gym.envs.limits import time_limit
 from acl_gym.envs.wrappers.rows import same_row
 
 Outcomes = list[tuple[int, Any]]
@@ -109,7 +110,7 @@ class Host:
             env.close()
 
     def ready(self) -> None:
-        """Nothing; the answer comes when the environments are made."""
+        """Do nothing; the answer comes once the environments are made."""
 
     def describe(self) -> Description:
         """What the slots have in common.
@@ -129,7 +130,7 @@ class Host:
             first.action_space,
             dict(first.metadata),
             first.render_mode,
-            getattr(first.spec, "max_episode_steps", None),
+            time_limit(first),
             _system_of(first),
         )
 

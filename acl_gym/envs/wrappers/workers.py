@@ -43,9 +43,9 @@ class WorkersVectorEnv(WaitingSlots):
     agent learns is the same, to the bit, for any number of workers and every executor:
     each episode of a slot starts from a seed that is drawn here, see `reset`. Where each
     trial is seeded and each slot makes one episode in it, as in the synchronous trials of
-    this package's agents, it is also the same as with a `WaitingVectorEnv`. It pays where the slots of a worker take longer for a step
-    together than a message to it, a few tenths of a millisecond for a process and a few
-    milliseconds for a cluster.
+    this package's agents, it is also the same as with a `WaitingVectorEnv`. It pays where
+    the slots of a worker take longer for a step together than a message to it, a few
+    tenths of a millisecond for a process and a few milliseconds for a cluster.
 
     When a worker dies (killed, out of memory, or by a fault of a simulator), a new one
     resets its slots with the same seeds and repeats the actions of the episodes under

@@ -13,6 +13,7 @@ from rich.console import Console
 from acl_gym.experiments import outcome, plots, report, tables
 from acl_gym.experiments.comparison.tasks import System
 from acl_gym.experiments.names import PRESETS
+from acl_gym.experiments.references import reference
 from acl_gym.experiments.results import Results
 from acl_gym.experiments.runner import list_jobs, run_studies
 from acl_gym.experiments.store import Store
@@ -170,24 +171,24 @@ def _reference(
     """What the methods are held against, JSON types."""
     if not system.has_model:
         return {
-            "best_known_cost": tables.reference(experiment, results).cost,
+            "best_known_cost": reference(experiment, results).cost,
             "success_rate": None,
             "method": "the best policy of these runs",
         }
     fine, *coarse = experiment.references.values()
-    reference: dict[str, Any] = {
+    facts: dict[str, Any] = {
         "optimal_cost" if system.optimum else "best_known_cost": results.last(fine)[0],
         "success_rate": results.last(fine, "success_rate")[0],
         "method": "value iteration" if system.finite else "fuzzy Q-iteration",
     }
     for study in coarse:
-        reference["cells"] = _cells(fine)
-        reference["coarse"] = {
+        facts["cells"] = _cells(fine)
+        facts["coarse"] = {
             "cells": _cells(study),
             "policy_cost": results.last(study)[0],
             "success_rate": results.last(study, "success_rate")[0],
         }
-    return reference
+    return facts
 
 
 def _cells(study: Study) -> list[int]:

@@ -15,8 +15,8 @@ from typing import Any
 import gymnasium as gym
 from gymnasium.vector import VectorEnv
 
-from acl_gym.agents.base import DEFAULT_MAX_STEPS, time_limit
 from acl_gym.agents.suitable import PROBES, suitable_deposit
+from acl_gym.envs.limits import usual_max_steps
 from acl_gym.envs.wrappers.waiting import WaitingVectorEnv
 from acl_gym.experiments.comparison.tasks import Budget, System
 from acl_gym.experiments.study import Study, Task
@@ -130,7 +130,7 @@ class ForeignTask(Task):
     @cached_property
     def longest_evaluation(self) -> int:
         """T of an evaluation."""
-        return time_limit(self.make_env(1)) or DEFAULT_MAX_STEPS
+        return usual_max_steps(self.make_env(1))
 
     @property
     def highest_cost(self) -> float:

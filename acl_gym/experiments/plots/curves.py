@@ -13,10 +13,10 @@ from matplotlib.patches import Patch
 from acl_gym.experiments.plots.dots import draw_strips
 from acl_gym.experiments.plots.looks import cost_line, in_symbols, look_of
 from acl_gym.experiments.plots.policies import best
+from acl_gym.experiments.references import reference
 from acl_gym.experiments.results import Results
 from acl_gym.experiments.study import Experiment, Study
 from acl_gym.experiments.systems import optimal_cost
-from acl_gym.experiments.tables import reference
 from acl_gym.plotting import pendulum, style
 from acl_gym.plotting.learning import AXES, draw_learning_curves
 

@@ -11,10 +11,11 @@ from matplotlib.lines import Line2D
 
 from acl_gym.experiments.comparison.experiments import LABELS
 from acl_gym.experiments.plots.looks import LOOKS, Look, cost_line, look_of
+from acl_gym.experiments.references import MARKS, reference
 from acl_gym.experiments.results import Results
 from acl_gym.experiments.statistics import estimate
 from acl_gym.experiments.study import Experiment, Study
-from acl_gym.experiments.tables import MARKS, reference, summarise
+from acl_gym.experiments.tables import summarise
 from acl_gym.plotting import style
 from acl_gym.plotting.intervals import (
     Interval,

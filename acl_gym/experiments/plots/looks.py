@@ -11,8 +11,8 @@ from typing import Any, NamedTuple
 
 from matplotlib.axes import Axes
 
+from acl_gym.experiments.references import Reference
 from acl_gym.experiments.study import Study
-from acl_gym.experiments.tables import Reference
 from acl_gym.plotting.style import BLUE, BOUND, GREEN, ORANGE
 from acl_gym.utils.text import digits
 

@@ -8,9 +8,9 @@ from matplotlib.figure import Figure
 
 from acl_gym.experiments.methods import restore_policy
 from acl_gym.experiments.plots.looks import in_symbols, look_of
+from acl_gym.experiments.references import reference
 from acl_gym.experiments.results import Results
 from acl_gym.experiments.study import Experiment, Study
-from acl_gym.experiments.tables import reference
 from acl_gym.plotting import Shown, draw_policies, draw_trajectories
 from acl_gym.utils.text import digits
 

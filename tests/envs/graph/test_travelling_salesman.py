@@ -21,7 +21,6 @@ from acl_gym import (
     evaluate_policy_cost,
     fuzzy_q_iteration,
 )
-from acl_gym.agents.base import time_limit
 from acl_gym.envs.graph import (
     TravellingSalesmanInstance,
     load_instance,
@@ -33,7 +32,7 @@ from acl_gym.envs.graph.travelling_salesman import (
     TravellingSalesmanVectorEnv,
     kernels,
 )
-from acl_gym.envs.limits import RegisteredLimit
+from acl_gym.envs.limits import RegisteredLimit, time_limit
 from acl_gym.planning.model import TabularModel
 from tests.envs.systems import tour_state
 

@@ -16,11 +16,11 @@ from acl_gym.experiments.comparison.compare import experiment_of
 from acl_gym.experiments.comparison.tasks import SYSTEMS
 from acl_gym.experiments.names import METHODS
 from acl_gym.experiments.results import Results, Run
+from acl_gym.experiments.rivals import compare
 from acl_gym.experiments.study import Experiment, Study
 from acl_gym.experiments.tables import (
     TABLES,
     Table,
-    compare,
     number,
     summarise,
     summary,

@@ -48,7 +48,9 @@ class Particles(ABC):
             A new array of the shape of `x`.
 
         Raises:
-            ValueError: states, inputs and parameters are not those of as many agents.
+            TypeError: `time_step` is not a number.
+            ValueError: it is out of range, a state or an input is not finite, or states,
+                inputs and parameters are not those of as many agents.
         """
 
 
@@ -79,7 +81,7 @@ class Kinematic(Particles):
 
     def advance(self, x: FloatArray, u: FloatArray, time_step: float) -> FloatArray:
         """See `Particles.advance`."""
-        x, u = _checked(self, x, u)
+        x, u = _checked(self, x, u, time_step)
         return np.asarray(x + time_step * shortened(u, self.max_speed))
 
 
@@ -116,7 +118,7 @@ class PointMass(Particles):
 
     def advance(self, x: FloatArray, u: FloatArray, time_step: float) -> FloatArray:
         """See `Particles.advance`."""
-        x, u = _checked(self, x, u)
+        x, u = _checked(self, x, u, time_step)
         n, dim = u.shape
         force = shortened(u, self.max_force)
         moved = np.empty((n, 2 * dim))
@@ -225,10 +227,11 @@ def _check_sizes(particles: Particles, names: tuple[str, ...], n: int) -> None:
 
 
 def _checked(
-    particles: Particles, x: FloatArray, u: FloatArray
+    particles: Particles, x: FloatArray, u: FloatArray, time_step: float
 ) -> tuple[FloatArray, FloatArray]:
     """States and inputs of as many agents as the parameters, in C order."""
-    states, inputs = (np.ascontiguousarray(each, dtype=np.float64) for each in (x, u))
+    validation.number("time_step", time_step, above=0)
+    states, inputs = validation.real_array("x", x), validation.real_array("u", u)
     if inputs.ndim != 2:
         raise ValueError(
             f"u must have shape (n, dim), a row for each agent, got {inputs.shape}."

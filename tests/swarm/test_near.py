@@ -85,6 +85,20 @@ def test_channels_and_forces_agree_about_pairs_at_the_radius(x, radius, each) ->
     )
 
 
+COORDINATES = st.floats(1e-3, 1e3)
+
+
+@given(COORDINATES, COORDINATES)
+def test_a_pair_at_the_radius_is_not_within_it(a: float, b: float) -> None:
+    """Although the square of the rounded radius may be larger than that of the distance."""
+    x = np.array([[0.0, 0.0], [a, b]])
+    at = math.sqrt(a * a + b * b)
+    for radius, n_links in ((at, 0), (math.nextafter(at, math.inf), 2)):
+        assert Radius(radius, include_self=False).links(x).n_links == n_links
+        force = forces_within(x, BoundedRepulsion(repulsion=0.0), radius)
+        assert np.count_nonzero(force) == 2 * n_links
+
+
 def _square(y: np.ndarray) -> float:
     total = 0.0
     for each in np.concatenate([np.zeros(3 - y.size), y]):  # in the order of the cells

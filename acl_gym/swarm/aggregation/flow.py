@@ -37,7 +37,7 @@ def flow(
             give equal positions.
         profile: sigma; None: there is none.
         links: who hears whom, all the time; None: everyone.
-        tolerance: of the solution, relative and absolute, > 0.
+        tolerance: of the solution, relative (1e-13 or more) and absolute, in [1e-15, 1].
         most_evaluations: how often the right-hand side may be computed, >= 1. It takes
             about 11 a M T evaluations to reach the time T, because a swarm at rest is
             stiff.
@@ -60,7 +60,7 @@ def flow(
         raise ValueError(
             f"times must be >= 0 and in ascending order, got {validation.shown(times)}."
         )
-    tolerance = validation.number("tolerance", tolerance, above=0)
+    tolerance = validation.number("tolerance", tolerance, at_least=1e-15, at_most=1)
     most = validation.integer("most_evaluations", most_evaluations, at_least=1)
     everyone = Links.everyone(len(x)) if links is None else links
     check_interaction(interaction)

@@ -82,7 +82,8 @@ class Kinematic(Particles):
     def advance(self, x: FloatArray, u: FloatArray, time_step: float) -> FloatArray:
         """See `Particles.advance`."""
         x, u = _checked(self, x, u, time_step)
-        return np.asarray(x + time_step * shortened(u, self.max_speed))
+        with np.errstate(over="ignore"):  # `Field` refuses positions that are infinite
+            return np.asarray(x + time_step * shortened(u, self.max_speed))
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -14,6 +14,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
+from acl_gym.swarm.rows import FARTHEST
 from acl_gym.utils import validation
 from acl_gym.utils.compiling import njit
 from acl_gym.utils.typing import FloatArray
@@ -208,7 +209,8 @@ def checked_gradient(
     Raises:
         ValueError: the gradient has another shape, or is not finite.
     """
-    returned = part.gradient(positions.copy())
+    with np.errstate(over="ignore", invalid="ignore"):  # which is found below
+        returned = part.gradient(positions.copy())
     gradient = validation.as_array(returned)
     kind = type(part).__name__
     if (
@@ -237,6 +239,11 @@ def _checked(positions: FloatArray, centre: ArrayLike) -> FloatArray:
         raise ValueError(
             f"positions must have {dim} coordinates each, as the profile has, got an "
             f"array of shape {x.shape}."
+        )
+    if np.abs(x).max() > FARTHEST:
+        raise ValueError(
+            f"positions must be numbers of at most {FARTHEST:g}, got "
+            f"{np.abs(x).max():g}; use another unit of length."
         )
     return x
 

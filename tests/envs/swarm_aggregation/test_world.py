@@ -367,15 +367,19 @@ def test_neighbours_that_are_observed_count_as_memory() -> None:
         World(SwarmAggregation(nearest=1000), 10**6, 0)
 
 
-def test_a_collision_is_a_distance_below_the_limit() -> None:
-    """As in a `Radius` channel: sqrt((0.1 - 0.3)^2 + 0.1^2) against the same number."""
-    x = np.array([[0.1, 0.0], [0.3, 0.1]])
-    apart = math.sqrt(0.0 + (0.1 - 0.3) ** 2 + (0.0 - 0.1) ** 2)
-    for limit in (apart, math.nextafter(apart, 1.0), math.nextafter(apart, 0.0)):
+COORDINATES = st.floats(1e-3, 3.0)
+
+
+@given(COORDINATES, COORDINATES)
+def test_a_pair_at_the_limit_does_not_collide(a: float, b: float) -> None:
+    """As in a `Radius` channel: what counts is the distance, not its square."""
+    x = np.array([[0.0, 0.0], [a, b]])
+    at = math.sqrt(a * a + b * b)
+    for limit, hit in ((at, 0), (math.nextafter(at, math.inf), 1)):
         world = World(
             SwarmAggregation(collision_distance=limit, sensing_radius=limit), 2, 0
         )
         world.start(RNG(0), x)
-        heard = len(Radius(limit, include_self=False).links(x).sender)
-        assert world.look().collisions.sum() == world.look().heard.sum() == heard
-        assert heard == (2 if apart < limit else 0)
+        assert world.look().collisions.tolist() == [hit, hit]
+        assert world.look().heard.tolist() == [hit, hit]
+        assert Radius(limit, include_self=False).links(x).n_links == 2 * hit

@@ -469,3 +469,9 @@ class Deaf(Everyone):
 def test_a_channel_that_drops_a_message() -> None:
     with pytest.raises(ValueError, match="there must be a message 'position', got"):
         run(AggregatingAgents(), Field(3), 1, 0, Deaf())
+
+
+@pytest.mark.parametrize("tolerance", [0.0, 1e-300, 5e-324, 2.0, 1e308, math.nan])
+def test_tolerances_that_no_solver_can_keep(tolerance: float) -> None:
+    with pytest.raises(ValueError, match=r"tolerance must lie in \[1e-15, 1\]"):
+        flow([[0.0], [1.0]], BoundedRepulsion(), [0.1], tolerance=tolerance)

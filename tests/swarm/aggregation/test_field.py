@@ -515,3 +515,15 @@ def test_particles_without_a_number_of_variables() -> None:
 def test_no_nan_and_nothing_odd_goes_through(call: Any, x: Any) -> None:
     with pytest.raises(ValueError, match=r"(positions|u) must"):
         call(x)
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [{"time_step": 1e308}, {"profile": Quadratic([9.0, 9.0], 1e308)}],
+    ids=["time_step", "profile"],
+)
+def test_what_overflows_ends_in_an_error(settings: dict[str, Any]) -> None:
+    field = Field([[0.0, 0.0], [1.0, 1.0]], **settings)
+    field.reset(RNG(0))
+    with pytest.raises(ValueError, match=r"positions must be numbers|must be finite"):
+        field.step(-field.observe()["slope"] + [3.0, 3.0], RNG(0))

@@ -78,7 +78,8 @@ class Inbox:
                 NaN; infinity is allowed.
         """
         message, links = self.message(key), self.links
-        array = validation.as_array(message)
+        plain = type(message) is np.ndarray
+        array = message if plain else validation.as_array(message)
         if array is None or array.shape != (links.n,) or array.dtype.kind not in "biuf":
             raise ValueError(
                 f"message {key!r} must be one real number for each agent, got "

@@ -101,8 +101,9 @@ class Links:
         set_once("n", n)
         set_once("complete", complete)
         set_once("all_others", all_others)
-        set_once("_sender", sender)
-        set_once("_offsets", offsets)
+        # Views of arrays that are read-only themselves cannot be made writable again.
+        set_once("_sender", sender.view())
+        set_once("_offsets", offsets.view())
         set_once("_receiver", None)
 
     def __setattr__(self, name: str, value: Any) -> None:
@@ -215,7 +216,7 @@ class Links:
         if self.is_implicit:
             each = self.n - self.all_others
             return validation.read_only(np.arange(self.n + 1) * each)
-        return self._offsets.view()
+        return self._offsets
 
     @property
     def receiver(self) -> IntArray:
@@ -233,8 +234,9 @@ class Links:
         if receiver is None:
             receiver = np.repeat(np.arange(self.n), np.diff(self._offsets))
             receiver.setflags(write=False)
+            receiver = receiver.view()
             super().__setattr__("_receiver", receiver)
-        return receiver.view()
+        return receiver
 
     @property
     def sender(self) -> IntArray:
@@ -249,7 +251,7 @@ class Links:
             if self.all_others:
                 senders = senders[~np.eye(self.n, dtype=np.bool_)]
             return validation.read_only(senders.reshape(-1))
-        return self._sender.view()
+        return self._sender
 
     @property
     def hears_itself(self) -> BoolArray:

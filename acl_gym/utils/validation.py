@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+_FLOAT64 = np.dtype(np.float64)
 _MANY = 10
 _MOST_ELEMENTS = 1_000_000
 _LONGEST = 200  # letters of a value that a message shows
@@ -204,6 +205,10 @@ def float64(array: NDArray[Any]) -> NDArray[np.float64]:
     Returns:
         A plain array in C order, of float64 in the byte order of the machine.
     """
+    if type(array) is np.ndarray and array.dtype == _FLOAT64:
+        flags = array.flags
+        if flags.c_contiguous and flags.aligned:
+            return array  # a tenth of the time of `np.require`
     with np.errstate(over="ignore"):
         return np.require(np.asarray(array), np.float64, ("C", "A"))
 

@@ -11,7 +11,7 @@ from acl_gym.swarm.aggregation.obstacles import Obstacles
 from acl_gym.swarm.aggregation.particles import Kinematic, Particles
 from acl_gym.swarm.aggregation.profiles import Profile, checked_gradient
 from acl_gym.swarm.protocols import Environment
-from acl_gym.swarm.rows import FARTHEST, checked_positions, checked_rows
+from acl_gym.swarm.rows import FARTHEST, all_finite, checked_positions, checked_rows
 from acl_gym.utils import validation
 from acl_gym.utils.typing import FloatArray
 
@@ -148,7 +148,7 @@ class Field(Environment):
                 or to be farther away than 1e150.
         """
         inputs = checked_rows("u", u, (self._count, self._dim))
-        if not np.isfinite(inputs).all():
+        if not all_finite(inputs):
             agent = int(np.flatnonzero(~np.isfinite(inputs).all(axis=1))[0])
             raise ValueError(
                 f"inputs must be finite, got {inputs[agent]} for agent {agent}: agents "

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from acl_gym.swarm.aggregation.interaction import Parameter
-from acl_gym.swarm.rows import per_agent
+from acl_gym.swarm.rows import all_finite, per_agent
 from acl_gym.utils import validation
 from acl_gym.utils.compiling import njit
 from acl_gym.utils.typing import FloatArray
@@ -231,8 +231,9 @@ def _checked(
     particles: Particles, x: FloatArray, u: FloatArray, time_step: float
 ) -> tuple[FloatArray, FloatArray]:
     """States and inputs of as many agents as the parameters, in C order."""
-    validation.number("time_step", time_step, above=0)
-    states, inputs = validation.real_array("x", x), validation.real_array("u", u)
+    if type(time_step) is not float or not 0.0 < time_step < math.inf:
+        validation.number("time_step", time_step, above=0)
+    states, inputs = _numbers("x", x), _numbers("u", u)
     if inputs.ndim != 2:
         raise ValueError(
             f"u must have shape (n, dim), a row for each agent, got {inputs.shape}."
@@ -245,6 +246,19 @@ def _checked(
         )
     particles.check(n)
     return states, inputs
+
+
+def _numbers(name: str, values: FloatArray) -> FloatArray:
+    """Finite numbers as kernels take them, not copied if they are so already."""
+    array = validation.as_array(values)
+    if array is not None and array.dtype.kind in "iuf":
+        rows = validation.float64(array)
+        if all_finite(rows):
+            return rows
+    raise ValueError(
+        f"{name} must be an array of finite real numbers, got "
+        f"{validation.shown(values)}."
+    )
 
 
 def _set(

@@ -17,6 +17,8 @@ from acl_gym.swarm.rows import FARTHEST
 from acl_gym.utils import validation
 from acl_gym.utils.typing import FloatArray
 
+_FLOAT64 = np.dtype(np.float64)
+
 
 class ExplosionError(OverflowError):
     """A position of a swarm is beyond `FARTHEST`, or a velocity beyond all floats."""
@@ -201,7 +203,7 @@ class Landscape(Environment):
         if (
             type(self.x) is not np.ndarray
             or self.x.shape != shape
-            or self.x.dtype != np.float64
+            or self.x.dtype != _FLOAT64
             or not self.x.flags.writeable
         ):
             raise ValueError(

@@ -97,7 +97,8 @@ class Objective:
                     f"{validation.shown(returned)}; pass vectorized=False if it takes "
                     "one point at a time."
                 )
-            values = np.array(validation.float64(array))
+            values = validation.float64(array)
+            values = values.copy() if values is array else values
         if values.shape != (n,):
             raise ValueError(
                 f"the function must return an array of shape ({n},) for an array of {n} "

@@ -174,9 +174,13 @@ class Ants(DynamicAgents):
         return {"finished": self._finished}
 
     def hear(self, inbox: Inbox) -> None:
-        """Note which ants have heard from all ants that they are done."""
+        """Note which ants know of all ants that they are done.
+
+        Of itself an ant knows it where the channel does not deliver its own message.
+        """
         done = inbox.message("finished") > self._trial
-        self._all_done = inbox.sum(done) == self.solutions.n_ants
+        own = (self._finished > self._trial) & ~inbox.links.hears_itself
+        self._all_done = inbox.sum(done) + own == self.solutions.n_ants
 
     def decide(self, rng: np.random.Generator) -> Inputs:
         """Choose actions by the selection rule, or ask for the global update.
@@ -304,13 +308,15 @@ class StigmergyEnvironment(Environment):
 
         Raises:
             TypeError: `u` are not the inputs of ants.
-            ValueError: a solution's cost is not positive and finite.
+            ValueError: they are inputs for other ants, cells or actions; or a solution's
+                cost is not positive and finite.
         """
         if not isinstance(u, Inputs):
             raise TypeError(
                 f"u must be the Inputs of Ants, got {validation.shown(u)}; run Ants in "
                 "this environment."
             )
+        self._check_inputs(u)
         if u.asks.all():
             self._end_trial(u.solutions)
             if not self.done:
@@ -319,6 +325,31 @@ class StigmergyEnvironment(Environment):
             self._take_in(self._rollout.move(u.actions))
             self._rule.local_update(
                 self.pheromone, u.cells, u.degrees, u.actions, self._local_decay
+            )
+
+    def _check_inputs(self, u: Inputs) -> None:
+        """Kernels look up cells and actions without a look at their number."""
+        n, m = len(self.x), self._rollout.ants.size
+        n_cells, n_actions = self._levels.shape
+        acting = np.size(u.ants)
+        fits = (
+            acting in (0, m)
+            and np.array_equal(u.ants, self._rollout.ants[:acting])
+            and _within(u.actions, (acting,), n_actions)
+            and _within(u.cells, (acting, *np.shape(u.cells)[1:2]), n_cells)
+            and np.shape(u.degrees) == np.shape(u.cells)
+            and np.asarray(u.degrees).dtype == np.float64
+            and np.shape(u.asks) == (n,)
+            and np.asarray(u.asks).dtype == np.bool_
+            and isinstance(u.solutions, Solutions)
+            and u.solutions.n_ants == n
+        )
+        if not fits:
+            raise ValueError(
+                f"u must hold actions from 0 to {n_actions - 1} and cells from 0 to "
+                f"{n_cells - 1} with their degrees for all of the {m} ants that walk, or "
+                f"for none, and flags and solutions of all {n} ants, got "
+                f"{validation.shown(u)}; let Ants decide."
             )
 
     @property
@@ -357,6 +388,16 @@ class StigmergyEnvironment(Environment):
     def _take_in(self, observation: NDArray[Any]) -> None:
         self._observation = observation
         self.x = observation.reshape(len(observation), -1).astype(np.float64)
+
+
+def _within(numbers: Any, shape: tuple[int, ...], count: int) -> bool:
+    """Whether these are integers from 0 to count - 1 in an array of this shape."""
+    return (
+        isinstance(numbers, np.ndarray)
+        and numbers.shape == shape
+        and numbers.dtype.kind in "iu"
+        and (numbers.size == 0 or bool(0 <= numbers.min() <= numbers.max() < count))
+    )
 
 
 def _same_cells(one: Partition, other: Partition) -> bool:

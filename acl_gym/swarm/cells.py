@@ -102,6 +102,40 @@ def sort_into_cells(
     return shape, first, agent, cell_sorted, place, width
 
 
+@njit(error_model="numpy")
+def squared_reach(radius: float) -> float:
+    """The limit of squared distances, by which agents are within a radius or not.
+
+    All kernels compare with it. A squared distance is less than it exactly where its
+    square root is less than the radius. The square of the radius would not do, because it
+    is rounded, and 0 for a radius of 1e-200.
+
+    Args:
+        radius: >= 0 or infinite.
+
+    Returns:
+        The least float whose square root is not less than the radius.
+    """
+    least = radius * radius
+    while least > 0.0 and np.sqrt(np.nextafter(least, 0.0)) >= radius:
+        least = np.nextafter(least, 0.0)
+    while np.sqrt(least) < radius:
+        least = np.nextafter(least, np.inf)
+    return float(least)
+
+
+@njit
+def squared_reaches(radii: FloatArray) -> FloatArray:
+    """`squared_reach` of each radius, `(n,)`; of equal ones in a row computed once."""
+    reaches = np.empty_like(radii)
+    for i in range(radii.size):
+        if i > 0 and radii[i] == radii[i - 1]:
+            reaches[i] = reaches[i - 1]
+        else:
+            reaches[i] = squared_reach(radii[i])
+    return reaches
+
+
 @njit(inline="always")
 def beside(index: int, count: int) -> tuple[int, int]:
     """The first cell beside one along an axis, and the one after the last."""

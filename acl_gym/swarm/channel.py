@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from acl_gym.swarm.inbox import Inbox, checked_inbox
 from acl_gym.swarm.links import Links, link_of
+from acl_gym.swarm.rows import check_messages
 from acl_gym.utils import validation
 from acl_gym.utils.compiling import njit
 from acl_gym.utils.typing import BoolArray, FloatArray, IntArray
@@ -36,7 +37,8 @@ class Channel(ABC):
         """Deliver the messages of a step.
 
         Args:
-            sent: v_i of all agents, name -> `(n, ...)`.
+            sent: v_i of all agents, name -> `(n, ...)`. They may be arrays that the
+                agents keep: a channel that changes messages changes copies.
             x: positions of all agents, `(n, dim)`.
             rng: the generator of the run.
 
@@ -184,6 +186,7 @@ class Delayed(ChannelWrapper):
         rng: np.random.Generator,
     ) -> Inbox:
         """See `Channel.deliver`."""
+        check_messages(sent, len(x))
         # Copies, because agents may change what they have sent.
         own = {name: np.array(rows) for name, rows in sent.items()}
         self._under_way.append((own, np.array(x)))

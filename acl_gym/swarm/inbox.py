@@ -67,6 +67,7 @@ class Inbox:
 
         Args:
             key: a message of one number, `(n,)`, such as the cost of the best solution.
+                Integers are compared as they are, floats of any format as float64.
 
         Returns:
             Numbers of senders, `(n,)`; of equal values the sender with the lowest
@@ -76,13 +77,16 @@ class Inbox:
             ValueError: there is no such message, it is not one number, or a value is
                 NaN; infinity is allowed.
         """
-        values = self.message(key)
-        if values.shape != (self.links.n,) or values.dtype.kind not in "biuf":
+        message, links = self.message(key), self.links
+        plain = type(message) is np.ndarray
+        array = message if plain else validation.as_array(message)
+        if array is None or array.shape != (links.n,) or array.dtype.kind not in "biuf":
             raise ValueError(
-                f"message {key!r} must be one real number for each agent, got an array "
-                f"of {values.dtype} and shape {values.shape}."
+                f"message {key!r} must be one real number for each agent, got "
+                f"{validation.shown(message)} of {message.dtype} and shape "
+                f"{message.shape}."
             )
-        links, values = self.links, np.ascontiguousarray(values)
+        values = _comparable(array)
         found = np.empty(links.n, np.int64)
         if links.is_implicit:
             unordered = _best_of_all(values, links.all_others, found)
@@ -119,7 +123,7 @@ class Inbox:
                 f"rows must be real numbers with a row for each of the {links.n} agents, "
                 f"got {validation.shown(rows)}."
             )
-        flat = np.ascontiguousarray(array, np.float64).reshape(links.n, -1)
+        flat = validation.float64(array).reshape(links.n, -1)
         sums = np.empty_like(flat)
         if links.complete:
             _sum_everyone(flat, sums)
@@ -173,13 +177,25 @@ class Inbox:
             return self.messages[name]
         except KeyError:
             raise ValueError(
-                f"there must be a message {name!r}, got {sorted(self.messages)}; let "
-                "send() of the agents return it."
+                f"there must be a message {name!r}, got {self._names}; let send() of the "
+                "agents return it, and the channel deliver it."
             ) from None
 
     def __repr__(self) -> str:
         """What was sent, to how many."""
-        return f"Inbox({self.links!r}, messages={sorted(self.messages)})"
+        return f"Inbox({self.links!r}, messages={self._names})"
+
+    @property
+    def _names(self) -> list[str]:
+        return sorted(map(str, self.messages))
+
+
+def _comparable(values: NDArray[Any]) -> NDArray[Any]:
+    """Numbers as kernels compare them: int64, uint64 where they need it, or float64."""
+    if values.dtype.kind == "f":
+        return validation.float64(values)
+    wide = np.uint64 if values.dtype.kind == "u" else np.int64
+    return np.require(values, wide, ("C", "A"))
 
 
 def checked_inbox(delivered: Any, channel: Any, n: int) -> Inbox:

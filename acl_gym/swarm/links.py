@@ -8,18 +8,28 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from acl_gym.swarm.rows import check_room
 from acl_gym.utils import validation
 from acl_gym.utils.compiling import njit
-from acl_gym.utils.typing import IntArray
+from acl_gym.utils.typing import BoolArray, IntArray
 
-_NOTHING: IntArray = np.empty(0, np.int64)
+_NOTHING: IntArray = validation.read_only(np.empty(0, np.int64))
 
 _MOST_AGENTS = 3_000_000_000
 """The number of a pair of agents fits into an int64."""
 
 
+_HEAR_FEWER = (
+    "let each agent hear fewer others, or use Inbox.best and Inbox.sum, which need no "
+    "list of the links"
+)
+
+
 class Links:
     """The neighbourhoods N_i of all agents, Definition 6.6; they do not change.
+
+    The arrays are copied, and those that are returned are read-only: kernels follow the
+    numbers in them without a look at the limits.
 
     A link leads from a sender to a receiver: agent i hears agent j if j is in N_i. Links
     are most easily made with `everyone`, `from_pairs` or `from_lists`.
@@ -55,13 +65,15 @@ class Links:
     _receiver: IntArray | None  # made when it is asked for
 
     def __init__(self, n: int, sender: IntArray, offsets: IntArray) -> None:
-        n = validation.integer("n", n, at_least=1)
+        n = validation.integer("n", n, at_least=1, at_most=_MOST_AGENTS)
         for array in (sender, offsets):
             if not isinstance(array, np.ndarray) or array.dtype != np.int64:
                 raise ValueError(
                     "sender and offsets must be arrays of int64, got "
                     f"{validation.shown(array)}; use Links.from_pairs for others."
                 )
+        # Copied before they are checked, so that nobody changes them afterwards.
+        sender, offsets = np.array(sender), np.array(offsets)
         if (
             sender.ndim != 1
             or offsets.shape != (n + 1,)
@@ -83,12 +95,15 @@ class Links:
         complete: bool = False,
         all_others: bool = False,
     ) -> None:
+        for array in (sender, offsets):
+            array.setflags(write=False)
         set_once = super().__setattr__
         set_once("n", n)
         set_once("complete", complete)
         set_once("all_others", all_others)
-        set_once("_sender", sender)
-        set_once("_offsets", offsets)
+        # Views of arrays that are read-only themselves cannot be made writable again.
+        set_once("_sender", sender.view())
+        set_once("_offsets", offsets.view())
         set_once("_receiver", None)
 
     def __setattr__(self, name: str, value: Any) -> None:
@@ -121,6 +136,13 @@ class Links:
         return links
 
     @classmethod
+    def _from_rows(cls, n: int, sender: IntArray, offsets: IntArray) -> Links:
+        """Make links of arrays that only this package knows and that need no check."""
+        links = cls.__new__(cls)
+        links._set(n, sender, offsets)
+        return links
+
+    @classmethod
     def from_pairs(cls, n: int, receiver: ArrayLike, sender: ArrayLike) -> Links:
         """Make links from pairs of agents, in any order; a repeated pair is one link.
 
@@ -143,7 +165,7 @@ class Links:
             )
         pairs = np.unique(to * n + by)  # sorted by receiver, then by sender
         counts = np.bincount(pairs // n, minlength=n)
-        return cls(n, pairs % n, _offsets_of(counts))
+        return cls._from_rows(n, pairs % n, _offsets_of(counts))
 
     @classmethod
     def from_lists(cls, lists: Sequence[ArrayLike]) -> Links:
@@ -194,7 +216,7 @@ class Links:
         if self.is_implicit:
             each = self.n - self.all_others
             return validation.read_only(np.arange(self.n + 1) * each)
-        return validation.read_only(self._offsets)
+        return self._offsets
 
     @property
     def receiver(self) -> IntArray:
@@ -204,15 +226,17 @@ class Links:
             ValueError: no memory is large enough, where everyone hears everyone.
         """
         if self.is_implicit:
-            _check_room(self.n_links)
+            check_room(self.n_links, _HEAR_FEWER)
             return validation.read_only(
                 np.repeat(np.arange(self.n), self.n - self.all_others)
             )
         receiver = self._receiver
         if receiver is None:
             receiver = np.repeat(np.arange(self.n), np.diff(self._offsets))
+            receiver.setflags(write=False)
+            receiver = receiver.view()
             super().__setattr__("_receiver", receiver)
-        return validation.read_only(receiver)
+        return receiver
 
     @property
     def sender(self) -> IntArray:
@@ -222,12 +246,21 @@ class Links:
             ValueError: no memory is large enough, where everyone hears everyone.
         """
         if self.is_implicit:
-            _check_room(self.n_links)
+            check_room(self.n_links, _HEAR_FEWER)
             senders = np.tile(np.arange(self.n), (self.n, 1))
             if self.all_others:
                 senders = senders[~np.eye(self.n, dtype=np.bool_)]
             return validation.read_only(senders.reshape(-1))
-        return validation.read_only(self._sender)
+        return self._sender
+
+    @property
+    def hears_itself(self) -> BoolArray:
+        """Whether there is a link from each agent to itself, `(n,)`."""
+        if self.is_implicit:
+            return np.full(self.n, self.complete)
+        to_itself = np.empty(self.n, np.bool_)
+        _find_own(self._sender, self._offsets, to_itself)
+        return to_itself
 
     @property
     def is_symmetric(self) -> bool:
@@ -235,10 +268,12 @@ class Links:
         return self.is_implicit or bool(_is_symmetric(self._sender, self._offsets))
 
     def csr(self) -> tuple[IntArray, IntArray]:
-        """Return `sender` and `offsets` (compressed sparse rows) for kernels to read."""
-        if self.is_implicit:
-            return self.sender.copy(), self.offsets.copy()
-        return self._sender, self._offsets
+        """Return `sender` and `offsets`, compressed sparse rows for kernels, read-only.
+
+        Raises:
+            ValueError: no memory is large enough, where everyone hears everyone.
+        """
+        return self.sender, self.offsets
 
     def subset(self, kept: ArrayLike) -> Links:
         """Return some of these links.
@@ -256,7 +291,7 @@ class Links:
                 f"{validation.shown(kept)}; flags are True and False."
             )
         counts = np.bincount(self.receiver[flags], minlength=self.n)
-        return Links(self.n, self.sender[flags], _offsets_of(counts))
+        return Links._from_rows(self.n, self.sender[flags], _offsets_of(counts))
 
     def __repr__(self) -> str:
         """How many agents and links there are."""
@@ -271,9 +306,7 @@ def _everyone(n: int, include_self: bool) -> Links:
 def _checked_number(n: Any) -> int:
     """The number of agents, whose links have some rows of numbers at least."""
     count = validation.integer("n", n, at_least=1, at_most=_MOST_AGENTS)
-    validation.check_memory(
-        f"links of {count:,} agents", 24 * count, "use fewer agents"
-    )
+    check_room(0, "use fewer agents", n_agents=count)
     return count
 
 
@@ -282,6 +315,8 @@ def _agents(name: str, numbers: ArrayLike, n: int) -> IntArray:
     array = validation.as_array(numbers)
     if array is not None and array.size == 0 and array.ndim == 1:
         return _NOTHING
+    if array is not None:
+        check_room(array.size, "pass fewer")
     if array is None or array.ndim != 1 or array.dtype.kind not in "iu":
         raise ValueError(
             f"{name} must be a list of numbers of agents, got "
@@ -300,15 +335,6 @@ def _offsets_of(counts: NDArray[Any]) -> IntArray:
     offsets = np.zeros(counts.size + 1, np.int64)
     np.cumsum(counts, out=offsets[1:])
     return offsets
-
-
-def _check_room(n_links: int) -> None:
-    validation.check_memory(
-        f"{n_links:,} links",
-        16 * n_links,
-        "let each agent hear fewer others, or use Inbox.best and Inbox.sum, which need "
-        "no list of the links",
-    )
 
 
 @njit
@@ -340,6 +366,12 @@ def link_of(receiver: int, sender: int, senders: IntArray, offsets: IntArray) ->
             high = middle
     found = low < offsets[receiver + 1] and senders[low] == sender
     return low if found else -1
+
+
+@njit
+def _find_own(senders: IntArray, offsets: IntArray, to_itself: BoolArray) -> None:
+    for i in range(to_itself.size):
+        to_itself[i] = link_of(i, i, senders, offsets) >= 0
 
 
 @njit

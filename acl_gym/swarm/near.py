@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
-from acl_gym.swarm.cells import MOST_AXES, SLACK, sort_into_cells
-from acl_gym.utils import validation
+from acl_gym.swarm.cells import MOST_AXES, SLACK, sort_into_cells, squared_reaches
+from acl_gym.swarm.rows import check_room
 from acl_gym.utils.compiling import njit
 from acl_gym.utils.typing import FloatArray, IntArray
 
@@ -63,9 +63,7 @@ def _counted(
     step = max(1, n // _SAMPLE)
     sampled = _within(x, sigma, include_self, cells, step, counts, _NOTHING)
     about = sampled * n // -(-n // step)
-    validation.check_memory(
-        f"about {about:,} links", 24 * about, "use a smaller radius or fewer agents"
-    )
+    check_room(about, "use a smaller radius or fewer agents")
     return int(_within(x, sigma, include_self, cells, 1, counts, _NOTHING))
 
 
@@ -85,9 +83,7 @@ def nearest(x: FloatArray, k: int, include_self: bool) -> tuple[IntArray, IntArr
         ValueError: no memory is large enough for them.
     """
     n = len(x)
-    validation.check_memory(
-        f"the {k} nearest of {n:,} agents", 40 * n * (k + 1), "use a smaller k"
-    )
+    check_room(n * (k + 1), "use a smaller k")
     _, found = cKDTree(x).query(x, k + 1)
     found = np.asarray(found, np.int64)
     others = found != np.arange(n)[:, None]
@@ -128,11 +124,12 @@ def _within(
     _, first, agent, _, place, _ = cells
     dim = x.shape[1]
     listing = sender.size > 0
+    reaches = squared_reaches(sigma)
     total = 0
     for at in range(0, agent.size, step):
         i = agent[at]
-        radius = sigma[i]
-        planes, rows, columns = _block(at, radius, cells)
+        planes, rows, columns = _block(at, sigma[i], cells)
+        reach = reaches[i]
         x0, x1, x2 = place[0, at], place[1, at], place[2, at]
         count = 0
         for p in range(planes[0], planes[1]):
@@ -147,7 +144,7 @@ def _within(
                     if listing:
                         # Overwritten by the next one if it is too far: no branch.
                         sender[np.uint64(total + count)] = agent[j]
-                    count += (np.sqrt(square) < radius) & (include_self | (j != at))
+                    count += (square < reach) & (include_self | (j != at))
         total += count
         counts[i] = count
     return total

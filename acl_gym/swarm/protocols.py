@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acl_gym.swarm.inbox import Inbox
+from acl_gym.utils import validation
 from acl_gym.utils.typing import FloatArray
 
 
@@ -33,14 +34,32 @@ class Environment(ABC):
         def __getattr__(self, name: str) -> Any:
             kind = type(self).__name__
             message = f"{kind!r} object has no attribute {name!r}"
-            if ("x" not in self.__dict__ and hasattr(type(self), name)) or name == "x":
-                message += "; agents have states after the first reset, or in a run"
+            if name == "x":
+                message += (
+                    "; agents have states after the first reset, which must set x, or "
+                    "in a run"
+                )
+            # Python comes here as well where a property has raised an AttributeError,
+            # and drops that one. Asked once more, the property says what it lacks.
+            asked = getattr(type(self), name, None)
+            if isinstance(asked, property) and asked.fget is not None:
+                return asked.fget(self)
             raise AttributeError(message, name=name, obj=self)
 
     @property
     def n(self) -> int:
-        """The number of agents N."""
-        return len(self.x)
+        """The number of agents N.
+
+        Raises:
+            ValueError: `x` does not have a row for each agent.
+        """
+        states = validation.as_array(self.x)
+        if states is None or states.ndim == 0:
+            raise ValueError(
+                "x must be an array with a row for each agent, got "
+                f"{validation.shown(self.x)}; let reset of {type(self).__name__} set it."
+            )
+        return len(states)
 
     @property
     def positions(self) -> FloatArray:

@@ -1,7 +1,8 @@
-"""Checks of arrays with one row for each agent."""
+"""Checks of arrays with one row for each agent, and of the memory that links need."""
 
 from __future__ import annotations
 
+import sys
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,10 @@ from acl_gym.utils.typing import FloatArray
 FARTHEST = 1e150
 """Squares of distances between positions up to this are finite. A run ends with an error
 beyond it, and so does a search, as one that has exploded."""
+
+
+BYTES_A_LINK = 48
+"""The most memory that a link takes while links are being made."""
 
 
 def checked_positions(positions: Any, n: int | None = None) -> FloatArray:
@@ -40,7 +45,7 @@ def checked_positions(positions: Any, n: int | None = None) -> FloatArray:
             f"positions must be an array of numbers of shape ({many}, dim), a row for "
             f"each agent, got {validation.shown(positions)}."
         )
-    rows = np.ascontiguousarray(array, dtype=np.float64)
+    rows = validation.float64(array)
     agent = _first_beyond(rows, FARTHEST)
     if agent >= 0:
         raise ValueError(
@@ -67,7 +72,16 @@ def checked_rows(name: str, values: Any, shape: tuple[int, int]) -> FloatArray:
             f"{name} must be an array of numbers of shape {shape}, a row for each agent, "
             f"got {validation.shown(values)}."
         )
-    return np.ascontiguousarray(array, dtype=np.float64)
+    return validation.float64(array)
+
+
+def all_finite(rows: FloatArray) -> bool:
+    """Whether an array has neither NaN nor infinity; faster than NumPy for few agents.
+
+    Args:
+        rows: float64, in C order.
+    """
+    return bool(_first_beyond(rows.reshape(1, -1), sys.float_info.max) < 0)
 
 
 @njit
@@ -78,6 +92,35 @@ def _first_beyond(rows: FloatArray, limit: float) -> int:
             if not abs(rows[i, k]) <= limit:
                 return i
     return -1
+
+
+def check_room(
+    n_links: int,
+    remedy: str,
+    *,
+    n_agents: int = 0,
+    bytes_an_agent: int = 24,
+    bytes_a_link: int = BYTES_A_LINK,
+) -> None:
+    """Refuse links that do not fit into memory, before any is made.
+
+    Every function that writes links out, or an entry for each, asks here first.
+
+    Args:
+        n_links: how many, or about how many.
+        remedy: what to do about it, an imperative.
+        n_agents: how many agents there are, where their number may be too large as well.
+        bytes_an_agent: what is kept for each agent.
+        bytes_a_link: what is kept for each link.
+
+    Raises:
+        ValueError: no memory is large enough.
+    """
+    what = f"{n_links:,} links"
+    if n_agents:
+        what = f"{n_agents:,} agents with {what}"
+    n_bytes = bytes_a_link * n_links + bytes_an_agent * n_agents
+    validation.check_memory(what, n_bytes, remedy)
 
 
 def per_agent(

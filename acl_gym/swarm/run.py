@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from acl_gym.swarm.channel import Channel
 from acl_gym.swarm.inbox import checked_inbox
 from acl_gym.swarm.protocols import DynamicAgents, Environment
-from acl_gym.swarm.rows import checked_positions
+from acl_gym.swarm.rows import check_messages, checked_positions
 from acl_gym.swarm.topologies import Everyone
 from acl_gym.utils import validation
 
@@ -38,8 +38,18 @@ class History:
     recorded: dict[str, NDArray[Any]] = field(default_factory=dict)
 
     def __getitem__(self, name: str) -> NDArray[Any]:
-        """What was recorded under a name."""
-        return self.recorded[name]
+        """What was recorded under a name.
+
+        Raises:
+            KeyError: nothing was.
+        """
+        try:
+            return self.recorded[name]
+        except (KeyError, TypeError):
+            raise KeyError(
+                f"{validation.shown(name)} must be among the recorded names, got "
+                f"{sorted(self.recorded)}; pass record=(...) with it to run."
+            ) from None
 
 
 def run(
@@ -101,7 +111,7 @@ def run(
     _record(environment, series)
     while history.steps < steps and not history.done:
         if stale and history.steps > 0:
-            sent = _copied(agents.send())  # observing may change the same arrays
+            sent = _copied(agents.send(), n)  # observing may change the same arrays
             agents.observe(environment.observe())
         else:
             agents.observe(environment.observe())
@@ -171,7 +181,8 @@ def _record(environment: Environment, series: dict[str, list[NDArray[Any]]]) -> 
         rows.append(array.copy())
 
 
-def _copied(messages: dict[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
+def _copied(messages: dict[str, NDArray[Any]], n: int) -> dict[str, NDArray[Any]]:
+    check_messages(messages, n)
     return {name: np.array(rows) for name, rows in messages.items()}
 
 

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from acl_gym.swarm.channel import Topology
 from acl_gym.swarm.links import Links
 from acl_gym.swarm.near import nearest, within_radius
-from acl_gym.swarm.rows import checked_positions, per_agent
+from acl_gym.swarm.rows import check_room, checked_positions, per_agent
 from acl_gym.utils import validation
 from acl_gym.utils.typing import FloatArray
 
@@ -61,7 +61,8 @@ class Ring(_ByNumber):
 
     Raises:
         TypeError: `k` is not an integer.
-        ValueError: it is < 1.
+        ValueError: it is < 1, or, as soon as the number of agents is known, no memory is
+            large enough for the links.
     """
 
     def __init__(self, k: int = 1, include_self: bool = True) -> None:
@@ -71,12 +72,15 @@ class Ring(_ByNumber):
     def _links_of(self, n: int) -> Links:
         if 2 * self.k + 1 >= n:
             return Links.everyone(n, self.include_self)
+        each = 2 * self.k + self.include_self
+        check_room(n * each, "use a smaller k", n_agents=n)
         steps = np.arange(-self.k, self.k + 1)
         if not self.include_self:
             steps = steps[steps != 0]
-        agents = np.arange(n)[:, None]
-        sender = (agents + steps) % n
-        return Links.from_pairs(n, np.repeat(agents, steps.size), sender.reshape(-1))
+        sender = np.arange(n)[:, None] + steps
+        sender %= n
+        sender.sort(axis=1)
+        return Links._from_rows(n, sender.reshape(-1), np.arange(n + 1) * each)
 
     def __repr__(self) -> str:
         """The call that makes it."""
@@ -112,6 +116,7 @@ class VonNeumann(_ByNumber):
             raise ValueError(
                 f"rows must divide the number of agents, got {rows} rows for {n} agents."
             )
+        check_room(5 * n, "use fewer agents", n_agents=n)
         grid = np.arange(n).reshape(rows, -1)
         beside = [np.roll(grid, by, axis) for axis in (0, 1) for by in (-1, 1)]
         if self.include_self:
@@ -156,7 +161,9 @@ class Radius(Topology):
         x = checked_positions(x)
         n = len(x)
         sigma = per_agent("sigma", self.sigma, n, infinite=True, at_least=0)
-        return Links(n, *within_radius(x, np.full(n, sigma), self.include_self))
+        return Links._from_rows(
+            n, *within_radius(x, np.full(n, sigma), self.include_self)
+        )
 
     def __repr__(self) -> str:
         """The call that makes it."""
@@ -201,7 +208,7 @@ class Nearest(Topology):
                 f"k must be less than the number of agents, got {self.k} for {n} agents; "
                 "use Everyone(include_self=False) to hear all others."
             )
-        return Links(n, *nearest(x, self.k, self.include_self))
+        return Links._from_rows(n, *nearest(x, self.k, self.include_self))
 
     def __repr__(self) -> str:
         """The call that makes it."""

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+_FLOAT64 = np.dtype(np.float64)
 _MANY = 10
 _MOST_ELEMENTS = 1_000_000
 _LONGEST = 200  # letters of a value that a message shows
@@ -185,13 +186,31 @@ def real_array(
         and array.dtype.kind in ("iufb" if boolean else "iuf")
         and array.size > 0
         and ndim in (None, array.ndim)
-        and (not finite or bool(np.isfinite(array).all()))
     )
-    if array is None or not valid:
+    converted = float64(array) if array is not None and valid else None
+    if converted is None or (finite and not np.isfinite(converted).all()):
         kind = "an array" if ndim is None else f"an array of {ndim} axes"
         numbers = "finite real numbers" if finite else "real numbers"
         raise ValueError(f"{name} must be {kind} of {numbers}, got {shown(values)}.")
-    return array.astype(np.float64)
+    return np.array(converted)
+
+
+def float64(array: NDArray[Any]) -> NDArray[np.float64]:
+    """Return real numbers as kernels take them, not copied if they are so already.
+
+    Args:
+        array: of booleans, integers or floats, in any order and any format. What a
+            float64 cannot hold, as a `longdouble` can, becomes infinite.
+
+    Returns:
+        A plain array in C order, of float64 in the byte order of the machine.
+    """
+    if type(array) is np.ndarray and array.dtype == _FLOAT64:
+        flags = array.flags
+        if flags.c_contiguous and flags.aligned:
+            return array  # a tenth of the time of `np.require`
+    with np.errstate(over="ignore"):
+        return np.require(np.asarray(array), np.float64, ("C", "A"))
 
 
 def check_square(name: str, shape: tuple[int, ...], rows: str = "row") -> None:

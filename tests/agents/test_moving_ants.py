@@ -304,3 +304,52 @@ def test_halves_of_other_kinds_are_refused() -> None:
     environment.reset(np.random.default_rng(0))
     with pytest.raises(TypeError, match=r"u must be the Inputs of Ants, got None"):
         environment.step(None, np.random.default_rng(0))
+
+
+def test_an_ant_need_not_hear_itself() -> None:
+    """It knows of itself that it is done."""
+    settings = {"max_steps": 5000, "alpha": 1.0}
+    for n in (20, 1):
+        levels, steps = lengths(colony(GRID, n, **settings), 3, None)
+        for channel in (Everyone(include_self=False), OthersOnly()):
+            alike, as_many = lengths(colony(GRID, n, **settings), 3, channel)
+            np.testing.assert_array_equal(alike, levels)
+            assert as_many == steps
+
+
+class OthersOnly(Topology):
+    """All others, written out."""
+
+    def links(self, x: Any) -> Links:
+        n = len(x)
+        return Links.from_lists([[j for j in range(n) if j != i] for i in range(n)])
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"cells": np.full((4, 1), 10**9)},
+        {"cells": np.full((4, 1), -1)},
+        {"cells": None},
+        {"actions": np.full(4, 99)},
+        {"actions": np.zeros(4)},
+        {"degrees": np.ones((4, 2))},
+        {"degrees": np.ones((4, 1), int)},
+        {"ants": np.array([0, 1, 2, 7])},
+        {"asks": np.zeros(3, bool)},
+        {"asks": None},
+        {"solutions": None},
+    ],
+    ids=lambda wrong: next(iter(wrong)),
+)
+def test_inputs_that_point_elsewhere_are_refused(wrong: dict[str, Any]) -> None:
+    source = colony(GRID, n=4)
+    ants, environment = Ants(source), StigmergyEnvironment(source, 1)
+    rng = np.random.default_rng(0)
+    environment.reset(rng)
+    ants.reset(4, rng)
+    ants.observe(environment.observe())
+    good = ants.decide(rng)
+    with pytest.raises(ValueError, match="u must hold actions from 0 to"):
+        environment.step(good._replace(**wrong), rng)
+    environment.step(good, rng)

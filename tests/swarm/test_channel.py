@@ -161,3 +161,19 @@ def test_a_delay_is_a_number_of_steps() -> None:
 def test_repr_is_the_call_that_makes_it() -> None:
     channel = Lossy(Delayed(Ring(), 2), 0.1, symmetric=True)
     assert repr(eval(repr(channel))) == repr(channel)
+
+
+@pytest.mark.parametrize(
+    ("sent", "error", "message"),
+    [
+        (None, TypeError, "messages must be a dict of arrays"),
+        ({"a": [1, 2]}, TypeError, "message 'a' must be an array with a row"),
+        ({"a": np.zeros(3)}, ValueError, "a row for each of the 2 agents"),
+    ],
+)
+def test_a_delay_checks_what_is_sent_when_it_is_sent(sent, error, message) -> None:
+    channel, rng = Delayed(Everyone(), 3), np.random.default_rng(0)
+    channel.reset(2)
+    channel.deliver({"a": np.zeros(2)}, np.zeros((2, 1)), rng)
+    with pytest.raises(error, match=message):
+        channel.deliver(sent, np.zeros((2, 1)), rng)

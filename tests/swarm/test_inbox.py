@@ -188,3 +188,46 @@ def test_messages_that_were_replaced_are_not_read_past_their_end() -> None:
     inbox.messages["cost"] = np.ones(1)
     with pytest.raises(ValueError, match="one real number for each agent"):
         inbox.best("cost")
+
+
+@pytest.mark.parametrize("include_self", [True, False])
+@pytest.mark.parametrize(
+    "kind", ["f2", ">f4", ">f8", "g", "?", "i1", ">i2", "u1", ">u8", ">i8"]
+)
+def test_numbers_of_any_format(kind: str, include_self: bool) -> None:
+    """Kernels know the formats of this machine only."""
+    values = np.array([1, 0, 1]).astype(kind)
+    lists = [[0, 2], [0, 1, 2], [2]]
+    inbox = Inbox(Links.from_lists(lists), {"cost": values})
+    assert inbox.best("cost").tolist() == [0, 1, 2]
+    assert inbox.sum(values).tolist() == [2.0, 2.0, 1.0]
+    every = Inbox(Links.everyone(3, include_self), {"cost": values})
+    assert every.best("cost").tolist() == [1, 1 if include_self else 0, 1]
+
+
+def test_numbers_that_float64_would_confuse() -> None:
+    close = np.array([2**63 + 1, 2**63], np.uint64)
+    assert Inbox(Links.everyone(2), {"cost": close}).best("cost").tolist() == [1, 1]
+    signed = np.array([2**53 + 1, 2**53])
+    assert Inbox(Links.everyone(2), {"cost": signed}).best("cost").tolist() == [1, 1]
+    beyond = np.array([np.longdouble("1e4000"), 1.0])
+    inbox = Inbox(Links.everyone(2), {"cost": beyond})
+    assert inbox.best("cost").tolist() == [1, 1]
+    assert inbox.sum(beyond).tolist() == [math.inf, math.inf]
+
+
+def test_packed_and_masked_messages() -> None:
+    packed = np.zeros(3, np.dtype([("flag", "i1"), ("cost", "f8")]))
+    packed["cost"] = [3.0, 1.0, 2.0]  # not at multiples of eight bytes
+    inbox = Inbox(Links.everyone(3), {"cost": packed["cost"]})
+    assert inbox.best("cost").tolist() == [1, 1, 1]
+    hidden = np.ma.array([3.0, 1.0, 2.0], mask=[0, 1, 0])
+    with pytest.raises(ValueError, match="must be one real number for each agent"):
+        Inbox(Links.everyone(3), {"cost": hidden}).best("cost")
+
+
+def test_a_message_that_is_missing_among_odd_names() -> None:
+    inbox = Inbox(Links.everyone(1), {1: np.zeros(1), "a": np.zeros(1)})
+    with pytest.raises(ValueError, match=r"a message 'cost', got \['1', 'a'\]"):
+        inbox.message("cost")
+    assert "['1', 'a']" in repr(inbox)

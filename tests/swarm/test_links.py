@@ -161,3 +161,38 @@ def test_rows_of_senders_are_checked(sender, offsets) -> None:
         Links(2, *(each.astype(float) for each in arrays))
     with pytest.raises(ValueError, match="must be arrays of int64"):
         Links(2, sender, offsets)
+
+
+@given(neighbourhoods())
+def test_what_is_changed_afterwards_changes_no_links(lists) -> None:
+    made = Links.from_lists(lists)
+    sender, offsets = made.sender.copy(), made.offsets.copy()
+    links = Links(made.n, sender, offsets)
+    sender[:] = 10**9
+    offsets[:] = -(10**9)
+    assert as_lists(links) == as_lists(made)
+    for each in (links, made, links.subset(np.ones(links.n_links, np.bool_))):
+        for array in (each.sender, each.offsets, each.receiver, *each.csr()):
+            with pytest.raises(ValueError, match="cannot set WRITEABLE flag"):
+                array.setflags(write=True)
+
+
+@pytest.mark.parametrize("include_self", [True, False])
+def test_arrays_of_everyone_are_read_only(include_self: bool) -> None:
+    links = Links.everyone(3, include_self)
+    for array in (links.sender, links.offsets, links.receiver, *links.csr()):
+        assert not array.flags.writeable
+
+
+@given(neighbourhoods())
+def test_who_hears_itself(lists) -> None:
+    wanted = [i in each for i, each in enumerate(lists)]
+    assert Links.from_lists(lists).hears_itself.tolist() == wanted
+    assert Links.everyone(3).hears_itself.all()
+    assert not Links.everyone(3, include_self=False).hears_itself.any()
+
+
+def test_pairs_that_fill_the_memory_are_refused_before_they_are_looked_at() -> None:
+    many = np.broadcast_to(0, 10**12)
+    with pytest.raises(ValueError, match=r"1,000,000,000,000 links must fit"):
+        Links.from_pairs(2, many, many)

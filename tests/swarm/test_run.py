@@ -243,7 +243,7 @@ def test_states_are_there_after_the_first_reset() -> None:
         pass
 
     for name in ("x", "n", "positions"):
-        with pytest.raises(AttributeError, match=f"attribute '{name}'; .*first reset"):
+        with pytest.raises(AttributeError, match=r"attribute 'x'; .*first reset"):
             getattr(Late(), name)
     with pytest.raises(AttributeError, match=r"attribute 'speed'$"):
         Late().speed  # noqa: B018
@@ -357,3 +357,61 @@ def test_swarms_and_theory_need_no_gymnasium(tmp_path: Path) -> None:
         check=False,
     )
     assert done.returncode == 0, done.stderr
+
+
+class Bodiless(Plane):
+    """Its states are no array."""
+
+    def __init__(self, x: Any) -> None:
+        self._x = x
+
+    def reset(self, rng: np.random.Generator) -> None:
+        if self._x != "unset":
+            self.x = self._x
+
+
+@pytest.mark.parametrize("x", [None, 3.0, [[1.0], [2.0, 3.0]]])
+def test_states_that_are_no_rows(x: Any) -> None:
+    with pytest.raises(
+        ValueError, match=r"x must be an array with a row .* reset of Bodiless"
+    ):
+        run(ConsensusAgents(), Bodiless(x), 1, 0)
+
+
+def test_a_reset_that_sets_no_states() -> None:
+    with pytest.raises(AttributeError, match="the first reset, which must set x"):
+        run(ConsensusAgents(), Bodiless("unset"), 1, 0)
+
+
+class Mistyped(Plane):
+    """A property that fails for a reason of its own."""
+
+    @property
+    def positions(self) -> Any:
+        return self.postions  # (sic)
+
+
+def test_a_property_that_fails_says_why() -> None:
+    with pytest.raises(AttributeError, match="no attribute 'postions'") as caught:
+        run(ConsensusAgents(), Mistyped(), 1, 0)
+    assert "reset" not in str(caught.value)
+
+
+def test_what_was_not_recorded() -> None:
+    history = run(ConsensusAgents(), Plane(), 1, 0, record=("time",))
+    with pytest.raises(KeyError, match=r"'x' must be among .* \['time'\]; pass record"):
+        history["x"]
+
+
+class Mute(ConsensusAgents):
+    """Agents whose messages are none."""
+
+    def send(self) -> Any:
+        return None
+
+
+@pytest.mark.parametrize("stale", [False, True])
+@pytest.mark.parametrize("channel", [Everyone(), Delayed(Everyone(), 1)])
+def test_messages_that_are_none(channel: Channel, stale: bool) -> None:
+    with pytest.raises(TypeError, match="messages must be a dict of arrays"):
+        run(Mute(), Plane(), 2, 0, channel, stale=stale)

@@ -161,7 +161,7 @@ def test_too_many_links_are_refused_before_they_are_made() -> None:
         ValueError, match=r"links must fit into .* use a smaller radius"
     ):
         Radius(2.0).links(x)
-    with pytest.raises(ValueError, match=r"nearest of 600,000 agents must fit"):
+    with pytest.raises(ValueError, match=r"links must fit into .* use a smaller k"):
         Nearest(599_999).links(x)
 
 
@@ -228,3 +228,9 @@ def test_parameters_must_fit_the_number_of_agents() -> None:
 @pytest.mark.parametrize("topology", ANY, ids=str)
 def test_repr_is_the_call_that_makes_it(topology: Topology) -> None:
     assert repr(eval(repr(topology))) == repr(topology)
+
+
+def test_a_ring_counts_its_links_before_it_makes_them() -> None:
+    x = np.broadcast_to(0.0, (10**6, 1))
+    with pytest.raises(ValueError, match=r"200,001,000,000 links .* use a smaller k"):
+        Ring(100_000).links(x)

@@ -263,13 +263,14 @@ def checked_inputs(
             f"actions must have shape ({count}, {low.size}), a row of inputs for each "
             f"slot, got {array.shape}."
         )
+    array = validation.float64(array)
     if not np.isfinite(array).all():
         slot, axis = np.argwhere(~np.isfinite(array))[0]
         raise ValueError(
             f"actions must be finite, got {array[slot, axis]} as input {axis} in slot "
             f"{slot}; check what computes them."
         )
-    return np.clip(array.astype(np.float64), low, high)
+    return np.clip(array, low, high)
 
 
 def final_infos(

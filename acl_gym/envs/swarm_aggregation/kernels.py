@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from acl_gym.swarm.cells import MOST_AXES
+from acl_gym.swarm.cells import MOST_AXES, squared_reach
 from acl_gym.utils.compiling import njit
 from acl_gym.utils.typing import FloatArray, IntArray
 
@@ -42,7 +42,7 @@ def look_around(
     rows, columns = shape[_ROW], shape[_COLUMN]
     narrowest = min(width[_ROW], width[_COLUMN])
     limited = sensing_radius < np.inf
-    reach, contact = sensing_radius**2, collision_distance**2
+    reach, contact = squared_reach(sensing_radius), squared_reach(collision_distance)
     x, y = place[_ROW], place[_COLUMN]
     squares, who = np.empty(count + 1), np.empty(count + 1, np.int64)
     for at in range(n):

@@ -114,8 +114,8 @@ class SwarmAggregationVectorEnv(ChoosesAutoreset, VectorEnv[FloatArray, Any, Any
             options: any of
 
                 - `"state"`: array `(num_envs, state_size)`, sets the states of the agents
-                  in the slots (rows outside the mask are ignored); `(n, state_size)`
-                  sets those of all n agents of the world, followers last;
+                  in the slots; `(n, state_size)` sets those of all n agents of the
+                  world, followers last. Rows of agents outside the mask are ignored;
                 - `"reset_mask"`: bool array `(num_envs,)`: only these agents are put
                   elsewhere, and the episode goes on, see the class. A mask of all
                   slots starts an episode.
@@ -144,8 +144,8 @@ class SwarmAggregationVectorEnv(ChoosesAutoreset, VectorEnv[FloatArray, Any, Any
         given = options.get("state")
         if given is not None:
             rows = validation.real_array("options['state']", given, finite=False)
-            if begun and rows.shape == (self.num_envs, self.system.state_size):
-                rows[~mask] = self.states[: self.num_envs][~mask]
+            if not mask.all():
+                self._fill_in(rows, mask)
             given = checked_states(rows, self._world)
         super().reset(seed=seed)
         if mask.all():
@@ -157,6 +157,15 @@ class SwarmAggregationVectorEnv(ChoosesAutoreset, VectorEnv[FloatArray, Any, Any
         if self.render_mode == "human":
             self.render()
         return self._world.observe(), {}
+
+    def _fill_in(self, rows: FloatArray, mask: BoolArray) -> None:
+        """Replace what was given for agents that are not reset, which may be anything."""
+        present = self.states
+        n, size = present.shape
+        if rows.shape in ((self.num_envs, size), (n, size)):
+            kept = np.ones(len(rows), np.bool_)
+            kept[: self.num_envs] = ~mask
+            rows[kept] = present[: len(rows)][kept]
 
     def step(self, actions: ArrayLike) -> StepResult:
         """Move all agents for one time step.

@@ -13,7 +13,7 @@ from acl_gym.envs.swarm_aggregation.system import MOST_WITHOUT_RADIUS, SwarmAggr
 from acl_gym.swarm.aggregation import forces_within
 from acl_gym.swarm.aggregation.particles import shortened
 from acl_gym.swarm.cells import sort_into_cells
-from acl_gym.utils import validation
+from acl_gym.swarm.rows import check_room
 from acl_gym.utils.typing import BoolArray, FloatArray, IntArray
 
 TRAIL = 12
@@ -21,6 +21,7 @@ TRAIL = 12
 
 _MOST_DRAWS = 10_000
 _BYTES_AN_AGENT = 500  # of states, cells and what is observed
+_BYTES_A_NEIGHBOUR = 100  # of the two numbers observed of it, and of their bounds
 
 
 class Look(NamedTuple):
@@ -97,8 +98,12 @@ class World:
         self.learners = learners
         count = followers if system.followers is None else system.followers
         self.n = learners + count
-        validation.check_memory(
-            f"{self.n:,} agents", _BYTES_AN_AGENT * self.n, "use fewer"
+        check_room(
+            self.n * system.nearest,
+            "use fewer agents, or a smaller nearest",
+            n_agents=self.n,
+            bytes_an_agent=_BYTES_AN_AGENT,
+            bytes_a_link=_BYTES_A_NEIGHBOUR,
         )
         follows = self.n > learners or system.observe == "potential"
         if follows and system.sensing_radius is None and self.n > MOST_WITHOUT_RADIUS:

@@ -74,7 +74,7 @@ class AggregatingAgents(DynamicAgents):
     def hear(self, inbox: Inbox) -> None:
         """Add up what the neighbours do, by the positions that have arrived."""
         self._force = forces_over_links(
-            self._position, inbox.messages["position"], inbox.links, self.interaction
+            self._position, inbox.message("position"), inbox.links, self.interaction
         )
 
     def decide(self, rng: np.random.Generator) -> FloatArray:

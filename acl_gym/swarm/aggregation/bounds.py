@@ -24,6 +24,7 @@ from acl_gym.utils import validation
 from acl_gym.utils.typing import FloatArray
 
 
+@np.errstate(over="ignore")
 def size_bound(
     n_agents: ArrayLike, attraction: ArrayLike, repulsion: ArrayLike, spread: ArrayLike
 ) -> FloatArray:
@@ -37,6 +38,7 @@ def size_bound(
     return np.asarray(b / a * np.sqrt(0.5 * c) * math.exp(-0.5) * (m - 1.0) / m)
 
 
+@np.errstate(over="ignore")
 def rms_bound(
     n_agents: ArrayLike, attraction: ArrayLike, repulsion: ArrayLike, spread: ArrayLike
 ) -> FloatArray:
@@ -51,6 +53,7 @@ def rms_bound(
     return np.sqrt((m - 1.0) * b * c / (2.0 * a * math.e * m))
 
 
+@np.errstate(over="ignore")
 def resting_sum_of_squares(
     n_agents: ArrayLike, attraction: ArrayLike, repulsion: ArrayLike
 ) -> FloatArray:
@@ -63,6 +66,7 @@ def resting_sum_of_squares(
     return np.asarray(b * (m - 1.0) / (2.0 * a))
 
 
+@np.errstate(over="ignore")
 def sum_of_squares(
     time: ArrayLike,
     initial: ArrayLike,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
@@ -10,9 +9,9 @@ from numpy.typing import ArrayLike
 
 from acl_gym.swarm.aggregation.obstacles import Obstacles
 from acl_gym.swarm.aggregation.particles import Kinematic, Particles
-from acl_gym.swarm.aggregation.profiles import Profile
+from acl_gym.swarm.aggregation.profiles import Profile, checked_gradient
 from acl_gym.swarm.protocols import Environment
-from acl_gym.swarm.rows import FARTHEST, checked_positions, checked_rows
+from acl_gym.swarm.rows import FARTHEST, all_finite, checked_positions, checked_rows
 from acl_gym.utils import validation
 from acl_gym.utils.typing import FloatArray
 
@@ -35,7 +34,7 @@ class Field(Environment):
 
     Args:
         start: initial positions `(n, dim)`; or the number of agents n, whose positions
-            are then drawn uniformly from `bounds`.
+            are then drawn uniformly from `bounds`, outside of the obstacles.
         particles: how bodies move; None takes `Kinematic()`.
         time_step: s, > 0.
         profile: what the swarm feeds on; None: nothing.
@@ -51,7 +50,8 @@ class Field(Environment):
 
     Raises:
         TypeError: an argument is of the wrong kind.
-        ValueError: an argument is out of range.
+        ValueError: an argument is out of range, or an initial position lies inside an
+            obstacle.
     """
 
     def __init__(
@@ -91,9 +91,17 @@ class Field(Environment):
             _ARRAYS * 8 * self._count * self._dim,
             "use fewer",
         )
+        validation.integer(
+            f"variables of {type(self.particles).__name__}",
+            getattr(self.particles, "variables", None),
+            at_least=1,
+            at_most=2,
+        )
         self.particles.check(self._count)
         # Whether the field has as many coordinates as the positions.
         self.slope(np.zeros((self._count, self._dim)), finite=False)
+        if self._start is not None and obstacles is not None:
+            _check_outside(self._start, obstacles)
         self.time = 0.0
 
     @property
@@ -119,8 +127,6 @@ class Field(Environment):
         places = self._drawn(rng) if self._start is None else self._start
         self.x = np.zeros((self._count, self.particles.variables * self._dim))
         self.x[:, : self._dim] = places
-        if self.obstacles is not None:
-            self.obstacles.stop(self.positions)
         self.time = 0.0
 
     def observe(self) -> dict[str, FloatArray]:
@@ -138,10 +144,11 @@ class Field(Environment):
             rng: is not used.
 
         Raises:
-            ValueError: an input is not a finite number.
+            ValueError: an input is not a finite number, or a position comes to be none,
+                or to be farther away than 1e150.
         """
         inputs = checked_rows("u", u, (self._count, self._dim))
-        if not np.isfinite(inputs).all():
+        if not all_finite(inputs):
             agent = int(np.flatnonzero(~np.isfinite(inputs).all(axis=1))[0])
             raise ValueError(
                 f"inputs must be finite, got {inputs[agent]} for agent {agent}: agents "
@@ -149,9 +156,11 @@ class Field(Environment):
                 "bounded repulsion."
             )
         before = self.positions
-        self.x = self.particles.advance(self.x, inputs, self.time_step)
+        moved = self.particles.advance(self.x.copy(), inputs, self.time_step)
+        name = f"what {type(self.particles).__name__}.advance returns"
+        self.x = np.array(checked_rows(name, moved, self.x.shape))
+        checked_positions(self.positions, self._count)
         if self.obstacles is not None:
-            checked_positions(self.positions, self._count)
             stopped = self.obstacles.stop(self.positions, before)
             if self.velocities is not None:
                 self.velocities[stopped] = 0.0
@@ -170,7 +179,7 @@ class Field(Environment):
         total = np.zeros(np.shape(positions))
         for part in (self.profile, self.obstacles):
             if part is not None:
-                total += _checked_gradient(part, positions, finite)
+                total += checked_gradient(part, positions, finite)
         return total
 
     def _drawn(self, rng: np.random.Generator) -> FloatArray:
@@ -200,31 +209,22 @@ def _checked_start(start: Any) -> FloatArray:
     return array
 
 
-def _checked_gradient(
-    part: Profile | Obstacles, positions: FloatArray, finite: bool
-) -> FloatArray:
-    gradient = np.asarray(part.gradient(positions))
-    kind = type(part).__name__
-    if gradient.shape != np.shape(positions) or gradient.dtype.kind not in "biuf":
+def _check_outside(start: FloatArray, obstacles: Obstacles) -> None:
+    inside = np.flatnonzero(obstacles.inside(start))
+    if inside.size:
+        agent = int(inside[0])
         raise ValueError(
-            f"the gradient of {kind} must be real numbers of the shape of the positions, "
-            f"{np.shape(positions)}, got {gradient.dtype} of shape {gradient.shape}; let "
-            "it return a row for each position."
+            f"start must lie outside the obstacles, got {start[agent]} for agent {agent}; "
+            "move it, or let positions be drawn."
         )
-    if finite and not np.isfinite(gradient).all():
-        row = int(np.flatnonzero(~np.isfinite(gradient).all(axis=-1))[0])
-        raise ValueError(
-            f"the gradient of {kind} must be finite, got {gradient[row]} at the position "
-            f"{positions[row]}; let it return finite numbers everywhere."
-        )
-    return gradient
 
 
 def _checked_bounds(bounds: Any) -> tuple[float, float]:
     pair = validation.real_array("bounds", bounds, ndim=1)
-    if pair.size != 2 or not -math.inf < pair[0] <= pair[1] < math.inf:
+    if pair.size != 2 or not -FARTHEST <= pair[0] <= pair[1] <= FARTHEST:
         raise ValueError(
-            "bounds must be the lowest and the highest coordinate, got "
-            f"{validation.shown(bounds)}."
+            "bounds must be the lowest and the highest coordinate, both within "
+            f"{FARTHEST:g} of 0, got {validation.shown(bounds)}; use another unit of "
+            "length if they are larger."
         )
     return float(pair[0]), float(pair[1])

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from acl_gym.swarm.aggregation import kernels
 from acl_gym.swarm.aggregation.interaction import Interaction, check_interaction
-from acl_gym.swarm.cells import MOST_AXES, sort_into_cells
+from acl_gym.swarm.cells import MOST_AXES, sort_into_cells, squared_reaches
 from acl_gym.swarm.links import Links
 from acl_gym.swarm.rows import checked_positions, per_agent
 from acl_gym.utils import threads, validation
@@ -101,10 +101,10 @@ def forces_within(
             f"got {dim}; use forces_over_links with the links of a channel."
         )
     law = tuple(interaction.coefficients(n))
-    reach = np.array(np.broadcast_to(sigma, n))
+    reaches = squared_reaches(np.array(np.broadcast_to(sigma, n)))
     force = np.empty_like(x)
     cells = sort_into_cells(x, largest)
     shared = threads.worth_it(n)
     add = kernels.sum_radius_in_parallel if shared else kernels.sum_radius
-    add(cells, reach, law, force)
+    add(cells, reaches, law, force)
     return force

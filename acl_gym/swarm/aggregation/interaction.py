@@ -11,9 +11,12 @@ from numpy.typing import ArrayLike
 from scipy.special import xlogy
 
 from acl_gym.swarm.aggregation.kernels import BOUNDED, UNBOUNDED
-from acl_gym.swarm.rows import per_agent
+from acl_gym.swarm.rows import FARTHEST, per_agent
 from acl_gym.utils import validation
 from acl_gym.utils.typing import FloatArray
+
+_LEAST_SPREAD = 1e-300
+"""1 / c is finite."""
 
 Parameter = float | FloatArray
 """One number for all agents, or an array with one for each."""
@@ -89,14 +92,16 @@ class Interaction(ABC):
             An array of the shape of `y`; 0 where y is 0, since two agents in one place
             have no direction to part in.
         """
-        y = np.asarray(y, dtype=np.float64)
+        y = _checked("y", y)
         distance = np.sqrt(np.square(y).sum(axis=-1))
         strength = np.where(distance > 0, self.net_attraction(distance), 0.0)
         return np.asarray(-y * strength[..., None])
 
     def _distances(self, distance: ArrayLike) -> FloatArray:
         """Distances as an array, whose last axis is that of the agents, if they differ."""
-        r = np.asarray(distance, dtype=np.float64)
+        r = _checked("distance", distance)
+        if (r < 0.0).any():
+            raise ValueError(f"distance must be >= 0, got {r.min():g}.")
         n = max(np.size(each) for each in (self.attraction, self.repulsion, self._rate))
         if n > 1 and r.shape[-1:] not in ((), (1,), (n,)):
             raise ValueError(
@@ -139,8 +144,8 @@ class BoundedRepulsion(Interaction):
     Attributes:
         attraction: a, 1/s for kinematic particles, >= 0.
         repulsion: b, in the unit of a, >= 0. Agents keep a distance where b > a.
-        spread: c, the square of a length, > 0: at the distance sqrt(c) the repulsion is
-            b / e.
+        spread: c, the square of a length, >= 1e-300: at the distance sqrt(c) the
+            repulsion is b / e.
 
     Raises:
         ValueError: a parameter is out of range.
@@ -155,12 +160,13 @@ class BoundedRepulsion(Interaction):
     def __post_init__(self) -> None:
         _set(self, "attraction")
         _set(self, "repulsion")
-        _set(self, "spread", or_zero=False)
+        _set(self, "spread", at_least=_LEAST_SPREAD)
 
     def net_attraction(self, distance: ArrayLike) -> FloatArray:
         """a - b exp(-r^2 / c); see `Interaction.net_attraction`."""
         square = np.square(self._distances(distance))
-        decay = np.exp(-square / self.spread)
+        with np.errstate(over="ignore"):  # exp(-inf) is 0
+            decay = np.exp(-square / self.spread)
         return np.asarray(self.attraction - self.repulsion * decay)
 
     def potential(self, distance: ArrayLike) -> FloatArray:
@@ -168,7 +174,8 @@ class BoundedRepulsion(Interaction):
         square = np.square(self._distances(distance))
         height = 0.5 * self.repulsion * self.spread
         pull = 0.5 * self.attraction * square
-        return np.asarray(pull + height * np.exp(-square / self.spread))
+        with np.errstate(over="ignore"):
+            return np.asarray(pull + height * np.exp(-square / self.spread))
 
     @property
     def rest_distance(self) -> FloatArray:
@@ -208,7 +215,7 @@ class UnboundedRepulsion(Interaction):
     def net_attraction(self, distance: ArrayLike) -> FloatArray:
         """a - b / r^2, -infinity where r = 0; see `Interaction.net_attraction`."""
         square = np.square(self._distances(distance))
-        with np.errstate(divide="ignore", invalid="ignore"):
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             # Without repulsion there is none in one place either, where b / r^2 is 0 / 0.
             repulsion = np.where(self.repulsion == 0.0, 0.0, self.repulsion / square)
         return np.asarray(self.attraction - repulsion)
@@ -231,6 +238,17 @@ class UnboundedRepulsion(Interaction):
         return 0.0
 
 
+def _checked(name: str, values: ArrayLike) -> FloatArray:
+    """Numbers whose squares are finite, as an array."""
+    array = validation.real_array(name, values)
+    if np.abs(array).max() > FARTHEST:
+        raise ValueError(
+            f"{name} must hold numbers of at most {FARTHEST:g}, got "
+            f"{np.abs(array).max():g}; use another unit of length."
+        )
+    return array
+
+
 def check_interaction(interaction: object) -> None:
     """Check that something is an `Interaction`.
 
@@ -244,8 +262,7 @@ def check_interaction(interaction: object) -> None:
         )
 
 
-def _set(interaction: Interaction, name: str, *, or_zero: bool = True) -> None:
+def _set(interaction: Interaction, name: str, at_least: float = 0.0) -> None:
     """Check a parameter and keep it as an array that cannot be changed."""
-    end = {"at_least": 0.0} if or_zero else {"above": 0.0}
-    array = per_agent(name, getattr(interaction, name), None, infinite=False, **end)
+    array = per_agent(name, getattr(interaction, name), None, at_least=at_least)
     object.__setattr__(interaction, name, validation.read_only(array))

@@ -141,15 +141,15 @@ def of_links(
 @njit(error_model="numpy")
 def of_radius(
     cells: tuple[Any, ...],
-    radius: FloatArray,
+    reaches: FloatArray,
     law: tuple[Any, ...],
     force: FloatArray,
     block: int,
 ) -> None:
     """What those do that are closer than an agent's radius, in the order of the cells.
 
-    `cells` are the fields of `Cells`, and `radius` is sigma of each agent, `(n,)`, at most
-    that of the cells.
+    `cells` are the fields of `Cells`, and `reaches` is `squared_reach` of the radius sigma
+    of each agent, `(n,)`, which is at most that of the cells.
     """
     kind, attraction, repulsion, rate = law
     shape, first, agent, cell, place, _ = cells
@@ -159,7 +159,7 @@ def of_radius(
     weight = np.empty(BATCH)
     for at in range(block * BLOCK, min((block + 1) * BLOCK, n)):
         i = agent[at]
-        a, b, c, reach = attraction[i], repulsion[i], rate[i], radius[i] * radius[i]
+        a, b, c, reach = attraction[i], repulsion[i], rate[i], reaches[i]
         x0, x1, x2 = place[0, at], place[1, at], place[2, at]
         rest, column = divmod(cell[at], columns)
         plane, row = divmod(rest, rows)
@@ -251,21 +251,21 @@ def sum_links_in_parallel(
 
 @njit
 def sum_radius(
-    cells: tuple[Any, ...], radius: FloatArray, law: tuple[Any, ...], force: FloatArray
+    cells: tuple[Any, ...], reaches: FloatArray, law: tuple[Any, ...], force: FloatArray
 ) -> None:
     """Do what `of_radius` does for all blocks."""
     for block in range((len(force) + BLOCK - 1) // BLOCK):
-        of_radius(cells, radius, law, force, block)
+        of_radius(cells, reaches, law, force, block)
 
 
 @shared_among_threads
 @njit(parallel=True)
 def sum_radius_in_parallel(
-    cells: tuple[Any, ...], radius: FloatArray, law: tuple[Any, ...], force: FloatArray
+    cells: tuple[Any, ...], reaches: FloatArray, law: tuple[Any, ...], force: FloatArray
 ) -> None:
     """Do what `sum_radius` does, its blocks shared among threads."""
     kind, attraction, repulsion, rate = law
     shape, first, agent, cell, place, width = cells
     for block in prange((len(force) + BLOCK - 1) // BLOCK):
         grid = shape, first, agent, cell, place, width
-        of_radius(grid, radius, (kind, attraction, repulsion, rate), force, block)
+        of_radius(grid, reaches, (kind, attraction, repulsion, rate), force, block)

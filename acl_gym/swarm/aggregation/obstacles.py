@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from acl_gym.swarm.aggregation.profiles import for_each
+from acl_gym.swarm.rows import checked_positions
 from acl_gym.utils import validation
 from acl_gym.utils.compiling import njit
 from acl_gym.utils.typing import BoolArray, FloatArray
@@ -128,14 +129,15 @@ class Obstacles:
         return stopped
 
     def _checked(self, positions: FloatArray) -> FloatArray:
-        x = np.ascontiguousarray(positions, dtype=np.float64)
+        x = validation.as_array(positions)
         dim = np.shape(self.centres)[1]
-        if x.ndim != 2 or x.shape[1] != dim:
+        if x is None or x.ndim != 2 or x.shape[1] != dim:
+            got = validation.shown(positions) if x is None else f"shape {x.shape}"
             raise ValueError(
                 f"positions must have {dim} coordinates each, as the obstacles have, "
-                f"got an array of shape {x.shape}."
+                f"got {got}."
             )
-        return x
+        return checked_positions(x)
 
 
 @njit

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from acl_gym.swarm.aggregation.interaction import Parameter
-from acl_gym.swarm.rows import per_agent
+from acl_gym.swarm.rows import all_finite, per_agent
 from acl_gym.utils import validation
 from acl_gym.utils.compiling import njit
 from acl_gym.utils.typing import FloatArray
@@ -48,7 +48,9 @@ class Particles(ABC):
             A new array of the shape of `x`.
 
         Raises:
-            ValueError: states, inputs and parameters are not those of as many agents.
+            TypeError: `time_step` is not a number.
+            ValueError: it is out of range, a state or an input is not finite, or states,
+                inputs and parameters are not those of as many agents.
         """
 
 
@@ -79,8 +81,9 @@ class Kinematic(Particles):
 
     def advance(self, x: FloatArray, u: FloatArray, time_step: float) -> FloatArray:
         """See `Particles.advance`."""
-        x, u = _checked(self, x, u)
-        return np.asarray(x + time_step * shortened(u, self.max_speed))
+        x, u = _checked(self, x, u, time_step)
+        with np.errstate(over="ignore"):  # `Field` refuses positions that are infinite
+            return np.asarray(x + time_step * shortened(u, self.max_speed))
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -116,7 +119,7 @@ class PointMass(Particles):
 
     def advance(self, x: FloatArray, u: FloatArray, time_step: float) -> FloatArray:
         """See `Particles.advance`."""
-        x, u = _checked(self, x, u)
+        x, u = _checked(self, x, u, time_step)
         n, dim = u.shape
         force = shortened(u, self.max_force)
         moved = np.empty((n, 2 * dim))
@@ -225,10 +228,12 @@ def _check_sizes(particles: Particles, names: tuple[str, ...], n: int) -> None:
 
 
 def _checked(
-    particles: Particles, x: FloatArray, u: FloatArray
+    particles: Particles, x: FloatArray, u: FloatArray, time_step: float
 ) -> tuple[FloatArray, FloatArray]:
     """States and inputs of as many agents as the parameters, in C order."""
-    states, inputs = (np.ascontiguousarray(each, dtype=np.float64) for each in (x, u))
+    if type(time_step) is not float or not 0.0 < time_step < math.inf:
+        validation.number("time_step", time_step, above=0)
+    states, inputs = _numbers("x", x), _numbers("u", u)
     if inputs.ndim != 2:
         raise ValueError(
             f"u must have shape (n, dim), a row for each agent, got {inputs.shape}."
@@ -241,6 +246,19 @@ def _checked(
         )
     particles.check(n)
     return states, inputs
+
+
+def _numbers(name: str, values: FloatArray) -> FloatArray:
+    """Finite numbers as kernels take them, not copied if they are so already."""
+    array = validation.as_array(values)
+    if array is not None and array.dtype.kind in "iuf":
+        rows = validation.float64(array)
+        if all_finite(rows):
+            return rows
+    raise ValueError(
+        f"{name} must be an array of finite real numbers, got "
+        f"{validation.shown(values)}."
+    )
 
 
 def _set(

@@ -9,10 +9,12 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from acl_gym.swarm.rows import FARTHEST
 from acl_gym.utils import validation
 from acl_gym.utils.compiling import njit
 from acl_gym.utils.typing import FloatArray
@@ -138,7 +140,7 @@ class Gaussians(Profile):
 
     def _evaluated(self, positions: FloatArray) -> tuple[FloatArray, FloatArray]:
         x = _checked(positions, np.asarray(self.centres)[0])
-        rows = np.ascontiguousarray(x, dtype=np.float64).reshape(-1, x.shape[-1])
+        rows = x.reshape(-1, x.shape[-1])
         value, gradient = np.empty(len(rows)), np.empty_like(rows)
         depths, widths = np.asarray(self.depths), np.asarray(self.widths)
         sum_gaussians(rows, self.centres, depths, widths, value, gradient)
@@ -187,13 +189,61 @@ def for_each(name: str, values: ArrayLike, count: int) -> FloatArray:
     return np.array(np.broadcast_to(array, count))
 
 
+class HasGradient(Protocol):
+    """A `Profile`, or `Obstacles`."""
+
+    def gradient(self, positions: FloatArray) -> FloatArray:
+        """The gradient at `(n, dim)` positions, an array of the same shape."""
+
+
+def checked_gradient(
+    part: HasGradient, positions: FloatArray, finite: bool = True
+) -> FloatArray:
+    """The gradient of a profile, which may be the user's own, or of obstacles.
+
+    Args:
+        part: whose; it is given a copy of the positions, which it may change.
+        positions: where, `(n, dim)`.
+        finite: whether to refuse gradients that are NaN or infinite.
+
+    Raises:
+        ValueError: the gradient has another shape, or is not finite.
+    """
+    with np.errstate(over="ignore", invalid="ignore"):  # which is found below
+        returned = part.gradient(positions.copy())
+    gradient = validation.as_array(returned)
+    kind = type(part).__name__
+    if (
+        gradient is None
+        or gradient.shape != positions.shape
+        or gradient.dtype.kind not in "biuf"
+    ):
+        raise ValueError(
+            f"the gradient of {kind} must be real numbers of the shape of the positions, "
+            f"{positions.shape}, got {validation.shown(returned)}; let it return a row "
+            "for each position."
+        )
+    if finite and not np.isfinite(gradient).all():
+        row = int(np.flatnonzero(~np.isfinite(gradient).all(axis=-1))[0])
+        raise ValueError(
+            f"the gradient of {kind} must be finite, got {gradient[row]} at the position "
+            f"{positions[row]}; let it return finite numbers everywhere."
+        )
+    return gradient
+
+
 def _checked(positions: FloatArray, centre: ArrayLike) -> FloatArray:
-    x = np.asarray(positions)
+    x = validation.real_array("positions", positions)
     dim = np.size(centre)
     if x.ndim == 0 or x.shape[-1] != dim:
         raise ValueError(
             f"positions must have {dim} coordinates each, as the profile has, got an "
             f"array of shape {x.shape}."
+        )
+    if np.abs(x).max() > FARTHEST:
+        raise ValueError(
+            f"positions must be numbers of at most {FARTHEST:g}, got "
+            f"{np.abs(x).max():g}; use another unit of length."
         )
     return x
 

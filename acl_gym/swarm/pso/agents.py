@@ -215,12 +215,12 @@ def _observed(y: Any, n: int, d: int | None) -> tuple[FloatArray, FloatArray]:
 
 def _rows(name: str, rows: Any) -> FloatArray:
     """An array of numbers as kernels take it, not copied if it is one already."""
-    if type(rows) is np.ndarray and rows.dtype == np.float64 and rows.ndim:
-        return np.ascontiguousarray(rows)
+    if type(rows) is np.ndarray and rows.dtype.kind == "f" and rows.ndim:
+        return validation.float64(rows)
     array = validation.as_array(rows)
     if array is None or array.dtype.kind not in "biuf" or array.ndim == 0:
         raise ValueError(
             f"{name} must be real numbers with a row for each particle, got "
             f"{validation.shown(rows)}."
         )
-    return np.ascontiguousarray(array, np.float64)
+    return validation.float64(array)

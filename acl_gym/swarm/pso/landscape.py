@@ -17,6 +17,8 @@ from acl_gym.swarm.rows import FARTHEST
 from acl_gym.utils import validation
 from acl_gym.utils.typing import FloatArray
 
+_FLOAT64 = np.dtype(np.float64)
+
 
 class ExplosionError(OverflowError):
     """A position of a swarm is beyond `FARTHEST`, or a velocity beyond all floats."""
@@ -167,7 +169,7 @@ class Landscape(Environment):
                 f"u must be real numbers of the shape {shape}, a row for each particle, "
                 f"got {validation.shown(u)}."
             )
-        u = np.ascontiguousarray(given, np.float64)
+        u = validation.float64(given)
         if u.shape == shape and np.isnan(u).any():
             particle = int(np.flatnonzero(np.isnan(u).any(axis=1))[0])
             raise ValueError(
@@ -197,12 +199,19 @@ class Landscape(Environment):
         """
         w, d = self._w[rows], self.space.d
         _check_shape(u, (w.size, d))
-        x = self.x[rows]
-        if x.shape != (w.size, 2 * d):
+        shape = (self.n_particles, 2 * d)
+        if (
+            type(self.x) is not np.ndarray
+            or self.x.shape != shape
+            or self.x.dtype != _FLOAT64
+            or not self.x.flags.writeable
+        ):
             raise ValueError(
-                f"x must have {2 * d} columns and a row for each of the "
-                f"{self.n_particles} particles, got shape {self.x.shape}."
+                f"x must be a float64 array of shape {shape} that can be written to, got "
+                f"{validation.shown(self.x)}; change entries of x, or assign "
+                "np.array(x, dtype=float)."
             )
+        x = self.x[rows]
         finite = kernels.move(
             x,
             u,

@@ -97,7 +97,8 @@ class Objective:
                     f"{validation.shown(returned)}; pass vectorized=False if it takes "
                     "one point at a time."
                 )
-            values = array.astype(np.float64)
+            values = validation.float64(array)
+            values = values.copy() if values is array else values
         if values.shape != (n,):
             raise ValueError(
                 f"the function must return an array of shape ({n},) for an array of {n} "
@@ -115,7 +116,7 @@ class Objective:
                 f"{validation.shown(returned)}; leave vectorized=True if it takes an "
                 "array of points."
             )
-        return float(array.reshape(()))
+        return float(validation.float64(array).reshape(()))
 
 
 def _level_of_caller() -> int:

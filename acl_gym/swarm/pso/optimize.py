@@ -172,7 +172,7 @@ def minimize(
     result = search.result()
     found = math.isfinite(result.fun)
     if not found:
-        message += f" No point with a finite value was found: fun is {result.fun}."
+        message += f" {_why_not_finite(result)}"
     result.message = message
     result.success = found and not exploded and (target is None or result.fun <= target)
     if history:
@@ -182,6 +182,20 @@ def minimize(
             for name, column in zip(names, zip(*rows, strict=True), strict=True)
         }
     return result
+
+
+def _why_not_finite(result: OptimizeResult) -> str:
+    """What a message says of a least value that is infinite."""
+    if result.fun > 0:
+        return (
+            "The function must be finite at some point, got inf or NaN at all "
+            f"{result.nfev} points; change the bounds, or give an x0 where it is finite."
+        )
+    return (
+        f"The least value must be finite, got -inf at x = {validation.shown(result.x)}; "
+        "change the bounds so that the function has a minimum, or let it return inf "
+        "where it is not defined."
+    )
 
 
 class _Search:

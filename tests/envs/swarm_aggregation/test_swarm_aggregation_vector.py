@@ -225,7 +225,7 @@ def test_bad_actions_and_arguments() -> None:
         make("Sometimes")
     with pytest.raises(ValueError, match="at least 1, or -1 or None"):
         make(limit=0)
-    with pytest.raises(ValueError, match="agents must fit into"):
+    with pytest.raises(ValueError, match=r"agents with .* must fit into"):
         SwarmAggregationVectorEnv(10**12)
     assert SwarmAggregationVectorEnv(2, max_episode_steps=-1).max_episode_steps is None
 
@@ -301,3 +301,21 @@ def test_a_colony_learns_to_follow_the_field(mode: str) -> None:
     colony = ReturningACL(env, grid, seed=0, max_steps=100)
     colony.learn(trials=30)
     assert np.mean([row["ants_cost"] for row in colony.history[-10:]]) < 180.0
+
+
+@pytest.mark.parametrize("rows", [3, 5])
+def test_rows_of_agents_that_are_not_reset_may_be_anything(rows: int) -> None:
+    """With a row for each slot, and with one for each agent of the world."""
+    env = gym.make_vec("acl_gym/SwarmAggregation-v0", num_envs=3, followers=2)
+    env.reset(seed=0)
+    before = env.unwrapped.states
+    given = np.full((rows, 2), np.nan)
+    given[1] = [1.0, 2.0]
+    mask = np.array([False, True, False])
+    env.reset(options={"state": given, "reset_mask": mask})
+    after = env.unwrapped.states
+    assert after[1].tolist() == [1.0, 2.0]
+    np.testing.assert_array_equal(np.delete(after, 1, 0), np.delete(before, 1, 0))
+    with pytest.raises(ValueError, match="must lie within"):
+        env.reset(options={"state": given, "reset_mask": ~mask})
+    env.close()

@@ -15,6 +15,7 @@ from acl_gym.envs.swarm_aggregation import SwarmAggregation
 from acl_gym.envs.swarm_aggregation.kernels import look_around
 from acl_gym.envs.swarm_aggregation.system import LEAST, MOST, MOST_WITHOUT_RADIUS
 from acl_gym.envs.swarm_aggregation.world import World
+from acl_gym.swarm import Radius
 from acl_gym.swarm.cells import sort_into_cells
 from tests.envs.swarm_aggregation import reference_world as reference
 
@@ -262,7 +263,7 @@ def test_directions() -> None:
 
 
 def test_no_memory_for_so_many() -> None:
-    with pytest.raises(ValueError, match="agents must fit into"):
+    with pytest.raises(ValueError, match=r"agents with .* must fit into"):
         World(SwarmAggregation(), 10**12, 0)
 
 
@@ -359,3 +360,26 @@ def test_many_agents_that_hear_all_others_are_refused() -> None:
             ValueError, match=r"at most 20,000 agents where .* set sensing"
         ):
             World(system, learners, followers)
+
+
+def test_neighbours_that_are_observed_count_as_memory() -> None:
+    with pytest.raises(ValueError, match=r"links must fit .* or a smaller nearest"):
+        World(SwarmAggregation(nearest=1000), 10**6, 0)
+
+
+COORDINATES = st.floats(1e-3, 3.0)
+
+
+@given(COORDINATES, COORDINATES)
+def test_a_pair_at_the_limit_does_not_collide(a: float, b: float) -> None:
+    """As in a `Radius` channel: what counts is the distance, not its square."""
+    x = np.array([[0.0, 0.0], [a, b]])
+    at = math.sqrt(a * a + b * b)
+    for limit, hit in ((at, 0), (math.nextafter(at, math.inf), 1)):
+        world = World(
+            SwarmAggregation(collision_distance=limit, sensing_radius=limit), 2, 0
+        )
+        world.start(RNG(0), x)
+        assert world.look().collisions.tolist() == [hit, hit]
+        assert world.look().heard.tolist() == [hit, hit]
+        assert Radius(limit, include_self=False).links(x).n_links == 2 * hit

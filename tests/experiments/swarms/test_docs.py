@@ -1,4 +1,4 @@
-"""The program of docs/swarms-and-channels.md prints what the page says."""
+"""The program of docs/swarms/delays.md prints what the page says."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-PAGE = Path(__file__).resolve().parents[3] / "docs" / "swarms-and-channels.md"
+PAGE = Path(__file__).resolve().parents[3] / "docs" / "swarms" / "delays.md"
 
 
 @pytest.mark.skipif(not PAGE.exists(), reason="not in the checkout")

@@ -11,6 +11,7 @@ import pytest
 from acl_gym.swarm import (
     Delayed,
     Everyone,
+    Inbox,
     Links,
     Lossy,
     Nearest,
@@ -24,6 +25,7 @@ from acl_gym.swarm.aggregation import (
     Field,
     Obstacles,
     PointMass,
+    Profile,
     Quadratic,
     UnboundedRepulsion,
     bounds,
@@ -379,3 +381,97 @@ def test_arrays_that_do_not_fit_each_other() -> None:
     ):
         with pytest.raises(ValueError, match="must be numbers or arrays of one shape"):
             call()
+
+
+class Sloped(Profile):
+    """A profile whose gradient a test gives."""
+
+    def __init__(self, gradient: Any) -> None:
+        self._gradient = gradient
+
+    def value(self, positions: Any) -> Any:
+        return np.zeros(len(positions))
+
+    def gradient(self, positions: Any) -> Any:
+        return self._gradient(positions)
+
+
+@pytest.mark.parametrize(
+    ("gradient", "message"),
+    [
+        (lambda x: None, "the gradient of Sloped must be real numbers of the shape"),
+        (lambda x: [1.0, 0.0], "the gradient of Sloped must be real numbers"),
+        (lambda x: [[1.0], [2.0, 3.0]], "the gradient of Sloped must be real numbers"),
+        (lambda x: x.astype(complex), "the gradient of Sloped must be real numbers"),
+        (lambda x: x * math.nan, "the gradient of Sloped must be finite, got"),
+    ],
+)
+def test_gradients_of_a_users_profile_are_checked(gradient: Any, message: str) -> None:
+    x = [[0.0, 0.0], [1.0, 0.0]]
+    with pytest.raises(ValueError, match=message):
+        flow(x, BoundedRepulsion(), [0.1], Sloped(gradient))
+
+
+def spoil(positions: np.ndarray) -> np.ndarray:
+    positions[:] = 7.0
+    return np.zeros_like(positions)
+
+
+def test_a_profile_that_changes_its_argument_moves_nobody() -> None:
+    x = np.array([[0.0, 0.0], [1.0, 0.0]])
+    without = flow(x, BoundedRepulsion(), [0.1])
+    np.testing.assert_array_equal(
+        flow(x, BoundedRepulsion(), [0.1], Sloped(spoil)), without
+    )
+    field = Field(x, profile=Sloped(spoil))
+    field.reset(np.random.default_rng(0))
+    field.observe()
+    np.testing.assert_array_equal(field.positions, x)
+
+
+def test_equal_times_have_equal_positions() -> None:
+    x = [[0.0, 0.0], [1.0, 0.0]]
+    once = flow(x, BoundedRepulsion(), [0.0, 0.1])
+    twice = flow(x, BoundedRepulsion(), [0.0, 0.0, 0.1, 0.1])
+    np.testing.assert_array_equal(twice, once[[0, 0, 1, 1]])
+
+
+def test_nothing_drives_agents_in_one_place_apart() -> None:
+    """b / r^2 has no direction there, and its flow no solution that would last."""
+    x = np.array([[0.0, 1.0], [2.0, 1.0], [-0.0, 1.0]])
+    apart = Links.from_lists([[1], [0, 2], [1]])
+    near = Links.from_lists([[], [], [0]])
+    only_the_first = UnboundedRepulsion(repulsion=[0.6, 0.0, 0.0])
+    only_the_second = UnboundedRepulsion(repulsion=[0.0, 0.6, 0.0])
+    for links, law in (
+        (None, UnboundedRepulsion()),
+        (Links.everyone(3, include_self=False), only_the_first),
+        (near, UnboundedRepulsion()),
+    ):
+        with pytest.raises(ValueError, match="drives apart must differ"):
+            flow(x, law, [0.1], links=links)
+    for links, law in (
+        (apart, UnboundedRepulsion()),
+        (None, UnboundedRepulsion(repulsion=0.0)),
+        (None, only_the_second),
+        (None, BoundedRepulsion()),
+    ):
+        assert np.isfinite(flow(x, law, [0.1], links=links)).all()
+
+
+class Deaf(Everyone):
+    """A channel that drops the message that agents need."""
+
+    def deliver(self, sent: Any, x: Any, rng: Any) -> Inbox:
+        return Inbox(self.links(x), {})
+
+
+def test_a_channel_that_drops_a_message() -> None:
+    with pytest.raises(ValueError, match="there must be a message 'position', got"):
+        run(AggregatingAgents(), Field(3), 1, 0, Deaf())
+
+
+@pytest.mark.parametrize("tolerance", [0.0, 1e-300, 5e-324, 2.0, 1e308, math.nan])
+def test_tolerances_that_no_solver_can_keep(tolerance: float) -> None:
+    with pytest.raises(ValueError, match=r"tolerance must lie in \[1e-15, 1\]"):
+        flow([[0.0], [1.0]], BoundedRepulsion(), [0.1], tolerance=tolerance)

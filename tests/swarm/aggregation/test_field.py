@@ -433,3 +433,97 @@ def test_nobody_is_left_inside_obstacles_that_overlap(
         between = on_the_way[~stopped]
         distance = np.linalg.norm(between[:, None] - table[:, :2], axis=2)
         assert (distance >= table[:, 2] * (1 - 1e-8)).all()
+
+
+def test_nobody_is_put_into_an_obstacle() -> None:
+    """Agents would be moved without a word."""
+    with pytest.raises(
+        ValueError, match=r"start must lie outside the obstacles, got .* for agent 1"
+    ):
+        Field([[2.0, 2.0], [0.1, 0.0]], obstacles=ROCKS)
+    field = Field([[2.0, 2.0], [1.0, 0.0]], obstacles=ROCKS)  # the second at an edge
+    field.reset(RNG(0))
+    assert field.x.tolist() == [[2.0, 2.0], [1.0, 0.0]]
+
+
+def test_bounds_too_wide_to_draw_from() -> None:
+    with pytest.raises(ValueError, match=r"both within 1e\+150 of 0, got \(-1e\+308"):
+        Field(3, bounds=(-1e308, 1e308))
+
+
+class Unruly(Kinematic):
+    """Particles that move as a test says."""
+
+    def advance(self, x: Any, u: Any, time_step: float) -> Any:
+        return self.__dict__["moved"](x)
+
+
+@pytest.mark.parametrize(
+    ("moved", "message"),
+    [
+        (lambda x: None, "what Unruly.advance returns must be an array of numbers"),
+        (lambda x: x[:1], "what Unruly.advance returns must be an array of numbers"),
+        (lambda x: x * math.nan, "positions must be numbers of at most 1e"),
+        (lambda x: x + 1e200, "positions must be numbers of at most 1e"),
+    ],
+)
+def test_particles_of_ones_own_are_checked(moved: Any, message: str) -> None:
+    particles = Unruly()
+    particles.__dict__["moved"] = moved
+    field = Field([[0.0, 1.0], [1.0, 0.0]], particles)
+    field.reset(RNG(0))
+    with pytest.raises(ValueError, match=message):
+        field.step(np.zeros((2, 2)), RNG(0))
+
+
+def test_particles_that_change_their_argument_do_not_jump_through_obstacles() -> None:
+    def leap(x: np.ndarray) -> np.ndarray:
+        x += [4.0, 0.0]
+        return x
+
+    particles = Unruly()
+    particles.__dict__["moved"] = leap
+    rock = Obstacles([[0.0, 0.0]], 1.0)
+    field = Field([[-2.0, 0.0]], particles, obstacles=rock)
+    field.reset(RNG(0))
+    field.step(np.zeros((1, 2)), RNG(0))
+    np.testing.assert_allclose(field.x, [[-1.0, 0.0]], atol=1e-12)
+
+
+def test_particles_without_a_number_of_variables() -> None:
+    particles = Unruly()
+    particles.__dict__["variables"] = 3
+    with pytest.raises(
+        ValueError, match="variables of Unruly must be at most 2, got 3"
+    ):
+        Field(2, particles)
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        ROCKS.gradient,
+        ROCKS.inside,
+        VALLEYS.value,
+        lambda x: Quadratic([0.0, 0.0]).gradient(x),
+        lambda x: PointMass().advance(np.zeros((1, 4)), x, 0.1),
+    ],
+)
+@pytest.mark.parametrize(
+    "x", [[[math.nan, 0.0]], [["a", "b"]], None, [[1.0, 0.0], [1.0]]], ids=repr
+)
+def test_no_nan_and_nothing_odd_goes_through(call: Any, x: Any) -> None:
+    with pytest.raises(ValueError, match=r"(positions|u) must"):
+        call(x)
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [{"time_step": 1e308}, {"profile": Quadratic([9.0, 9.0], 1e308)}],
+    ids=["time_step", "profile"],
+)
+def test_what_overflows_ends_in_an_error(settings: dict[str, Any]) -> None:
+    field = Field([[0.0, 0.0], [1.0, 1.0]], **settings)
+    field.reset(RNG(0))
+    with pytest.raises(ValueError, match=r"positions must be numbers|must be finite"):
+        field.step(-field.observe()["slope"] + [3.0, 3.0], RNG(0))

@@ -84,7 +84,7 @@ def test_what_is_no_parameter_is_refused(
 
 
 def test_a_spread_is_positive() -> None:
-    with pytest.raises(ValueError, match=r"spread must lie in \(0, inf\), got 0"):
+    with pytest.raises(ValueError, match=r"spread must lie in \[1e-300, inf\), got 0"):
         BoundedRepulsion(spread=0.0)
 
 
@@ -101,3 +101,30 @@ def test_parameters_are_for_as_many_agents_as_there_are() -> None:
     assert kept.coefficients(2).attraction.tolist() == [1.0, 2.0]
     with pytest.raises(ValueError, match="read-only"):
         kept.attraction[0] = 3.0  # type: ignore[index]
+
+
+@BOTH
+@pytest.mark.parametrize(
+    "bad", [math.nan, math.inf, 1e200, 1j, "near", None, [[1.0], [1.0, 2.0]]], ids=repr
+)
+def test_distances_that_are_none_are_refused(
+    interaction: Interaction, bad: Any
+) -> None:
+    for call in (interaction.net_attraction, interaction.potential):
+        with pytest.raises(ValueError, match="distance must"):
+            call(bad)
+    with pytest.raises(ValueError, match="y must"):
+        interaction([bad, 0.0])
+
+
+@BOTH
+def test_distances_are_not_negative(interaction: Interaction) -> None:
+    with pytest.raises(ValueError, match="distance must be >= 0, got -1"):
+        interaction.net_attraction([1.0, -1.0])
+
+
+@BOTH
+def test_extreme_distances_have_finite_pushes(interaction: Interaction) -> None:
+    assert np.isfinite(interaction.potential([1e-160, 1e150])).all()
+    assert interaction.net_attraction(1e150) == 1.0
+    assert not np.isnan(interaction.net_attraction(1e-160))

@@ -380,7 +380,7 @@ def test_some_particles_move_by_as_many_inputs_only() -> None:
         with pytest.raises(ValueError, match=r"u must have the shape \(1, 2\)"):
             landscape.move(slice(0, 1), u)
     landscape.x = landscape.x[:, :3]
-    with pytest.raises(ValueError, match="x must have 4 columns"):
+    with pytest.raises(ValueError, match="x must be a float64 array of shape"):
         landscape.move(slice(0, 1), np.ones((1, 2)))
 
 
@@ -495,3 +495,20 @@ def test_the_warning_of_nan_names_the_line_of_the_caller() -> None:
         with pytest.warns(RuntimeWarning, match="returned NaN") as caught:
             search()
         assert caught[0].filename == __file__
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda x: x.astype(int),
+        lambda x: x.tolist(),
+        lambda x: np.broadcast_to(0.0, x.shape),
+        lambda x: x.astype(">f8"),
+        lambda x: None,
+    ],
+)
+def test_states_that_no_kernel_could_move(change: Any) -> None:
+    landscape = begun(Landscape(sphere, UNIT, n_particles=3))
+    landscape.x = change(landscape.x)
+    with pytest.raises(ValueError, match="x must be a float64 array of shape"):
+        landscape.step(np.zeros((3, 2)), np.random.default_rng(0))

@@ -273,7 +273,9 @@ class Links:
         Raises:
             ValueError: no memory is large enough, where everyone hears everyone.
         """
-        return self.sender, self.offsets
+        if self.is_implicit:
+            return self.sender, self.offsets
+        return self._sender, self._offsets
 
     def subset(self, kept: ArrayLike) -> Links:
         """Return some of these links.

@@ -205,10 +205,13 @@ def float64(array: NDArray[Any]) -> NDArray[np.float64]:
     Returns:
         A plain array in C order, of float64 in the byte order of the machine.
     """
-    if type(array) is np.ndarray and array.dtype == _FLOAT64:
+    # NumPy has one object for this type in the byte order of the machine, and comparing
+    # objects takes a third of the time of comparing types; `np.require` takes ten times
+    # as long, and gives back what passes through here.
+    if type(array) is np.ndarray and array.dtype is _FLOAT64:
         flags = array.flags
-        if flags.c_contiguous and flags.aligned:
-            return array  # a tenth of the time of `np.require`
+        if flags.carray or (flags.c_contiguous and flags.aligned):
+            return array
     with np.errstate(over="ignore"):
         return np.require(np.asarray(array), np.float64, ("C", "A"))
 

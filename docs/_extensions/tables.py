@@ -1,6 +1,7 @@
 """Tables that hold text are marked, so that narrow screens can stack their cells.
 
-A table of figures must keep its columns, and scrolls in a box where it is too wide. A
+A table of figures keeps its columns, and scrolls in a box where it is too wide; its
+short cells are not broken, since a break after the hyphen of 1e-16 misleads. A
 table of text is easier to read one cell below the other. `_static/site.css` and
 `_static/wide.js` do both.
 """
@@ -18,6 +19,9 @@ LONG = 40
 MOST_COLUMNS = 5
 CLASS = "text-table"
 
+SHORT = 28
+"""Characters of a figure and its interval, at most."""
+
 
 def setup(app: Sphinx) -> ExtensionMetadata:
     """Mark tables when a page has been read; load the script on each page."""
@@ -33,6 +37,11 @@ def _mark(app: Sphinx, document: nodes.document) -> None:
             for cell in table.findall(nodes.entry):
                 if not _length(cell):
                     cell["classes"].append("empty")
+        else:
+            for body in table.findall(nodes.tbody):
+                for cell in body.findall(nodes.entry):
+                    if _length(cell) <= SHORT:
+                        cell["classes"].append("short")
 
 
 def holds_text(table: nodes.table) -> bool:

@@ -34,7 +34,7 @@ from acl_gym import (
     evaluate_policy_cost,
     fuzzy_q_iteration,
 )
-from acl_gym.agents.base import time_limit
+from acl_gym.envs.limits import time_limit
 from acl_gym.policies import InterpolatedPolicy, TablePolicy
 from acl_gym.utils.text import replace_unprintable_letters
 

@@ -10,7 +10,7 @@ from typing import Any
 
 from gymnasium.error import ClosedEnvironmentError
 
-from acl_gym.envs.wrappers.executors import Hire, Worker, WorkerLostError
+from acl_gym.envs.wrappers.executors import GRACE, Hire, Worker, WorkerLostError
 from acl_gym.envs.wrappers.hosting import Failure, Repeat, Request
 
 logger = logging.getLogger("acl_gym")
@@ -20,9 +20,6 @@ MOST_LOSSES = 3
 
 STARTING_TIME = 60.0
 """Seconds in which a new worker must have made its environments, if there is a timeout."""
-
-_GRACE = 5.0
-"""Seconds in which workers that are dismissed may close their environments."""
 
 Question = tuple[str, tuple[Any, ...]]
 """The name of a method of `Host`, and its arguments."""
@@ -168,7 +165,7 @@ class Crew:
             member.worker = None
         for worker in working:
             worker.dismiss()
-        end = time.monotonic() + _GRACE
+        end = time.monotonic() + GRACE
         for worker in working:
             worker.stop(max(0.0, end - time.monotonic()))
 

@@ -29,8 +29,9 @@ EXECUTORS = ("processes", "ray", "serial")
 _LOOK_EVERY = 1.0
 """Seconds between looks at whether a silent process is still alive."""
 
-_GRACE = 1.0
-"""Seconds in which a process whose parent has died may close its environments."""
+GRACE = 5.0
+"""Seconds in which a worker that is dismissed, or whose parent has died, may close its
+environments."""
 
 
 _TOO_LATE = "gave no answer in time"
@@ -183,7 +184,7 @@ def _how_it_ended(code: int | None) -> str:
 
 def _serve(connection: Any, parent: int, first: int, env_fns: bytes) -> None:
     """The life of a process that is a worker."""
-    serve_parent(parent, _GRACE)
+    serve_parent(parent, GRACE)
     # For environments with processes of their own: those of the system, not loky's.
     multiprocessing.set_start_method(None, force=True)
     host = Host(first, partial(unpacked_env_fns, env_fns))

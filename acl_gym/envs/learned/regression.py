@@ -163,7 +163,8 @@ class Fit:
         n_draws: draws from the posterior beside the mean.
         seed: of the draws.
         begin: the fit of fewer data. Scales are searched for and kinds compared anew
-            only where there are `AGAIN` times as many data as at the last time.
+            only where there are `AGAIN` times as many data as at the last time; until
+            then "auto" takes the kind of that fit.
 
     Attributes:
         regression: what predicts.
@@ -212,11 +213,16 @@ class Fit:
         self.scales: list[Scales]
         self.searched_at: int
         count, n_features = outputs[0].every.size, outputs[0].rows.shape[1]
-        if begin is not None and begin.scales[0].lengths.size != n_features:
+        if begin is not None and (
+            len(begin.scales) != len(outputs)
+            or begin.scales[0].lengths.size != n_features
+        ):
             begin = None
         if begin is not None and count < AGAIN * begin.searched_at:
             self.scales, self.searched_at = begin.scales, begin.searched_at
-            kinds = [begin.regression.name if isinstance(kind, str) else kind]
+            known = begin.regression.name
+            again = kind == "auto" and known in KINDS  # else it is somebody's object
+            kinds = [known] if again else _candidates(kind, count)
         else:
             self.searched_at = count
             self.scales = [

@@ -59,7 +59,9 @@ def test_settings_do_not_change() -> None:
 @pytest.mark.parametrize("settings", [DQNSettings, A2CSettings, PPOSettings])
 @pytest.mark.parametrize("layers", [8, "88", None])
 def test_hidden_layers_must_be_a_sequence(settings: Any, layers: Any) -> None:
-    with pytest.raises(TypeError, match=r"net_arch must be a sequence .*\(64, 64\), got"):
+    with pytest.raises(
+        TypeError, match=r"net_arch must be a sequence .*\(64, 64\), got"
+    ):
         settings(net_arch=layers)
 
 
@@ -72,8 +74,12 @@ def test_hidden_layers_must_be_a_sequence(settings: Any, layers: Any) -> None:
         (make_ppo, PPOSettings, {}),
     ],
 )
-def test_settings_of_another_model_are_refused(make: Any, kind: Any, other: Any) -> None:
-    with pytest.raises(TypeError, match=f"settings must be {kind.__name__} or None, got"):
+def test_settings_of_another_model_are_refused(
+    make: Any, kind: Any, other: Any
+) -> None:
+    with pytest.raises(
+        TypeError, match=f"settings must be {kind.__name__} or None, got"
+    ):
         make("acl_gym/Pendulum-v0", other)
 
 

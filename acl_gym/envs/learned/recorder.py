@@ -162,7 +162,10 @@ class Recorder:
                 f"a row for each slot, got {validation.shown(actions)}; check the policy."
             )
         if discrete:
-            first, last = int(self._space.start), int(self._space.start + self._space.n) - 1
+            first, last = (
+                int(self._space.start),
+                int(self._space.start + self._space.n) - 1,
+            )
             wrong = (array < first) | (array > last)
             expected = f"in {first}..{last}"
         else:
@@ -182,7 +185,9 @@ class Recorder:
         Raises:
             ValueError: infos do not hold it.
         """
-        found = validation.as_array(None if observations is None else observations[slot])
+        found = validation.as_array(
+            None if observations is None else observations[slot]
+        )
         if (
             found is None
             or found.shape != (self._size,)

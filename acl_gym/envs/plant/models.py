@@ -33,7 +33,8 @@ class Model:
     def __init__(self, system: Any, one_by_one: bool = False) -> None:
         self.system, self.one_by_one = system, one_by_one
         timebase = system.dt
-        # 0 and None are continuous time, True is discrete without a sampling time.
+        # 0 and None mean continuous time; True means discrete time without a sampling
+        # time.
         self.discrete_time = timebase is True or bool(timebase)
         self.sampling_time = (
             float(timebase) if timebase and timebase is not True else None
@@ -45,7 +46,7 @@ class Model:
         """Check that the system has parameters of these names.
 
         Raises:
-            ValueError: it has not.
+            ValueError: it lacks one of them.
         """
         known = () if self._is_linear else tuple(getattr(self.system, "params", ()))
         unknown = [name for name in names if name not in known]

@@ -77,7 +77,7 @@ class WaitingSlots(VectorEnv[Any, Any, NDArray[Any]]):
         Raises:
             TypeError: a seed is not an integer, or the mask no bool array.
             ValueError: a seed is negative, there is not one for each slot, the mask
-                fits not, or an environment does not return what it should.
+                does not fit, or an environment does not return what it should.
             ResetNeeded: the first reset has a mask.
         """
         seeds = self._seeds(seed)

@@ -273,7 +273,9 @@ def test_a_regressor_that_is_named_is_taken_wherever_the_search_begins() -> None
 def test_dynamics_check_what_they_are_made_of() -> None:
     with pytest.raises(TypeError, match=r"transitions must be acl_gym\.Transitions"):
         LearnedDynamics(3)  # type: ignore[arg-type]
-    with pytest.raises(TypeError, match="begin must be a LearnedDynamics or None, got 3"):
+    with pytest.raises(
+        TypeError, match="begin must be a LearnedDynamics or None, got 3"
+    ):
         LearnedDynamics(pendulum(), begin=3)  # type: ignore[arg-type]
 
 

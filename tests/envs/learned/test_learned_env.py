@@ -319,7 +319,11 @@ def test_a_goal_far_from_the_data_is_warned_of() -> None:
         ({"pessimism": -1.0}, ValueError, "pessimism must lie in"),
         ({"max_episode_steps": 0}, ValueError, "max_episode_steps must be"),
         ({"inputs": [1.0]}, ValueError, "two actions or more, got the one input"),
-        ({"goal": [np.nan]}, ValueError, "goal must be an array of finite real numbers"),
+        (
+            {"goal": [np.nan]},
+            ValueError,
+            "goal must be an array of finite real numbers",
+        ),
         ({"goal": ["up"]}, ValueError, "goal must be an array of finite real numbers"),
         (
             {"goal": [0.0], "tolerance": [1, 2]},
@@ -370,7 +374,9 @@ def test_dynamics_must_be_those_of_the_plant() -> None:
     with pytest.raises(TypeError, match="dynamics must be a LearnedDynamics or None"):
         LearnedVectorEnv(pendulum(), dynamics=3, **how)  # type: ignore[arg-type]
     other = LearnedDynamics(Transitions(**line()))
-    with pytest.raises(ValueError, match="learned from the plant of transitions, got st"):
+    with pytest.raises(
+        ValueError, match="learned from the plant of transitions, got st"
+    ):
         LearnedVectorEnv(pendulum(), dynamics=other, **how)
 
 

@@ -40,7 +40,9 @@ def test_without_rewards_there_is_nothing_to_learn() -> None:
 
 
 def test_too_few_rewards_are_called_too_few() -> None:
-    with pytest.raises(ValueError, match="from 5 steps or more, got 3; record more, or"):
+    with pytest.raises(
+        ValueError, match="from 5 steps or more, got 3; record more, or"
+    ):
         LearnedCost(pendulum(60)[:3])
 
 

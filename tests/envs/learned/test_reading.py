@@ -150,7 +150,9 @@ def test_numbers_of_several_types_are_read() -> None:
     found = Transitions.from_frame(table().astype(object), **COLUMNS)
     assert (found.states == expected.states).all()
     large = table().astype(object).assign(u=10**400)
-    with pytest.raises(ValueError, match=r"\['u'\] of the frame must be finite, got \[inf"):
+    with pytest.raises(
+        ValueError, match=r"\['u'\] of the frame must be finite, got \[inf"
+    ):
         Transitions.from_frame(large, **COLUMNS)
 
 

@@ -262,7 +262,9 @@ def test_actions_of_joined_recordings() -> None:
 
 
 def test_a_step_is_not_chosen_by_its_number() -> None:
-    with pytest.raises(TypeError, match=r"got \[1, \[2\]\]; for step i use \[i : i \+ 1\]"):
+    with pytest.raises(
+        TypeError, match=r"got \[1, \[2\]\]; for step i use \[i : i \+ 1\]"
+    ):
         pendulum()[[1, [2]]]
 
 
@@ -289,7 +291,10 @@ NAN = np.where(np.arange(40)[:, None] == 7, np.nan, 0.0)
         ({"episodes": np.arange(40)[::-1]}, "episodes must be 40 integers that do not"),
         # The difference of these two is 1 where it overflows.
         ({"episodes": [2**63 - 1] * 39 + [-(2**63)]}, "40 integers that do not fall"),
-        ({"episodes": [0] * 39 + [2**60]}, r"integers in \[-2\^53, 2\^53\], got 0 to 115"),
+        (
+            {"episodes": [0] * 39 + [2**60]},
+            r"integers in \[-2\^53, 2\^53\], got 0 to 115",
+        ),
         # Their squares overflow, so that a deviation is infinite and features vanish.
         ({"states": np.full(40, 1e200)}, r"states must be at most 1e\+100 in size"),
         ({"inputs": np.full(40, -1e200)}, r"inputs must be at most 1e\+100 in size"),
@@ -494,7 +499,9 @@ def test_last_observations_are_checked(final: Any) -> None:
     env = SyncVectorEnv(
         [lambda: gym.make("CartPole-v1")] * 2, autoreset_mode=AutoresetMode.SAME_STEP
     )
-    with pytest.raises(ValueError, match=r"final_obs'\] must hold the last observation"):
+    with pytest.raises(
+        ValueError, match=r"final_obs'\] must hold the last observation"
+    ):
         Transitions.record(Forgetful(env), 200, seed=0)
 
 

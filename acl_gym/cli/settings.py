@@ -20,8 +20,9 @@ from typing import Any
 
 from acl_gym import costs, deposits, schedules
 from acl_gym.cli.agents import AGENTS, CHOICES, Declared, parameters
-from acl_gym.cli.common import check_name, did_you_mean
+from acl_gym.cli.common import check_name
 from acl_gym.cli.errors import BadArgumentError, in_words
+from acl_gym.utils.validation import did_you_mean
 
 Kinds = Mapping[str, type[Any]]
 

@@ -14,6 +14,9 @@ from acl_gym.utils.typing import FloatArray
 INFINITE = 1e30
 """A larger bound counts as none: some spaces use the largest float for infinity."""
 
+MOST_ACTIONS = 10_000
+"""How many numbered actions may be made of real inputs: no table is good for more."""
+
 _WIDE = 4
 """Integers of as many bytes or more: their extremes stand for infinity. Those of smaller
 ones do not, because they are ordinary values, such as 0 and 255 of an image."""

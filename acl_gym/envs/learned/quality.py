@@ -37,6 +37,10 @@ FAR = 0.5
 """How many times its recorded range a goal may lie beyond it, in a variable, before that
 is said."""
 
+UNSURE = 0.5
+"""A spread above which a model is called unsure of a step: half of what a step changes on
+the average."""
+
 UNITS = {
     180 / np.pi: "degrees instead of radians",
     60.0: "minutes instead of seconds",

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Sequence
-from difflib import get_close_matches
 from numbers import Real
 from typing import Any
 
@@ -295,11 +294,10 @@ def _check_described(described: dict[str, Any]) -> None:
     """Refuse what describes no recording, such as a name that is misspelt."""
     for name in described:
         if name not in DESCRIBED:
-            similar = get_close_matches(name, (*COLUMNS, *DESCRIBED), 1)
-            hint = f" Did you mean {similar[0]!r}?" if similar else ""
             raise TypeError(
                 f"columns of a recording are named by {', '.join(COLUMNS)}, and described "
-                f"by {', '.join(DESCRIBED)}, got {name!r}.{hint}"
+                f"by {', '.join(DESCRIBED)}, got {name!r}."
+                f"{validation.did_you_mean(name, (*COLUMNS, *DESCRIBED))}"
             )
 
 

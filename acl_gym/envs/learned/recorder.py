@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, Protocol
 
-import gymnasium as gym
 import numpy as np
 from gymnasium import spaces
 from gymnasium.vector import AutoresetMode, VectorEnv
@@ -55,7 +54,7 @@ class Recorder:
         inputs: Any = None,
         seed: int | None = None,
     ) -> None:
-        if not isinstance(env, gym.Env | VectorEnv):
+        if not all(callable(getattr(env, name, None)) for name in ("reset", "step")):
             raise TypeError(
                 "env must be an environment of Gymnasium, single or vector, got "
                 f"{validation.shown(env)}; make it with gym.make or gym.make_vec."
@@ -72,7 +71,7 @@ class Recorder:
         self.hold = validation.integer("hold", hold, at_least=1)
         self._vector = isinstance(env, VectorEnv)
         self.num_envs = env.num_envs if self._vector else 1
-        self._space = env.single_action_space if self._vector else env.action_space
+        self._space: Any = env.single_action_space if self._vector else env.action_space
         # What numbered actions set, where that is known.
         self._values: NDArray[np.float64] | None = None
         if isinstance(self._space, spaces.Discrete) and not self.facts.get("numbered"):
@@ -121,7 +120,7 @@ class Recorder:
             reached = found.copy()
             last = received.infos(infos, self.num_envs).get("final_obs")
             for slot in np.flatnonzero(ended):
-                reached[slot] = self._last(last, slot)
+                reached[slot] = self._last(last, int(slot))
         self._check(reached, rewards)
         made = ~self._starting  # a slot that restarts makes no step
         rows = np.flatnonzero(made)

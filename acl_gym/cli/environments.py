@@ -131,7 +131,7 @@ class Environment:
 
     @property
     def facts(self) -> dict[str, Any]:
-        """What a file says of it, JSON types; see `from_metadata`."""
+        """What a file says about it, JSON types; see `from_metadata`."""
         bins = None if self.bins is None else list(self.bins)
         found = {
             "env_id": self.env_id,
@@ -345,7 +345,7 @@ def _twin(name: str) -> str:
 
 
 def _unknown(name: str) -> str:
-    """What to say of an id that is not registered."""
+    """The message about an id that is not registered."""
     known = list(gym.registry)
     similar = [each for each in known if _stem(each).lower() == _stem(name).lower()]
     own = [each for each in similar if each in ENVIRONMENTS]

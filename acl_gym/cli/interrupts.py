@@ -17,7 +17,7 @@ _SIGNALS = ("SIGINT", "SIGTERM", "SIGHUP")
 class Interruption:
     """Notes the first signal, and ends the program at the second; a context manager.
 
-    Whoever learns looks at `wanted` after each trial and stops there. If the trial takes
+    The learning code looks at `wanted` after each trial and stops there. If the trial takes
     longer than `GRACE`, KeyboardInterrupt is raised in it. A signal that the caller has
     set to be ignored, as `nohup` does, stays ignored.
 

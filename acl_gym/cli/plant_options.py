@@ -26,7 +26,7 @@ class PlantOptions(NamedTuple):
         input: the same.
         time: a column.
         run: a column whose value changes from one run to the next.
-        reward: a column of what the step gave that begins in a row.
+        reward: a column of the reward of the step that begins in a row.
         terminated: a column that says whether an episode ended with that step.
         circular: names or numbers of variables that wrap around, with commas.
     """

@@ -63,8 +63,8 @@ def parse_value(option: str, text: str) -> Any:
         text: the value.
 
     Raises:
-        BadArgumentError: the value begins like a list and is none, holds a number that
-            is not finite, or is a switch in other words.
+        BadArgumentError: the value begins like a list but is not one, holds a number
+            that is not finite, or is a switch written in other words.
     """
     word = text.strip().lower()
     if word in _WORDS:
@@ -299,7 +299,7 @@ def _tuples(value: Any) -> Any:
 
 
 def _split(option: str, text: str, separator: str) -> list[str]:
-    """Split at a separator outside brackets; a `+` of 1e+5 is none."""
+    """Split at a separator outside brackets; the `+` in 1e+5 does not count as one."""
     parts, depth, begin = [], 0, 0
     for place, letter in enumerate(text):
         depth += (letter in "[(") - (letter in "])")

@@ -21,7 +21,7 @@ MOST_CITIES = 100_000
 """Cities of an instance at most; a matrix of so many takes 80 GB."""
 
 UNNAMED = ("distances", "coordinates", "graph")
-"""Names of instances to which nobody has given one: what they were made of."""
+"""The default names of instances, which say what they were made of."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

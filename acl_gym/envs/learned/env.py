@@ -70,13 +70,13 @@ class LearnedVectorEnv(ControlVectorEnv):
         n_draws: see there; only with `uncertain`.
         uncertain: let each slot walk in its own function, drawn anew in each episode
             from all that fit the data, so that a policy is learned that works for all.
-        pessimism: what a step costs more where the model is not sure, for a `spread` of
-            1, >= 0. None takes 0 with one or two state variables, and with more, where no
-            model is right everywhere, a tenth of the most that a step costs.
+        pessimism: how much more a step costs where the model is not sure, for a `spread`
+            of 1, >= 0. None takes 0 with one or two state variables, and with more, where
+            no model is right everywhere, a tenth of the most that a step costs.
         most_spread: where the `spread` of a step is more than this, > 0, the episode
-            ends in failure: the step costs as much as the dearest step does, for itself
-            and for each step that was left. So no policy gains by leaving the data. None
-            lets ants go anywhere.
+            ends in failure: it is charged the cost of the most expensive step, for this
+            step and for each step that was left. So no policy gains by leaving the data.
+            None lets ants go anywhere.
         dynamics: what was learned already from a recording of this plant, in place of
             learning it.
         begin: see `LearnedDynamics`.

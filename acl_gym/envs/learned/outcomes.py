@@ -101,7 +101,7 @@ class LearnedGoal:
     """Where episodes end, learned from recorded terminations: a decision tree.
 
     Ends mostly lie behind thresholds, which a tree finds exactly. It knows ends only
-    where it has seen some: a small goal that was never reached is none.
+    where it has seen some: it does not know a small goal that was never reached.
 
     Args:
         transitions: with terminations, of which some are True and some are not.

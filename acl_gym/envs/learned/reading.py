@@ -208,7 +208,7 @@ def _changes(frame: Any, run: str | None, name: str) -> Any:
     missing = column.isna().to_numpy()
     if missing.any():
         raise ValueError(
-            f"column {run!r} of {name} must say of each row which run it belongs to, got "
+            f"column {run!r} of {name} must say which run each row belongs to, got "
             f"nothing in row {int(np.argmax(missing))} ({np.count_nonzero(missing)} rows of "
             f"{len(missing)} are empty); fill in the run, or leave such rows out."
         )

@@ -243,7 +243,7 @@ class Recorder:
         return array.reshape(self.num_envs)
 
     def _check(self, reached: NDArray[np.float64], rewards: Any) -> None:
-        """Refuse what is not finite before it is kept: nobody could learn from it."""
+        """Refuse what is not finite before it is kept: a model cannot learn from it."""
         good = np.isfinite(reached).all(axis=1) & np.isfinite(rewards)
         if not good.all():
             slot = int(np.argmin(good))

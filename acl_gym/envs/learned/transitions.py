@@ -44,7 +44,7 @@ class Transitions:
             as all numbers are.
         inputs: u(t), `(n, n_inputs)`, or `(n,)` for one input.
         next_states: x(t+1), in the shape of `states`.
-        rewards: what the steps gave, `(n,)`; None if that is not known.
+        rewards: of the steps, `(n,)`; None if they are not known.
         terminated: whether an episode ended with the step, in its goal or in failure,
             `(n,)`; None if that is not known.
         episodes: the number of the run that each step belongs to, `(n,)`, in order, up to
@@ -141,7 +141,7 @@ class Transitions:
 
     @property
     def rewards(self) -> FloatArray | None:
-        """What the steps gave, `(n,)`, read-only; None if that is not known."""
+        """The rewards of the steps, `(n,)`, read-only; None if they are not known."""
         return self._arrays.get("rewards")
 
     @property
@@ -249,8 +249,8 @@ class Transitions:
     def doubts(self) -> list[str]:
         """What speaks against learning from this data, a sentence each; empty if nothing.
 
-        Few steps, inputs that never change, rows that are there twice, variables that
-        never change, and units that do not fit together.
+        Looked for are few steps, inputs and variables that never change, rows that are
+        there twice, and units that do not fit together.
         """
         found = doubts(
             self.states, self.inputs, self.next_states, self.episodes, self.description
@@ -278,7 +278,7 @@ class Transitions:
 
         Raises:
             FileNotFoundError: there is no such file.
-            ValueError: it is none of this package, or is damaged.
+            ValueError: it is not a file of this package, or is damaged.
         """
         found, told = saving.load(
             path, max_bytes, lambda facts, told: (cls(**facts), told)
@@ -386,7 +386,7 @@ class Transitions:
     def _made(
         cls, description: Description, arrays: dict[str, Any], unit_doubts: list[str]
     ) -> Self:
-        """From arrays that are known to be good."""
+        """Make a recording of arrays that were checked before."""
         made = cls.__new__(cls)
         made.description, made._arrays = description, arrays
         made._unit_doubts = list(unit_doubts)

@@ -112,7 +112,7 @@ class PlantParameters:
         return (self.nominal, self.drawn, own) if self.names else ()
 
     def check_rows(self, rows: FloatArray) -> None:
-        """Check values of the uncertain ones, `(n, m)`, that somebody gives.
+        """Check given values of the uncertain ones, `(n, m)`.
 
         Raises:
             ValueError: one lies outside its range.

@@ -28,8 +28,8 @@ class ActionGrid(VectorActionWrapper[Any, Any, Any, Any]):
     `agent.interpolated_policy()` chooses between neighbouring points afterwards: real
     inputs for the environment without this wrapper.
 
-    `gymnasium.wrappers.DiscretizeAction` does so for single environments, with values in
-    the middle of equal parts of the range, of which the bounds are none.
+    `gymnasium.wrappers.DiscretizeAction` does so for single environments; its values lie
+    in the middle of equal parts of the range, so that none is a bound.
 
     Args:
         env: a vector environment whose actions are a bounded Box of one axis.

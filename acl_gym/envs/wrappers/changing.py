@@ -157,8 +157,8 @@ class ChangingVectorEnv(VectorWrapper[Any, Any, Any, Any]):
         steps: how many were made before, >= 0, for instance by an agent that was saved.
 
     Raises:
-        TypeError: `env` is of another package, a schedule is none, or there is no such
-            parameter.
+        TypeError: `env` is of another package, a schedule is not a `Jump` or a `Drift`, or
+            there is no such parameter.
         ValueError: changes of one parameter overlap, a value is not valid, a change
             would change what can be observed or done, or `env` changes already.
     """

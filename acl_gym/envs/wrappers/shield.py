@@ -76,7 +76,8 @@ class Shield(VectorWrapper[Any, Any, Any, Any]):
         interventions: steps in which the action of each slot was replaced by another.
 
     Raises:
-        TypeError: `env` is not a vector environment, or a function is none.
+        TypeError: `env` is not a vector environment, or `baseline`, `safe` or `predict` is
+            not a function.
         ValueError: an argument does not fit the environment or the others.
 
     Example:
@@ -165,7 +166,7 @@ class Shield(VectorWrapper[Any, Any, Any, Any]):
 
     @property
     def interventions(self) -> IntArray:
-        """Steps in which the action of each slot was replaced, likewise."""
+        """Steps in which the action of each slot was replaced, `(num_envs,)`, a copy."""
         return self._interventions.copy()
 
     def reset_counters(self) -> None:

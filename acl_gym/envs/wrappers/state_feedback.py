@@ -30,7 +30,7 @@ class StateFeedback:
         circular: variables that wrap around, whose error is taken the short way: their
             numbers, where the period is 2 pi, or number -> period, > 0.
         low: the least inputs, a number or `(m,)`; None: no limit.
-        high: the greatest inputs, likewise, not less than `low`.
+        high: the greatest inputs, in the same form, not less than `low`.
         n_inputs: m, >= 1, where the gain is a parameter; else it says itself.
 
     Attributes:

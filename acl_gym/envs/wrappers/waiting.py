@@ -154,7 +154,7 @@ class WaitingSlots(VectorEnv[Any, Any, NDArray[Any]]):
 
 
 def _no_numbers(slot: int, given: Any) -> ValueError:
-    """The error for a reward or flags that are none."""
+    """The error for a reward that is no number, or flags that are no booleans."""
     return ValueError(
         "step must return a number as reward, then True or False for terminated and "
         f"truncated, got {', '.join(map(validation.shown, given[1:4]))} in slot {slot}; "

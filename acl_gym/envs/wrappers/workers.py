@@ -49,9 +49,9 @@ class WorkersVectorEnv(WaitingSlots):
 
     When a worker dies (killed, out of memory, or by a fault of a simulator), a new one
     resets its slots with the same seeds and repeats the actions of the episodes under
-    way, and the run goes on with the same bits; the logger `acl_gym` tells of it. That
-    needs environments whose chance is that of the generator which `reset(seed=...)`
-    seeds. Where the repetition leads elsewhere, a `RuntimeWarning` says so, and the
+    way, and the run goes on with the same bits; the logger `acl_gym` says so. That
+    needs environments that draw all random numbers from the generator which
+    `reset(seed=...)` seeds. Where the repetition leads elsewhere, a `RuntimeWarning` says so, and the
     episode ends there, truncated. An exception that an environment raises is raised here;
     after it everything is as before the call.
 

@@ -209,7 +209,7 @@ def test_rows_may_be_steps_already() -> None:
         (
             lambda f: f.assign(run=np.where(f.index < 20, np.nan, 1.0)),
             {"run": "run"},
-            r"which run it belongs to, got nothing in row 0 \(20 rows of 50 are empty\)",
+            r"which run each row belongs to, got nothing in row 0 \(20 rows of 50 are empty\)",
         ),
         (
             lambda f: f.assign(run=["a"] * 49 + [None]),

@@ -79,7 +79,7 @@ class Environment:
         Ids of modules that are still to be imported are not checked.
 
         Raises:
-            BadArgumentError: there is none.
+            BadArgumentError: there is no such id.
         """
         if not self.module and self.name not in gym.registry:
             raise BadArgumentError(_unknown(self.name))
@@ -302,7 +302,7 @@ def check_named_by_file(file: str, found: Environment, option: str) -> None:
         option: how the user can name it, such as "--env-id".
 
     Raises:
-        BadArgumentError: it cannot.
+        BadArgumentError: the id is not registered, or an argument may name a module.
     """
     if found.name not in gym.registry:
         typed = f"{option} {found.env_id if found.module else 'MODULE:' + found.name}"

@@ -9,7 +9,7 @@ from types import FrameType
 from typing import Any, Self
 
 GRACE = 2.0
-"""Seconds in which the trial under way may come to its end after a signal."""
+"""Seconds in which the trial under way may end by itself after a signal."""
 
 _SIGNALS = ("SIGINT", "SIGTERM", "SIGHUP")
 

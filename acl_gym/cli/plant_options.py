@@ -104,7 +104,7 @@ class PlantOptions(NamedTuple):
         """Check that the options go together.
 
         Raises:
-            BadArgumentError: they do not.
+            BadArgumentError: one option needs another, or excludes it.
         """
         if self.restart_after is not None and self.interactions is None:
             raise BadArgumentError(

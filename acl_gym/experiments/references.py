@@ -1,4 +1,4 @@
-"""What policies are measured against, and what the runs of a study come to beside it."""
+"""What policies are measured against, and the figures of a study relative to it."""
 
 from __future__ import annotations
 

@@ -61,10 +61,11 @@ def _with_autoreset_disabled(env: VectorEnv[Any, Any, Any]) -> str:
 
 
 def check_action_space(space: spaces.Space[Any]) -> None:
-    """Refuse what cannot be an array with one row for each slot.
+    """Refuse actions that cannot be an array with one row for each slot.
 
     Raises:
-        ValueError: it is refused.
+        ValueError: `space` is not a Box, Discrete, MultiDiscrete or MultiBinary, or does not
+            start from 0.
     """
     if not isinstance(space, _ARRAY_SPACES):
         raise ValueError(
@@ -78,10 +79,11 @@ def check_action_space(space: spaces.Space[Any]) -> None:
 
 
 def check_observation_space(space: spaces.Space[Any]) -> None:
-    """Refuse what a `VecEnv` cannot hand out.
+    """Refuse observations that a `VecEnv` cannot return.
 
     Raises:
-        ValueError: it is refused.
+        ValueError: `space` is not a Box, Discrete, MultiDiscrete, MultiBinary or a Dict of
+            those, or does not start from 0.
     """
     parts = space.spaces.values() if isinstance(space, spaces.Dict) else [space]
     for part in parts:

@@ -20,13 +20,14 @@ from acl_gym.utils.compiling import njit
 from acl_gym.utils.typing import BoolArray, FloatArray, IntArray
 
 MOST_CITIES = 9
-"""All tours of so many are tried within a tenth of a second."""
+"""The most cities: all tours through so many are tried within a tenth of a second."""
 
 SHORTEST = 1e-100
 """The shortest road; one over it is the longest. Lengths and fitness are then numbers."""
 
 SAME = 1e-12
-"""Lengths that differ by less of themselves are equal: sums in another order are."""
+"""The relative difference below which two lengths are equal: sums in another order differ
+by rounding."""
 
 
 class LimitedAnts(NamedTuple):

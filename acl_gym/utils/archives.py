@@ -34,7 +34,7 @@ MOST_BYTES = 2**28
 tables of 20 million (cell, action) pairs. An agent takes about five times as much."""
 
 _BYTES_A_VALUE = 64
-"""The least that a value in the JSON counts: it becomes an object in memory."""
+"""The least bytes that a value in the JSON counts as: it becomes an object in memory."""
 
 _NAMED = {AGENT: "an agent", TRANSITIONS: "a file of transitions"}
 _FILE = {AGENT: "agent file", TRANSITIONS: "file of transitions"}

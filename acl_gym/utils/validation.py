@@ -225,7 +225,7 @@ def check_square(name: str, shape: tuple[int, ...], rows: str = "row") -> None:
         rows: what has a row and a column each, such as "city".
 
     Raises:
-        ValueError: it is not.
+        ValueError: it has another shape, or no row.
     """
     if len(shape) != 2 or shape[0] != shape[1] or shape[0] == 0:
         raise ValueError(

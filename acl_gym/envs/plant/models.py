@@ -75,7 +75,7 @@ class Model:
         return self.at(0.0, x, u, p)
 
     def at(self, time: float, x: FloatArray, u: FloatArray, p: Any = None) -> Any:
-        """The same at a time; a system that depends on it is refused."""
+        """Evaluate as `__call__` does, at some time; `Equations` refuses systems that depend on it."""
         system = self.system
         own = {} if p is None else p._asdict()
         if self.one_by_one:

@@ -75,7 +75,7 @@ class Drift(Change):
 
     Attributes:
         start: after so many steps it begins to change, >= 0.
-        end: after so many steps it comes to its last value, > `start`.
+        end: after so many steps it has its last value, > `start`.
         to: the last value.
         stages: equal ones into which the drift is divided, 1 to 1,000; at most one a
             step.

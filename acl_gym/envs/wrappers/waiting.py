@@ -231,7 +231,7 @@ def _parts(name: str, given: Any, count: int) -> Any:
     """What a single environment returned, if it has so many parts.
 
     Raises:
-        ValueError: it has not.
+        ValueError: it is no tuple, or has another number of parts.
     """
     if not isinstance(given, (tuple, list)) or len(given) != count:
         raise ValueError(

@@ -201,7 +201,7 @@ class TravellingSalesman(ControlSystem):
         return array + 0.0  # no -0
 
     def _are_tours(self, states: FloatArray) -> BoolArray:
-        """Whether each row is a state that a walk can come to, `(n,)`."""
+        """Whether each row is a state that a walk can reach, `(n,)`."""
         n = self.n_cities
         arcs = states[:, ARCS]
         good = np.isin(arcs, np.arange(n + 1)) & (

@@ -62,13 +62,25 @@ class Scaling:
         """Return the features of one observation `(d,)` or of a batch `(n, d)`.
 
         Raises:
-            ValueError: the last axis does not have the length d of the space.
+            ValueError: the last axis does not have the length d of the space, or an entry
+                is not a finite number.
         """
-        values = np.asarray(observation, dtype=np.float64)
+        array = validation.as_array(observation)
+        if array is None or array.dtype.kind not in "biuf":
+            raise ValueError(
+                f"observations must be real numbers, got {validation.shown(observation)}; "
+                "check the environment."
+            )
+        values = array.astype(np.float64)
         if values.shape[-1:] != self._low.shape:
             raise ValueError(
                 f"observations must have {self._low.size} variables on their last "
                 f"axis, got shape {values.shape}."
+            )
+        if not np.isfinite(values).all():
+            raise ValueError(
+                f"observations must be finite, got {validation.shown(observation)}; check "
+                "the environment."
             )
         place = (values - self._low) / self._range
         features = np.empty((*values.shape[:-1], self._size), dtype=np.float32)

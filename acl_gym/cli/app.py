@@ -36,8 +36,8 @@ Examples:
   acl-gym reproduce fig5.4 --runs 3              repeat a figure of the thesis
 
 For the options of a command: acl-gym train --help. Exit codes are 0 for success, 1 for
-a run that failed, 2 for bad arguments, 130 for Ctrl-C, 143 for SIGTERM, and 141 where
-nobody reads the results (as in `| head`), which are saved nevertheless.
+a run that failed, 2 for bad arguments, 130 for Ctrl-C, 143 for SIGTERM, and 141 if the
+reader of the results has gone (as in `| head`); files are saved all the same.
 """
 
 app = typer.Typer(cls=Group, add_completion=False, rich_markup_mode=None)

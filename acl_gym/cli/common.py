@@ -6,12 +6,12 @@ import json
 import os
 import sys
 from collections.abc import Iterable
-from difflib import get_close_matches
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from acl_gym.cli.errors import BadArgumentError, set_debug
+from acl_gym.utils.validation import did_you_mean
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -42,12 +42,6 @@ def console(stderr: bool = False) -> Console:
     stream = sys.stderr if stderr else sys.stdout
     known = stream.isatty() or os.environ.get("COLUMNS", "").isdecimal()
     return Console(file=stream, width=None if known else 100)
-
-
-def did_you_mean(name: str, known: Iterable[str]) -> str:
-    """The question "Did you mean ...?" after a blank, or "" if no name is similar."""
-    similar = get_close_matches(name, list(known), 1)
-    return f" Did you mean {similar[0]!r}?" if similar else ""
 
 
 def check_name(option: str, name: str, known: Iterable[str]) -> str:

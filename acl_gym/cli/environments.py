@@ -79,7 +79,7 @@ class Environment:
         Ids of modules that are still to be imported are not checked.
 
         Raises:
-            BadArgumentError: there is none.
+            BadArgumentError: there is no such id.
         """
         if not self.module and self.name not in gym.registry:
             raise BadArgumentError(_unknown(self.name))
@@ -131,7 +131,7 @@ class Environment:
 
     @property
     def facts(self) -> dict[str, Any]:
-        """What a file says of it, JSON types; see `from_metadata`."""
+        """What a file says about it, JSON types; see `from_metadata`."""
         bins = None if self.bins is None else list(self.bins)
         found = {
             "env_id": self.env_id,
@@ -302,7 +302,7 @@ def check_named_by_file(file: str, found: Environment, option: str) -> None:
         option: how the user can name it, such as "--env-id".
 
     Raises:
-        BadArgumentError: it cannot.
+        BadArgumentError: the id is not registered, or an argument may name a module.
     """
     if found.name not in gym.registry:
         typed = f"{option} {found.env_id if found.module else 'MODULE:' + found.name}"
@@ -345,7 +345,7 @@ def _twin(name: str) -> str:
 
 
 def _unknown(name: str) -> str:
-    """What to say of an id that is not registered."""
+    """The message about an id that is not registered."""
     known = list(gym.registry)
     similar = [each for each in known if _stem(each).lower() == _stem(name).lower()]
     own = [each for each in similar if each in ENVIRONMENTS]

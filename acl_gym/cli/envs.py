@@ -19,13 +19,13 @@ import typer
 from acl_gym.cli.common import (
     DebugOption,
     JsonOption,
-    did_you_mean,
     print_json,
 )
 from acl_gym.cli.environments import Environment
 from acl_gym.cli.errors import BadArgumentError
 from acl_gym.cli.sources import class_node
 from acl_gym.envs import ENVIRONMENTS
+from acl_gym.utils.validation import did_you_mean
 
 HELP = """List the environments of acl-gym, or show the parameters of one.
 

@@ -168,7 +168,7 @@ def _message(error: BaseException) -> str:
 
 
 def report(name: str, message: str) -> None:
-    """Write one line to stderr; nobody need read it."""
+    """Write one line to stderr, also where it is a pipe that is no longer read."""
     with suppress(BrokenPipeError):
         typer.echo(f"{name}: {' '.join(message.split())}", err=True)
 

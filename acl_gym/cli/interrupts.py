@@ -9,7 +9,7 @@ from types import FrameType
 from typing import Any, Self
 
 GRACE = 2.0
-"""Seconds in which the trial under way may come to its end after a signal."""
+"""Seconds in which the trial under way may end by itself after a signal."""
 
 _SIGNALS = ("SIGINT", "SIGTERM", "SIGHUP")
 
@@ -17,7 +17,7 @@ _SIGNALS = ("SIGINT", "SIGTERM", "SIGHUP")
 class Interruption:
     """Notes the first signal, and ends the program at the second; a context manager.
 
-    Whoever learns looks at `wanted` after each trial and stops there. If the trial takes
+    The learning code looks at `wanted` after each trial and stops there. If the trial takes
     longer than `GRACE`, KeyboardInterrupt is raised in it. A signal that the caller has
     set to be ignored, as `nohup` does, stays ignored.
 

@@ -107,8 +107,8 @@ def begin(
         seed: of the agent.
         evaluate_every: trials between evaluations; None takes what is usual.
         trials: how many.
-        chosen_for: whether the agent is none that the user has named, so that a word
-            about a better one is of use.
+        chosen_for: whether the agent was chosen for the user, who may then want to know
+            of a better one.
 
     Raises:
         BadArgumentError: an argument does not suit the environment or the agent.
@@ -270,7 +270,7 @@ def _count(value: Any, default: int) -> int:
 
 
 def _deposit(environment: Environment, steps: int, seed: int) -> dict[str, Any]:
-    """A deposit for rewards that are no negative costs, with a word; else nothing."""
+    """A deposit for rewards that are not negative costs, with a note; else nothing."""
     deposit = suitable_deposit(environment.vector(PROBES), steps, seed)
     if deposit is None:
         return {}

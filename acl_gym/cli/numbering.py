@@ -9,9 +9,7 @@ import gymnasium as gym
 from gymnasium import spaces
 
 from acl_gym.cli.errors import BadArgumentError
-
-MOST_ACTIONS = 10_000
-"""More actions than any table is good for; `--discretize` may not make as many."""
+from acl_gym.utils.boxes import MOST_ACTIONS
 
 
 def parse_bins(text: str | None) -> tuple[int, ...] | None:

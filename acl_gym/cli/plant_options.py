@@ -26,7 +26,7 @@ class PlantOptions(NamedTuple):
         input: the same.
         time: a column.
         run: a column whose value changes from one run to the next.
-        reward: a column of what the step gave that begins in a row.
+        reward: a column of the reward of the step that begins in a row.
         terminated: a column that says whether an episode ended with that step.
         circular: names or numbers of variables that wrap around, with commas.
     """
@@ -104,7 +104,7 @@ class PlantOptions(NamedTuple):
         """Check that the options go together.
 
         Raises:
-            BadArgumentError: they do not.
+            BadArgumentError: one option needs another, or excludes it.
         """
         if self.restart_after is not None and self.interactions is None:
             raise BadArgumentError(

@@ -11,12 +11,10 @@ from acl_gym.cli.model_words import model_in_words
 from acl_gym.colony.episodes import Episode
 from acl_gym.envs.control.lookup import system_of
 from acl_gym.envs.learned import LearnedVectorEnv
+from acl_gym.envs.learned.quality import UNSURE
 from acl_gym.evaluation import evaluate_policy_cost
 from acl_gym.model_based import PlantLearning
 from acl_gym.utils.typing import FloatArray
-
-UNSURE = 0.5
-"""A spread at which a prediction is halfway to saying nothing."""
 
 
 def facts_of_model(learned: PlantLearning, plant: Any) -> dict[str, Any]:

@@ -71,7 +71,7 @@ def resumed_plan(
 
 
 def _without_deposit(param: list[str], known: str) -> list[str]:
-    """Leave out a deposit, with a word, where an agent goes on that needs none.
+    """Leave out a deposit, with a note, where the agent that goes on does not need one.
 
     It says how ants turn costs into pheromone, and lets them learn from rewards of any
     sign. Other agents do so without it, so that a script that always sets it still works.

@@ -20,8 +20,9 @@ from typing import Any
 
 from acl_gym import costs, deposits, schedules
 from acl_gym.cli.agents import AGENTS, CHOICES, Declared, parameters
-from acl_gym.cli.common import check_name, did_you_mean
+from acl_gym.cli.common import check_name
 from acl_gym.cli.errors import BadArgumentError, in_words
+from acl_gym.utils.validation import did_you_mean
 
 Kinds = Mapping[str, type[Any]]
 
@@ -62,8 +63,8 @@ def parse_value(option: str, text: str) -> Any:
         text: the value.
 
     Raises:
-        BadArgumentError: the value begins like a list and is none, holds a number that
-            is not finite, or is a switch in other words.
+        BadArgumentError: the value begins like a list but is not one, holds a number
+            that is not finite, or is a switch written in other words.
     """
     word = text.strip().lower()
     if word in _WORDS:
@@ -298,7 +299,7 @@ def _tuples(value: Any) -> Any:
 
 
 def _split(option: str, text: str, separator: str) -> list[str]:
-    """Split at a separator outside brackets; a `+` of 1e+5 is none."""
+    """Split at a separator outside brackets; the `+` in 1e+5 does not count as one."""
     parts, depth, begin = [], 0, 0
     for place, letter in enumerate(text):
         depth += (letter in "[(") - (letter in "])")

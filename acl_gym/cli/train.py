@@ -245,8 +245,8 @@ def train(
         str | None,
         typer.Option(
             metavar="NAME",
-            help="Column of what the step gave that begins in a row. The cost is learned "
-            "from it where the environment does not tell its own.",
+            help="Column of the reward of the step that begins in a row. The cost is learned "
+            "from it if the environment does not say what its cost is.",
             show_default=False,
         ),
     ] = None,
@@ -255,7 +255,7 @@ def train(
         typer.Option(
             metavar="NAME",
             help="Column of 0 and 1: whether an episode ended with that step. The goal is "
-            "learned from it where the environment does not tell its own; needs --run.",
+            "learned from it if the environment does not say what its goal is; needs --run.",
             show_default=False,
         ),
     ] = None,
@@ -265,7 +265,7 @@ def train(
             metavar="NAME,...",
             help="With --interactions and --from-data: variables that wrap around, such as "
             "an angle that jumps from pi to -pi, by the names of --state or by numbers "
-            "from 0, beside those of which the environment tells.",
+            "from 0, in addition to those that the environment names.",
             show_default=False,
         ),
     ] = None,

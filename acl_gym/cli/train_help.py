@@ -11,7 +11,7 @@ from acl_gym.cli.errors import Command
 HELP = """Learn in an environment, print the progress, and save the agent.
 
 The agent is the returning colony: its ants walk back and remember, and its partition is
-chosen and grows. --agent acl is the colony of the thesis, --agent q-learning is
+chosen automatically and grows. --agent acl is the colony of the thesis, --agent q-learning is
 Q-learning and Q(lambda); --agent ant-system, ant-colony-system and max-min look for one
 best solution, such as a shortest tour, where states are numbered. Without --agent, a
 parameter may choose: --param deposit=rank:5 takes the colony of the thesis, the first
@@ -25,10 +25,10 @@ Ctrl-C, and SIGTERM, end learning after the trial under way (or at once if that 
 more than two seconds) and save the agent; --resume goes on from there as if nothing had
 happened. The exit code is then 130, or 143. A second Ctrl-C ends the program at once.
 
-Where steps are dear, --interactions N makes only N of them: what they did is recorded,
-a model is fitted to it, the ants learn in the model, and their policy makes the next
-steps. Each is written to the folder NAME-plant at once; the same command goes on with a
-run that was killed. --from-data FILE learns from what was recorded before, alone or
+Where steps are expensive, --interactions N makes only N of them: they are recorded, a
+model is fitted to them, the ants learn in the model, and their policy makes the next
+steps. Each step is written to the folder NAME-plant at once; after a run that was
+killed, the same command continues it. --from-data FILE learns from what was recorded before, alone or
 before --interactions. Goal and cost are those of the environment, or else are learned
 from rewards and terminations.
 

@@ -133,7 +133,7 @@ def advice(learned: Learned, measures: Measures, plant: Plant) -> list[str]:
     none_round = not found and not plant.circular
     if learned.ended in _MORE:
         found.append(
-            f"{_MORE[learned.ended]}: learning had not come to its end after "
+            f"{_MORE[learned.ended]}: learning was not finished after "
             f"{learned.seconds:.0f} s."
         )
     if late:

@@ -36,8 +36,8 @@ def colony_for(env: ControlVectorEnv, seed: int) -> ReturningACL:
     """Make a colony for a plant: few ants, and their settings by its number of variables.
 
     Args:
-        env: the plant. If it has two slots or more, there are as many ants. One slot is
-            what a plant has if nobody has chosen, and leaves the number to this function.
+        env: the plant. If it has two slots or more, there are as many ants. A plant has
+            one slot by default, which leaves the number to this function.
         seed: of the colony.
 
     Returns:

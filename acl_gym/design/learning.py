@@ -23,7 +23,7 @@ CHOOSING = 500
 """Random starts from which the policies of one run are compared."""
 
 FIRST, GROWTH = 1_500, 1.1
-"""Interactions before the first evaluation, and how much later each next one is at least."""
+"""The least interactions between two evaluations, and the least factor by which they grow."""
 
 BETTER = 0.01
 """Relative improvement of the cost that counts as one."""
@@ -110,7 +110,7 @@ class Learned:
 class Choice:
     """The best policy of those seen.
 
-    The success rate comes first, but for differences of `CLOSE`; then the score.
+    The success rate comes first, unless it differs by no more than `CLOSE`; then the score.
 
     Attributes:
         best: how good it is; None before the first.

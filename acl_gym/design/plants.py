@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import sys
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -75,7 +76,7 @@ def as_vector_env(env: Any) -> ControlVectorEnv:
 
     Raises:
         TypeError: it is something else.
-        ValueError: it has no goal.
+        ValueError: it has no goal, or its actions are not numbered, two or more.
     """
     if not _is_plant(env):
         raise TypeError(
@@ -87,6 +88,12 @@ def as_vector_env(env: Any) -> ControlVectorEnv:
         raise ValueError(
             "a controller is designed to reach a goal, got a plant with goal=None; give "
             "it the state to which it is to be brought."
+        )
+    if base.system.real_inputs is not None or len(base.system.inputs) < 2:
+        raise ValueError(
+            "a controller chooses among two inputs or more, got a plant with inputs="
+            f"{validation.shown(base.parameters['inputs'])}; give some values of each "
+            "input, such as inputs=[-1, 0, 1]."
         )
     if isinstance(base, PlantEnv):
         steps = base.system.evaluation_steps
@@ -113,10 +120,12 @@ def _run(file: Path) -> ModuleType:
             f"there is no file {file}; `acl-gym design --show pendulum` prints one to "
             "begin with."
         )
-    if not file.is_file() or file.stat().st_size > _LARGEST:
+    size = file.stat().st_size
+    if not file.is_file() or size > _LARGEST:
+        kind = "a folder" if file.is_dir() else "something else"
         raise PlantFileError(
-            f"{file} must be a Python file that calls acl_gym.plant(...), got "
-            f"{'a folder' if file.is_dir() else 'something else'}."
+            f"{file} must be a Python file of at most {_LARGEST:,} bytes that calls "
+            f"acl_gym.plant(...), got {f'{size:,} bytes' if file.is_file() else kind}."
         )
     try:
         code = compile(file.read_bytes(), str(file.absolute()), "exec")
@@ -131,20 +140,35 @@ def _run(file: Path) -> ModuleType:
     module.__file__ = str(file.absolute())
     # Classes and compiled functions look their module up by its name.
     sys.modules[module.__name__] = module
+    with _running(file):
+        exec(code, vars(module))
+    return module
+
+
+@contextmanager
+def _running(file: Path, remedy: str = "") -> Iterator[None]:
+    """Run code of a file: its folder comes first in `sys.path`, and errors name it.
+
+    Args:
+        file: whose code is run.
+        remedy: what an error says at its end.
+
+    Raises:
+        PlantFileError: the code raises something, or ends the program.
+    """
     path = sys.path.copy()
     sys.path.insert(0, str(file.absolute().parent))
     try:
-        exec(code, vars(module))
+        yield
     except SystemExit as leaving:
         raise PlantFileError(
             f"{file} ends the program, sys.exit({leaving.code!r}), before its plant can "
             'be used; put that below `if __name__ == "__main__":`.'
         ) from leaving
     except Exception as error:
-        raise PlantFileError(_failure(file, error)) from error
+        raise PlantFileError(f"{_failure(file, error)}{remedy}") from error
     finally:
         sys.path[:] = path
-    return module
 
 
 def _failure(file: Path, error: Exception) -> str:
@@ -160,12 +184,8 @@ def _failure(file: Path, error: Exception) -> str:
 
 
 def _made(file: Path, maker: Callable[..., Any]) -> ControlVectorEnv:
-    try:
+    with _running(file, f"; {MAKER}(num_envs) must return a plant."):
         env = maker(num_envs=1)
-    except Exception as error:
-        raise PlantFileError(
-            f"{_failure(file, error)}; {MAKER}(num_envs) must return a plant."
-        ) from error
     return _checked(file, env)
 
 

@@ -10,14 +10,11 @@ import numpy as np
 
 from acl_gym.design.simulation import Responses
 from acl_gym.envs.learned.env import LearnedVectorEnv
+from acl_gym.envs.learned.quality import UNSURE
 from acl_gym.envs.learned.transitions import Transitions
 from acl_gym.utils.typing import FloatArray
 
 _AT_ONCE = 20_000  # steps, so that memory does not matter
-
-UNSURE = 0.5
-"""A spread from which on the model does not know what a step does: half of what a step
-changes on the average."""
 
 
 @dataclass(frozen=True)

@@ -53,7 +53,7 @@ class Claim:
     """A claim of the thesis.
 
     Attributes:
-        name: C1 .. C23.
+        name: "C1", "C2" and so on.
         text: the claim in this project's words.
         section: of the thesis.
         decide: returns its statements.

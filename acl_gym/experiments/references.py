@@ -1,4 +1,4 @@
-"""What policies are measured against, and what the runs of a study come to beside it."""
+"""What policies are measured against, and the figures of a study relative to it."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def reference(experiment: Experiment, results: Results) -> Reference:
 
 
 def measured(study: Study, results: Results, known: Reference) -> dict[str, FloatArray]:
-    """All that tables say of a study, `(runs,)` each.
+    """The figures of a study that tables show, `(runs,)` each.
 
     NaN where nothing is known: of success in environments of other packages.
     """

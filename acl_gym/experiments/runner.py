@@ -116,7 +116,7 @@ def list_jobs(studies: Iterable[AnyStudy], seeds: Sequence[int]) -> list[Job]:
 def exclusive_lock(directory: Path) -> AbstractContextManager[Any]:
     """Hold a lock that the operating system releases when this process exits.
 
-    Whoever holds it may take it again in the same thread.
+    A thread that holds it may take it again.
 
     Args:
         directory: in which this process alone is to work; made if it is not there.

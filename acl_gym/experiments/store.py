@@ -25,7 +25,7 @@ from acl_gym.utils.typing import FloatArray
 _METADATA = b"acl_gym"
 _TABLE = "table"
 
-# A file that is not there, is cut short or damaged, or is somebody else's.
+# A file that is not there, is cut short or damaged, or is not of this program.
 _UNREADABLE = (
     ArithmeticError,
     AttributeError,

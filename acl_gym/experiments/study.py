@@ -310,7 +310,7 @@ S = TypeVar("S", bound=AnyStudy, default=Study)
 class Experiment(Generic[S]):
     """A figure of the thesis, a trial beside it, or a comparison of methods.
 
-    Its studies are of one kind, which is `Study` where nothing else is said.
+    Its studies are of one kind, by default `Study`.
 
     Attributes:
         name: for instance "fig5.4".

@@ -33,6 +33,9 @@ _WHITE = 244
 
 _KINDS = (".gif", ".mp4")
 
+_LONGEST = 3600.0
+"""Seconds for which a policy may be followed: of more no file of frames is made."""
+
 
 def animate(
     agent: TabularAgent,
@@ -58,8 +61,8 @@ def animate(
         trials: after which trials pictures are taken, increasing; the agent learns up
             to the last. None takes twelve between 0 and 100 if the agent is new, else
             only the present one.
-        seconds: for how long each policy is followed at most, > 0; where steps have no
-            duration ten of them make a second.
+        seconds: for how long each policy is followed at most, in (0, 3600]; where steps
+            have no duration ten of them make a second.
         env: where the policies are shown; None takes the environment of the agent.
         start: the initial state of each showing, see `plot_trajectory`.
         axes: the state variables along the axes, see `plot_policy`.
@@ -73,7 +76,7 @@ def animate(
         `save` writes files and whose `to_jshtml` shows it in a notebook.
 
     Raises:
-        TypeError: `agent` is no agent.
+        TypeError: `agent` is no agent, or `path` no path.
         ValueError: an argument does not fit the agent, or `path` is of another kind.
         OSError: `path` cannot be written, which is found before the agent learns.
         RuntimeError: ffmpeg is missing.
@@ -84,7 +87,7 @@ def animate(
             f"{validation.shown(agent)}; plot_policy draws policies."
         )
     target = None if path is None else _checked_path(path)
-    seconds = validation.number("seconds", seconds, above=0)
+    seconds = validation.number("seconds", seconds, above=0, at_most=_LONGEST)
     dpi = validation.number("dpi", dpi, at_least=20, at_most=600)
     shown = _checked_trials(agent, trials)
     looks = {"axes": axes, "slice": slice, "labels": labels, "actions": actions}
@@ -199,12 +202,12 @@ def _mp4(film: _Film) -> bytes:
 
 
 def _checked_path(path: Any) -> Path:
-    if not isinstance(path, (str, Path)) or Path(path).suffix.lower() not in _KINDS:
+    target = validation.file_path("path", path)
+    if target.suffix.lower() not in _KINDS:
         raise ValueError(
-            f"path must end in {' or '.join(_KINDS)}, got {str(path)!r}; leave it out "
-            "for an animation of Matplotlib, which saves other kinds."
+            f"path must end in {' or '.join(_KINDS)}, got {validation.shown(str(path))}; "
+            "leave it out for an animation of Matplotlib, which saves other kinds."
         )
-    target = Path(path)
     if target.suffix.lower() == ".mp4" and not writers.is_available("ffmpeg"):
         raise RuntimeError(
             f"an .mp4 file needs ffmpeg, which is not installed; install it, or write "

@@ -48,7 +48,11 @@ def plot_crossings(
             f"ants in record, got the shapes {counts.shape} and {after.shape}."
         )
     if (counts > after).any():
-        raise ValueError("chosen must not be more than the ants in record.")
+        row, column = np.argwhere(counts > after)[0]
+        raise ValueError(
+            "chosen must not be more than the ants in record, got "
+            f"{counts[row, column]:g} of {after[column]:g} ants for colony {row}."
+        )
     shares = counts / after
     with style.axes_or_new(ax) as ax:
         # Both ends of the scale are equally good, so colours show who wins.
@@ -88,11 +92,14 @@ def plot_crossing_law(
         The axes.
 
     Raises:
-        ValueError: there is no law, one is empty, or nothing of that name is exact.
-        TypeError: `ax` are not axes.
+        ValueError: there is no law, one is empty, or `simulated` has a name that `laws`
+            lacks.
+        TypeError: `laws` or `simulated` is not a dict, or `ax` are not axes.
     """
     bins = validation.integer("bins", bins, at_least=1)
+    _check_named("laws", laws)
     simulated = {} if simulated is None else simulated
+    _check_named("simulated", simulated)
     if not laws or not set(simulated) <= set(laws):
         raise ValueError(
             "laws must name one law or more, and simulated some of them, got "
@@ -147,8 +154,9 @@ def plot_branch_choice(
 
     Raises:
         ValueError: there are none, or a share is out of range.
-        TypeError: `ax` are not axes.
+        TypeError: `shares` is not a dict, or `ax` are not axes.
     """
+    _check_named("shares", shares)
     if not shares:
         raise ValueError("shares must name one experiment or more, got none.")
     with style.axes_or_new(ax) as ax:
@@ -168,6 +176,19 @@ def plot_branch_choice(
         if any(shares):
             ax.legend()
     return ax
+
+
+def _check_named(name: str, given: Any) -> None:
+    """Check that what is drawn has names.
+
+    Raises:
+        TypeError: it is not a dict.
+    """
+    if not isinstance(given, Mapping):
+        raise TypeError(
+            f"{name} must be a dict from names to arrays, such as {{'ants': values}}, got "
+            f"{validation.shown(given)}."
+        )
 
 
 def _density(

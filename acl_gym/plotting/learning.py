@@ -135,7 +135,8 @@ def plot_learning_curve(
 
     Raises:
         TypeError: `runs` or `ax` is of the wrong kind.
-        ValueError: a run is empty or lacks the column.
+        ValueError: a run is empty, lacks the column or holds no numbers there, or no value
+            is known after the first interaction.
     """
     validation.one_of("x", x, tuple(X_AXES))
     named = isinstance(runs, Mapping)
@@ -150,6 +151,8 @@ def plot_learning_curve(
     for rows in everything:
         if x not in rows:
             raise ValueError(f"each run must have the column {x!r}, got {list(rows)}.")
+        _check_numbers(rows, x)
+        _check_numbers(rows, y)
     rising = _rises(y)
     lines = [
         {"color": colour, "linestyle": ("-", "--", ":")[i // len(COLOURS) % 3]}
@@ -160,6 +163,11 @@ def plot_learning_curve(
         for (name, histories), line in zip(curves.items(), lines, strict=True):
             kept = [rows.dropna(subset=[y]) for rows in histories]
             at, values = steps_of(kept, x, y, best_so_far=best_so_far, rising=rising)
+            if not at.size:
+                raise ValueError(
+                    f"{x} must be greater than 0 where {y} is known, in each run of a "
+                    f"curve, got {[rows[x].tolist() for rows in kept][:3]}."
+                )
             style.draw_band(ax, at, values, {**line, "label": name}, step=True)
             lowest, highest = min(lowest, values.min()), max(highest, values.max())
         if y.endswith("cost") and 0.0 < lowest * _STEEP < highest:
@@ -177,6 +185,19 @@ def plot_learning_curve(
         if most > 1:
             ax.set_title(f"median of {most} runs, band from lowest to highest")
     return ax
+
+
+def _check_numbers(rows: pd.DataFrame, column: str) -> None:
+    """Check that a column of a history holds real numbers.
+
+    Raises:
+        ValueError: it holds something else.
+    """
+    if rows[column].dtype.kind not in "biuf":
+        raise ValueError(
+            f"each run must hold numbers in the column {column!r}, got "
+            f"{validation.shown(rows[column].tolist())}."
+        )
 
 
 def _rises(column: str) -> bool:

@@ -28,7 +28,7 @@ def action_names(
     """The names of all actions: those given, the directions of a grid, or numbers.
 
     Args:
-        given: by the user; None if nobody has named them.
+        given: by the user; None if there are no such names.
         system: that of an environment of this package, or None.
         first: the number of the first action.
         count: how many there are.
@@ -52,7 +52,7 @@ def action_names(
 def _own_names(
     signals: Signals | None, count: int, angles: Sequence[tuple[int, int]]
 ) -> list[str]:
-    """The names of variables that nobody has given: those of their observations."""
+    """The names of variables that the user has not named: those of their observations."""
     known = () if signals is None else signals.observations
     if len(known) != count + len(angles):
         known = ()

@@ -30,7 +30,7 @@ class Plane:
         variables: all of the subject.
         shown: the numbers of those along the axes, one or two.
         fixed: the values of the others by their number.
-        middle: the numbers of those that nobody has fixed.
+        middle: the numbers of those that the user has not fixed.
     """
 
     variables: tuple[Variable, ...]

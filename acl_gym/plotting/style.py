@@ -98,7 +98,7 @@ def checked_axes(ax: Any) -> Axes:
     """Return `ax` if they are axes.
 
     Raises:
-        TypeError: they are not.
+        TypeError: `ax` is something else.
     """
     if not isinstance(ax, Axes):
         raise TypeError(

@@ -21,6 +21,7 @@ from acl_gym.envs.control.lookup import (
 from acl_gym.envs.control.signals import Signals
 from acl_gym.envs.control.system import ControlSystem
 from acl_gym.envs.grid_search.system import GridSearch
+from acl_gym.evaluation.predictions import checked_actions
 from acl_gym.partitions import Discrete, Grid, Partition
 from acl_gym.plotting import pieces
 from acl_gym.plotting.names import Labels, action_names, variable_names, with_unit
@@ -158,12 +159,21 @@ class Subject:
         return values
 
     def columns(self, states: NDArray[Any]) -> IntArray:
-        """The action of the policy for some observations, counted from 0, `(n,)`."""
+        """The action of the policy for some observations, counted from 0, `(n,)`.
+
+        Raises:
+            ValueError: what it returns are no actions, one for each.
+        """
         chosen = [
-            np.asarray(self.policy.predict(part, deterministic=True)[0])
+            checked_actions(
+                self.policy.predict(part, deterministic=True),
+                np.arange(len(part)),
+                self.first_action,
+                self.n_actions,
+            )
             for part in _batches(states)
         ]
-        return np.concatenate(chosen).astype(np.int64) - self.first_action
+        return np.concatenate(chosen) - self.first_action
 
     def levels(self, states: NDArray[Any]) -> FloatArray:
         """The entries of the table, weighed with the degrees, `(n, n_actions)`."""

@@ -15,6 +15,7 @@ from acl_gym.envs.limits import usual_max_steps
 from acl_gym.envs.navigation.system import Navigation
 from acl_gym.envs.pendulum.system import Pendulum
 from acl_gym.evaluation import Trajectory, record_trajectory
+from acl_gym.evaluation.predictions import checked_actions
 from acl_gym.evaluation.rollout import Rollout
 from acl_gym.plotting import cells, navigation, style
 from acl_gym.plotting.names import Labels
@@ -81,7 +82,8 @@ def plot_trajectory(
 
     Raises:
         TypeError: `agent`, `env` or `ax` is of the wrong kind.
-        ValueError: an argument does not fit the environment.
+        ValueError: an argument does not fit the environment, or the policy returns what
+            are no actions of it.
     """
     validation.one_of("kind", kind, _KINDS)
     if isinstance(agent, Trajectory):
@@ -127,7 +129,7 @@ def run(subject: Subject, start: Any, max_steps: int | None, seed: Any) -> Traje
         begin = (
             start_of(base.system)
             if start is None
-            else np.asarray(start, dtype=np.float64)
+            else validation.real_array("start", start)
         )
         return record_trajectory(
             subject.policy,
@@ -155,10 +157,13 @@ def _run_slot(subject: Subject, env: Any, steps: int, seed: Any) -> Trajectory:
     while rollout.ants.size and rollout.ants[0] == 0:
         allowed = rollout.allowed()
         masks = {} if allowed is None else {"action_masks": allowed}
-        chosen = subject.policy.predict(observation[rollout.ants], **masks)[0]
-        observation = rollout.step(
-            np.asarray(chosen) - rollout.first_action
-        ).observation
+        chosen = checked_actions(
+            subject.policy.predict(observation[rollout.ants], **masks),
+            rollout.ants,
+            rollout.first_action,
+            rollout.n_actions,
+        )
+        observation = rollout.step(chosen - rollout.first_action).observation
     walk = rollout.episodes()[0]
     states = walk.observations.reshape(len(walk.observations), -1)
     return Trajectory(
@@ -175,7 +180,13 @@ def _run_single(
         mask = info.get("action_mask")
         masks = {} if mask is None else {"action_masks": mask}
         batch = np.asarray(observation)[None]
-        action = int(np.asarray(subject.policy.predict(batch, **masks)[0]).ravel()[0])
+        chosen = checked_actions(
+            subject.policy.predict(batch, **masks),
+            np.zeros(1, np.int64),
+            subject.first_action,
+            subject.n_actions,
+        )
+        action = int(chosen[0])
         observation, reward, terminated, truncated, info = env.step(action)
         states.append(observation)
         taken.append(action - subject.first_action)

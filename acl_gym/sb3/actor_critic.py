@@ -2,10 +2,10 @@
 
 `make_ppo` and `make_a2c` return plain models of Stable-Baselines3, which learn in the same
 `learning_env` as the DQN of `acl_gym.sb3.dqn` and are evaluated like it: the notes there
-on scaled observations, threads and seeds hold here too. The defaults are general ones of
-Stable-Baselines3, but for 8 slots, the length of episodes and the scale of the rewards that
-DQN has, and larger batches with a higher learning rate in PPO: an interaction then takes a
-fifth of the time that it takes DQN.
+on scaled observations, threads and seeds hold here too. The defaults are those of
+Stable-Baselines3, except that there are 8 slots, that episodes and the scale of rewards are
+those of the DQN, and that PPO has larger batches and a higher learning rate. An interaction
+then takes a fifth of the time that it takes with DQN.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from typing import Any
 from stable_baselines3 import A2C, PPO
 from stable_baselines3.common.utils import LinearSchedule
 
+from acl_gym.sb3.checks import checked_layers, checked_settings
 from acl_gym.sb3.dqn import learning_env
 from acl_gym.utils import validation
 
@@ -65,9 +66,7 @@ class A2CSettings:
         validation.number("discount", self.discount, above=0, at_most=1)
         validation.number("trace_decay", self.trace_decay, at_least=0, at_most=1)
         validation.number("entropy_weight", self.entropy_weight, at_least=0)
-        object.__setattr__(self, "net_arch", tuple(self.net_arch))
-        for units in self.net_arch:
-            validation.integer("net_arch", units, at_least=1)
+        object.__setattr__(self, "net_arch", checked_layers(self.net_arch))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -76,7 +75,7 @@ class PPOSettings(A2CSettings):
 
     Attributes:
         batch_size: steps of a gradient step, in [2, num_envs * n_steps].
-        epochs: how often the steps of an update are gone through, >= 1.
+        epochs: passes over the steps of an update, >= 1.
         clip_range: how far the probability of an action may move in an update, > 0.
     """
 
@@ -95,8 +94,8 @@ class PPOSettings(A2CSettings):
         validation.number("clip_range", self.clip_range, above=0)
         if self.num_envs * self.n_steps < 2:
             raise ValueError(
-                "num_envs * n_steps must be at least 2, for advantages are normalised, "
-                f"got {self.num_envs} * {self.n_steps}."
+                "num_envs * n_steps must be at least 2, because advantages are "
+                f"normalised, got {self.num_envs} * {self.n_steps}; raise one of them."
             )
 
 
@@ -110,7 +109,7 @@ def make_a2c(
     **env_kwargs: Any,
 ) -> A2C:
     """Make an A2C agent that is ready to `learn`; for the arguments see `make_dqn`."""
-    settings = A2CSettings() if settings is None else settings
+    settings = checked_settings(settings, A2CSettings)
     return A2C(**_common(env_id, settings, seed, circular, device, env_kwargs))
 
 
@@ -124,7 +123,7 @@ def make_ppo(
     **env_kwargs: Any,
 ) -> PPO:
     """Make a PPO agent that is ready to `learn`; for the arguments see `make_dqn`."""
-    settings = PPOSettings() if settings is None else settings
+    settings = checked_settings(settings, PPOSettings)
     return PPO(
         **_common(env_id, settings, seed, circular, device, env_kwargs),
         # Stable-Baselines3 warns of a last batch that is smaller than the others.

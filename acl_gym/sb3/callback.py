@@ -28,8 +28,9 @@ class PolicyCostCallback(BaseCallback):
 
     Args:
         env: where to evaluate, with the observations that the model learns from: a
-            `scaled_env` for a model of `make_dqn`. See `evaluate_policy_cost`. Not the
-            environment that the model learns in, which would be reset under way.
+            `scaled_env` for a model of `make_dqn`. See `evaluate_policy_cost`. It must
+            not be the environment that the model learns in, which an evaluation would
+            reset in the middle of learning.
         states: initial states; None takes those of the environment.
         every: steps between evaluations, >= 1. The policy at the end of `learn` is
             always evaluated.
@@ -91,7 +92,7 @@ class PolicyCostCallback(BaseCallback):
         if _learns_in(self.model.get_env(), self.env):
             raise ValueError(
                 "env must be another environment than the one the model learns in, "
-                "which evaluations would reset under way; make a second one."
+                "which evaluations would reset in the middle of learning; make a second one."
             )
 
     def _on_training_start(self) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from gymnasium import spaces
@@ -19,6 +19,9 @@ _ARRAY_SPACES = (
     spaces.MultiDiscrete,
     spaces.MultiBinary,
 )
+
+
+Settings = TypeVar("Settings")
 
 
 def settle_mode(env: VectorEnv[Any, Any, Any]) -> AutoresetMode:
@@ -58,10 +61,11 @@ def _with_autoreset_disabled(env: VectorEnv[Any, Any, Any]) -> str:
 
 
 def check_action_space(space: spaces.Space[Any]) -> None:
-    """Refuse what cannot be an array with one row for each slot.
+    """Refuse actions that cannot be an array with one row for each slot.
 
     Raises:
-        ValueError: it is refused.
+        ValueError: `space` is not a Box, Discrete, MultiDiscrete or MultiBinary, or does not
+            start from 0.
     """
     if not isinstance(space, _ARRAY_SPACES):
         raise ValueError(
@@ -75,10 +79,11 @@ def check_action_space(space: spaces.Space[Any]) -> None:
 
 
 def check_observation_space(space: spaces.Space[Any]) -> None:
-    """Refuse what a `VecEnv` cannot hand out.
+    """Refuse observations that a `VecEnv` cannot return.
 
     Raises:
-        ValueError: it is refused.
+        ValueError: `space` is not a Box, Discrete, MultiDiscrete, MultiBinary or a Dict of
+            those, or does not start from 0.
     """
     parts = space.spaces.values() if isinstance(space, spaces.Dict) else [space]
     for part in parts:
@@ -118,6 +123,41 @@ def check_observations(
                 f"each slot in {validation.shown(part)}, got {shape}; check the "
                 "environment's reset and step."
             )
+
+
+def checked_settings(settings: Any, kind: type[Settings]) -> Settings:
+    """Return the settings of a model; None takes the defaults.
+
+    Raises:
+        TypeError: they are not of this kind.
+    """
+    if settings is None:
+        return kind()
+    if not isinstance(settings, kind):
+        raise TypeError(
+            f"settings must be {kind.__name__} or None, got "
+            f"{validation.shown(settings)}; make them with {kind.__name__}(...)."
+        )
+    return settings
+
+
+def checked_layers(units: Any) -> tuple[int, ...]:
+    """Return the number of units of each hidden layer of a network.
+
+    Args:
+        units: of each layer, >= 1; none where there is no hidden layer.
+
+    Raises:
+        TypeError: it is no sequence of integers.
+        ValueError: a layer has no unit.
+    """
+    listed = validation.elements(units)
+    if listed is None:
+        raise TypeError(
+            "net_arch must be a sequence with the units of each hidden layer, such as "
+            f"(64, 64), got {validation.shown(units)}."
+        )
+    return tuple(validation.integer("net_arch", each, at_least=1) for each in listed)
 
 
 def _check_start(what: str, space: spaces.Space[Any]) -> None:

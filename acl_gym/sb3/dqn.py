@@ -33,6 +33,7 @@ from acl_gym.envs.control.environments import ControlVectorEnv
 from acl_gym.envs.wrappers.scaling import ScaledVectorObservation, Scaling
 from acl_gym.partitions.discrete import FINITE_SPACES
 from acl_gym.sb3.adapter import VectorEnvAdapter
+from acl_gym.sb3.checks import checked_layers, checked_settings
 from acl_gym.utils import validation
 
 
@@ -125,9 +126,7 @@ class DQNSettings:
             validation.number(name, getattr(self, name), above=0, at_most=1)
         for name in ("exploration_initial", "exploration_final"):
             validation.number(name, getattr(self, name), at_least=0, at_most=1)
-        object.__setattr__(self, "net_arch", tuple(self.net_arch))
-        for units in self.net_arch:
-            validation.integer("net_arch", units, at_least=1)
+        object.__setattr__(self, "net_arch", checked_layers(self.net_arch))
         if self.buffer_size < self.num_envs:
             raise ValueError(
                 "buffer_size must be at least num_envs, got "
@@ -288,7 +287,7 @@ def make_dqn(
         >>> [row["env_steps"] for row in costs.history]
         [64, 128]
     """
-    settings = DQNSettings() if settings is None else settings
+    settings = checked_settings(settings, DQNSettings)
     seed = validation.seed(seed)
     env = learning_env(
         env_id,

@@ -68,7 +68,7 @@ class LocalEnvs(SlotEnvs):
         return [env.has_wrapper_attr(name) for env in self._envs]
 
     def reached(self, slots: Sequence[int]) -> Sequence[int]:
-        """See `SlotEnvs.reached`: those alone."""
+        """See `SlotEnvs.reached`: only those that are asked."""
         return slots
 
     def get(self, name: str, slots: Sequence[int]) -> list[Any]:
@@ -94,8 +94,8 @@ class LocalEnvs(SlotEnvs):
 class WorkerEnvs(SlotEnvs):
     """Single environments in worker processes, which all receive the same command.
 
-    So what changes something can be done in all slots only, and what is sent back must
-    be picklable, as in a `SubprocVecEnv`: a worker that cannot send its answer ends.
+    So a change can be made in all slots only, and what is sent back must be picklable, as
+    in a `SubprocVecEnv`: a worker that cannot send its answer ends.
 
     Args:
         env: the vector environment whose workers they are.
@@ -109,7 +109,10 @@ class WorkerEnvs(SlotEnvs):
         return self._env.call("has_wrapper_attr", name)
 
     def reached(self, slots: Sequence[int]) -> Sequence[int]:
-        """See `SlotEnvs.reached`: all; a worker asked for what it has not would end."""
+        """See `SlotEnvs.reached`: all.
+
+        A worker ends if it is asked for an attribute that it does not have.
+        """
         return range(self._env.num_envs)
 
     def get(self, name: str, slots: Sequence[int]) -> list[Any]:
@@ -137,9 +140,8 @@ class WorkerEnvs(SlotEnvs):
         """
         if name in _OWN_COMMANDS:
             raise ValueError(
-                f"method_name must be none of {', '.join(_OWN_COMMANDS)}, which workers "
-                "only take together, got "
-                f"{validation.shown(name)}; call {name}() of the adapter."
+                f"method_name must be none of {', '.join(_OWN_COMMANDS)}, which all "
+                f"workers take together, got {validation.shown(name)}; call {name}() of the adapter."
             )
         self._check_all(name, slots)
         values = self._env.call(name, *args, **kwargs)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from acl_gym.theory import ranges
+from acl_gym.utils import validation
 from acl_gym.utils.typing import FloatArray
 
 
@@ -37,13 +38,23 @@ def least_probability(
         tau_max: highest level, >= tau_min.
         n_choices: N_C, the most vertices that an ant chooses from, >= 1.
         alpha: exponent of the selection rule, >= 0.
+
+    Returns:
+        In [0, 1]; 0 where a float cannot hold the ratio of the weights.
     """
     low, high = ranges.positive("tau_min", tau_min), ranges.positive("tau_max", tau_max)
     if not (high >= low).all():
-        raise ValueError("tau_max must not be smaller than tau_min.")
-    choices = ranges.checked("n_choices", n_choices, at_least=1)
-    ratio = (high / low) ** ranges.checked("alpha", alpha, at_least=0)
-    return 1.0 / ((choices - 1.0) * ratio + 1.0)
+        raise ValueError(
+            "tau_max must not be smaller than tau_min, got "
+            f"{validation.shown(tau_max)} and {validation.shown(tau_min)}."
+        )
+    others = ranges.checked("n_choices", n_choices, at_least=1) - 1.0
+    alpha = ranges.checked("alpha", alpha, at_least=0)
+    with np.errstate(over="ignore", invalid="ignore"):  # an infinite ratio is meant
+        ratio = (high / low) ** alpha
+        # An ant without another choice takes the only one, whatever the levels are.
+        weight = np.where(others == 0.0, 0.0, others * ratio)
+    return np.asarray(1.0 / (weight + 1.0))
 
 
 def probability_found(

@@ -17,7 +17,8 @@ from acl_gym.utils.compiling import njit
 from acl_gym.utils.typing import BoolArray, FloatArray, IntArray
 
 COLONIES_AT_A_TIME = 128
-"""As many have their counts in the nearest cache, and their numbers in the next one."""
+"""So many that their counts fit into the nearest cache, and their random numbers into the
+next one."""
 
 
 @njit

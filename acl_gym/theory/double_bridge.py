@@ -94,6 +94,7 @@ def linear_crossing_law(n_ants: int, offset: float = OFFSET) -> FloatArray:
     """
     count = validation.integer("n_ants", n_ants, at_least=0)
     offset = validation.number("offset", offset, above=0)
+    validation.check_memory(f"{count:,} ants", 64 * count, "use fewer")
     k = np.arange(float(count))
     # P(k + 1) / P(k) of C(N, k) B(k + C, N - k + C) / B(C, C).
     ratio = (count - k) * (k + offset) / ((k + 1.0) * (count - k - 1.0 + offset))

@@ -20,10 +20,14 @@ from acl_gym.utils.compiling import njit
 from acl_gym.utils.typing import BoolArray, FloatArray, IntArray
 
 MOST_CITIES = 9
-"""All tours of so many are tried within a tenth of a second."""
+"""The most cities: all tours through so many are tried within a tenth of a second."""
+
+SHORTEST = 1e-100
+"""The shortest road; one over it is the longest. Lengths and fitness are then numbers."""
 
 SAME = 1e-12
-"""Lengths that differ by less of themselves are equal: sums in another order are."""
+"""The relative difference below which two lengths are equal: sums in another order differ
+by rounding."""
 
 
 class LimitedAnts(NamedTuple):
@@ -138,8 +142,8 @@ def simulate_limited_ants(
     levels below `tau_min` become `tau_min`.
 
     Args:
-        distances: `(n, n)` with 3 to 9 cities, > 0 off the diagonal; the way back may
-            be of another length.
+        distances: `(n, n)` with 3 to 9 cities, in [1e-100, 1e100] off the diagonal; the
+            way back may be of another length.
         n_colonies: >= 1.
         n_trials: >= 1.
         n_ants: M, ants of each colony, >= 1.
@@ -225,9 +229,11 @@ def _checked_distances(distances: Any) -> FloatArray:
             f"distances must be those of 3 to {MOST_CITIES} cities, so that all tours "
             f"can be tried, got {n}."
         )
-    if not (matrix[~np.eye(n, dtype=np.bool_)] > 0).all():
+    roads = matrix[~np.eye(n, dtype=np.bool_)]
+    if not ((roads >= SHORTEST) & (roads <= 1.0 / SHORTEST)).all():
         raise ValueError(
-            "distances must be > 0 off the diagonal, because fitness is 1 / length, got "
-            f"{validation.shown(matrix)}."
+            f"distances off the diagonal must lie in [{SHORTEST:g}, {1.0 / SHORTEST:g}], "
+            "because fitness is 1 / length, got "
+            f"{validation.shown(matrix)}; give them in another unit."
         )
     return np.ascontiguousarray(matrix)

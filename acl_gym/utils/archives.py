@@ -34,7 +34,7 @@ MOST_BYTES = 2**28
 tables of 20 million (cell, action) pairs. An agent takes about five times as much."""
 
 _BYTES_A_VALUE = 64
-"""The least that a value in the JSON counts: it becomes an object in memory."""
+"""The least bytes that a value in the JSON counts as: it becomes an object in memory."""
 
 _NAMED = {AGENT: "an agent", TRANSITIONS: "a file of transitions"}
 _FILE = {AGENT: "agent file", TRANSITIONS: "file of transitions"}
@@ -100,7 +100,7 @@ class Archive:
     Args:
         source: the path, with or without `.npz`, or a file open for reading in binary
             mode.
-        max_bytes: what the file may hold unpacked, as far as it is read.
+        max_bytes: what the file may hold unpacked, as far as it is read, >= 1.
         kind: what it must hold, `AGENT` or `TRANSITIONS`.
 
     Attributes:
@@ -110,14 +110,16 @@ class Archive:
 
     Raises:
         FileNotFoundError: there is no such file.
-        TypeError: `source` is neither a path nor a binary file.
+        TypeError: `source` is neither a path nor a binary file, or `max_bytes` is no
+            integer.
         ValueError: it is not a file of this package, is damaged, too large, or is of a
-            later version.
+            later version; or `max_bytes` is less than 1.
     """
 
     def __init__(
         self, source: Target, max_bytes: int = MOST_BYTES, kind: str = AGENT
     ) -> None:
+        max_bytes = validation.integer("max_bytes", max_bytes, at_least=1)
         self.name, content = _content(source, max_bytes, kind)
         try:
             members = _Members(content, max_bytes)
@@ -274,7 +276,7 @@ def _content(source: Target, most: int, kind: str) -> tuple[str, bytes]:
     """The name and the bytes of a file."""
     if _is_file("load from", source, "read"):
         name = str(getattr(source, "name", "the file"))
-        return name, _read(source, name, most)  # type: ignore[arg-type]
+        return name, _read(source, name, most, kind)  # type: ignore[arg-type]
     named = with_suffix(source)  # type: ignore[arg-type]
     typed = Path(source)  # type: ignore[arg-type]
     path = named if _is_there(named) else typed
@@ -285,7 +287,7 @@ def _content(source: Target, most: int, kind: str) -> tuple[str, bytes]:
             f"was written by {_WRITTEN_BY[kind]}."
         )
     with path.open("rb") as file:
-        return str(path), _read(file, str(path), most)
+        return str(path), _read(file, str(path), most, kind)
 
 
 def _is_there(path: Path) -> bool:
@@ -296,7 +298,7 @@ def _is_there(path: Path) -> bool:
         return False
 
 
-def _read(file: BinaryIO, name: str, most: int) -> bytes:
+def _read(file: BinaryIO, name: str, most: int, kind: str) -> bytes:
     """The rest of a file, in parts: `read(most)` would make room for all of `most`."""
     parts: list[bytes] = []
     left = most
@@ -308,7 +310,8 @@ def _read(file: BinaryIO, name: str, most: int) -> bytes:
             )
         left -= len(part)
         if left < 0:
-            raise ValueError(f"{name} {TooLargeError('an agent', most - left, most)}")
+            size = most - left
+            raise ValueError(f"{name} {TooLargeError(_NAMED[kind], size, most)}")
         parts.append(part)
     return b"".join(parts)
 

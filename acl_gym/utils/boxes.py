@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,9 @@ from acl_gym.utils.typing import FloatArray
 
 INFINITE = 1e30
 """A larger bound counts as none: some spaces use the largest float for infinity."""
+
+MOST_ACTIONS = 10_000
+"""How many numbered actions may be made of real inputs: no table is good for more."""
 
 _WIDE = 4
 """Integers of as many bytes or more: their extremes stand for infinity. Those of smaller
@@ -39,6 +43,32 @@ def declared_bounds(space: spaces.Box) -> tuple[FloatArray, FloatArray]:
         no_high |= space.high == extremes.max
     low[no_low | (low < -INFINITE)] = -np.inf
     high[no_high | (high > INFINITE)] = np.inf
+    return low, high
+
+
+def finite_bounds(
+    space: spaces.Box, variables: Iterable[int] | None = None
+) -> tuple[FloatArray, FloatArray]:
+    """Return the bounds of observations that must be bounded.
+
+    Args:
+        space: of one axis.
+        variables: those that must have bounds; None: all.
+
+    Returns:
+        `(low, high)`, float64 arrays `(n_variables,)`, infinite where others have none.
+
+    Raises:
+        ValueError: a variable has no finite bounds, low < high.
+    """
+    low, high = declared_bounds(space)
+    for axis in range(low.size) if variables is None else variables:
+        if not (np.isfinite([low[axis], high[axis]]).all() and low[axis] < high[axis]):
+            raise ValueError(
+                "every variable must have finite bounds, low < high, got "
+                f"[{low[axis]:g}, {high[axis]:g}] of variable {axis}; give the environment "
+                "a bounded space with gymnasium's TransformObservation."
+            )
     return low, high
 
 

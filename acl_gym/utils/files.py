@@ -77,8 +77,8 @@ def write_atomically(path: str | os.PathLike[str], content: bytes) -> None:
     """Write a file so that it appears complete or not at all.
 
     The content goes to a file with a name of its own beside the target, which then takes
-    the target's place: whoever reads meanwhile, and whoever writes the same path in
-    another thread or process, sees whole files only. As with `open`, a symbolic link
+    the target's place: readers, and writers of the same path in other threads or
+    processes, see whole files only. As with `open`, a symbolic link
     stays and the file that it points to is written, a new file gets the permissions that
     the umask leaves, an existing one keeps its own, and devices and pipes are written
     directly. Files left behind by processes that were killed while they wrote into the

@@ -6,7 +6,7 @@ import sys
 
 
 def count(number: float) -> str:
-    """A number of things in short: 950, 2.6k, 13M."""
+    """A count in short form: 950, 2.6k, 13M."""
     for size, unit in ((1e9, "G"), (1e6, "M"), (1e3, "k")):
         if number >= size:
             places = 0 if number >= 10 * size else 1

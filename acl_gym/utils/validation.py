@@ -6,7 +6,7 @@ import itertools
 import math
 import os
 import sys
-from collections.abc import Collection
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 from difflib import get_close_matches
 from numbers import Integral, Real
@@ -225,7 +225,7 @@ def check_square(name: str, shape: tuple[int, ...], rows: str = "row") -> None:
         rows: what has a row and a column each, such as "city".
 
     Raises:
-        ValueError: it is not.
+        ValueError: it has another shape, or no row.
     """
     if len(shape) != 2 or shape[0] != shape[1] or shape[0] == 0:
         raise ValueError(
@@ -352,13 +352,27 @@ def one_of(name: str, value: Any, allowed: Collection[str]) -> str:
     if not isinstance(value, str) or value not in allowed:
         choices = ", ".join(repr(choice) for choice in allowed)
         message = f"{name} must be one of {choices}, got {shown(value)}."
-        if isinstance(value, str) and (
-            similar := get_close_matches(value[:_LONGEST], allowed, 1)
-        ):
+        if question := did_you_mean(value, allowed):
             if len(allowed) > _MANY:
                 message = (
                     f"{name} must be one of {len(allowed)} names, got {shown(value)}."
                 )
-            message += f" Did you mean {similar[0]!r}?"
+            message += question
         raise ValueError(message)
     return str(value)
+
+
+def did_you_mean(name: Any, known: Iterable[str]) -> str:
+    """Return the question " Did you mean ...?" with the most similar name.
+
+    Args:
+        name: what was given.
+        known: the names that there are.
+
+    Returns:
+        The question after a blank; "" if no name is similar, or `name` is no text.
+    """
+    if not isinstance(name, str):
+        return ""
+    similar = get_close_matches(name[:_LONGEST], list(known), 1)
+    return f" Did you mean {similar[0]!r}?" if similar else ""

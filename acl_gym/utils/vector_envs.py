@@ -47,7 +47,7 @@ def require_discrete_actions(env: VectorEnv[Any, Any, Any]) -> spaces.Discrete:
     """The action space of a slot, if its actions are numbered.
 
     Raises:
-        ValueError: they are not.
+        ValueError: its actions are not `Discrete`; the message has a wrapper that helps.
     """
     space = env.single_action_space
     if isinstance(space, spaces.Discrete):

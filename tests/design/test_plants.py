@@ -112,3 +112,32 @@ def test_what_is_no_plant() -> None:
     )
     with pytest.raises(TypeError, match="without wrappers"):
         as_vector_env(wrapped)
+
+
+def test_a_function_that_makes_the_plant_runs_as_the_file_does(tmp_path: Path) -> None:
+    """It may import what lies beside the file, and must not end the program."""
+    (tmp_path / "beside_the_maker.py").write_text("GOAL = [0]\n")
+    made = "def make(num_envs):\n    from beside_the_maker import GOAL\n    {}"
+    text = plant(goal="GOAL", more=", num_envs=num_envs").replace("\n", "\n    ")
+    assert load(tmp_path, made.format(f"return {text}")).num_envs == 1
+    with pytest.raises(PlantFileError, match=r"ends the program, sys\.exit\(3\)"):
+        load(tmp_path, "def make(num_envs):\n    raise SystemExit(3)\n")
+
+
+def test_a_file_that_is_too_large_says_so(tmp_path: Path) -> None:
+    with pytest.raises(PlantFileError, match=r"at most 10,000,000 bytes .* got 10,0"):
+        load(tmp_path, "#" * 10_000_000)
+
+
+@pytest.mark.parametrize("inputs", [[1.0], gym.spaces.Box(-1.0, 1.0, (1,), np.float64)])
+def test_inputs_that_leave_no_choice_are_refused(inputs: object) -> None:
+    env = acl_gym.plant(
+        lambda x, u: [u[0]],
+        **{"low": [-1], "high": [1], "inputs": inputs, "sampling_time": 0.1},
+        goal=[0],
+        max_episode_steps=7,
+    )
+    with pytest.raises(
+        ValueError, match=r"chooses among two inputs or more, got a plant"
+    ):
+        as_vector_env(env)

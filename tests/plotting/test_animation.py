@@ -12,7 +12,7 @@ from matplotlib.animation import FuncAnimation, writers
 from matplotlib.figure import Figure
 from PIL import Image
 
-from acl_gym import ACL, QLearning, plant
+from acl_gym import ACL, QLearning, ReturningACL, plant
 from acl_gym.plotting import animate, scenes
 from tests.plotting.agents import colony, pendulum, q_learning
 
@@ -151,7 +151,7 @@ def test_without_ffmpeg_there_is_a_word(
     [
         ({"path": "film.avi"}, ValueError, r"path must end in \.gif or \.mp4"),
         ({"path": "no/such/film.gif"}, ValueError, "a folder that exists"),
-        ({"path": 3}, ValueError, "path must end in"),
+        ({"path": 3}, TypeError, "path must be a path"),
         ({"path": f"{'x' * 300}.gif"}, OSError, "give another name"),
         ({"trials": 3}, TypeError, "trials must be a list of integers"),
         ({"trials": ()}, ValueError, "one integer or more, increasing"),
@@ -173,3 +173,13 @@ def test_errors_say_what_is_expected(
 def test_policies_do_not_learn() -> None:
     with pytest.raises(TypeError, match="agent must be an agent that learns a table"):
         animate(pendulum().policy)
+
+
+def test_a_film_without_end_is_refused() -> None:
+    agent = ReturningACL(gym.make_vec("acl_gym/Pendulum-v0", 2), seed=0)
+    with pytest.raises(
+        ValueError, match=r"seconds must lie in \(0, 3600\], got 1e\+308"
+    ):
+        animate(agent, seconds=1e308)
+    with pytest.raises(ValueError, match="path must be the name of a file"):
+        animate(agent, "a\0.gif")

@@ -97,3 +97,31 @@ def test_runs_that_know_a_value_from_different_steps_on() -> None:
     x, y = ax.lines[0].get_data()
     assert np.asarray(x).tolist() == [150, 200, 250]
     assert np.asarray(y).tolist() == [6.0, 5.0, 2.0]
+
+
+@pytest.mark.parametrize(
+    ("row", "x", "message"),
+    [
+        (
+            {"env_steps": 0, "policy_cost": 1.0},
+            "env_steps",
+            r"greater than 0 .* \[\[0\]\]",
+        ),
+        (
+            {"seconds": 0.0, "policy_cost": 1.0},
+            "seconds",
+            "must be greater than 0 where",
+        ),
+        (
+            {"env_steps": 1, "policy_cost": "a"},
+            "env_steps",
+            r"'policy_cost', got \['a'\]",
+        ),
+        ({"env_steps": "a", "policy_cost": 1.0}, "env_steps", "numbers in the column"),
+    ],
+)
+def test_histories_that_cannot_be_drawn_are_refused(
+    row: dict[str, Any], x: str, message: str
+) -> None:
+    with pytest.raises(ValueError, match=message):
+        plot_learning_curve([row], x=x)

@@ -96,3 +96,19 @@ def test_they_draw_where_they_are_told() -> None:
 def test_what_cannot_be_drawn_is_refused(call: Any, message: str) -> None:
     with pytest.raises(ValueError, match=message):
         call()
+
+
+@pytest.mark.parametrize(
+    ("draw", "name"),
+    [
+        (lambda: plot_branch_choice([0.5]), "shares"),  # type: ignore[arg-type]
+        (lambda: plot_crossing_law([0.5, 0.5]), "laws"),  # type: ignore[arg-type]
+        (
+            lambda: plot_crossing_law({"a": [0.5, 0.5]}, simulated=["a"]),  # type: ignore[arg-type]
+            "simulated",
+        ),
+    ],
+)
+def test_what_has_no_names_is_refused(draw: Any, name: str) -> None:
+    with pytest.raises(TypeError, match=f"{name} must be a dict from names to arrays"):
+        draw()

@@ -10,7 +10,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from acl_gym.evaluation import record_trajectory
-from acl_gym.plotting import plot_trajectory
+from acl_gym.plotting import plot_policy, plot_trajectory
 from tests.plotting.agents import colony, pendulum, q_learning
 
 
@@ -116,3 +116,33 @@ def test_the_vehicle_starts_in_a_corner() -> None:
     ax = plot_trajectory(colony("acl_gym/Navigation-v0"), kind="plane", max_steps=3)
     path = ax.lines[0]
     assert (path.get_xdata()[0], path.get_ydata()[0]) == (-5.0, -5.0)
+
+
+class Chooses:
+    """A policy that returns the same for any observations."""
+
+    def __init__(self, found: Any) -> None:
+        self._found = found
+
+    def predict(self, observation: Any, *, deterministic: bool = True) -> Any:
+        return self._found, None
+
+
+@pytest.mark.parametrize("found", [[1.7], ["a"], [7], [-1], [], None, [np.nan], [1, 1]])
+def test_what_a_policy_returns_is_checked(found: Any) -> None:
+    """1.7 would be drawn, and carried out, as the action 1."""
+    policy, message = Chooses(found), r"model\.predict must return"
+    car = gym.make("MountainCar-v0")
+    for env in (car, gym.make_vec("MountainCar-v0", 3, vectorization_mode="sync")):
+        with pytest.raises(ValueError, match=message):
+            plot_trajectory(policy, env=env, max_steps=5)
+    with pytest.raises(ValueError, match=message):
+        plot_policy(policy, env=car)
+
+
+def test_a_start_that_is_no_state_is_refused() -> None:
+    vector = gym.make_vec("acl_gym/Pendulum-v0", 1)
+    with pytest.raises(
+        ValueError, match="start must be an array of finite real numbers"
+    ):
+        plot_trajectory(Chooses([0]), env=vector, start="rest")

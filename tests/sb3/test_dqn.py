@@ -15,6 +15,7 @@ from stable_baselines3.common.evaluation import evaluate_policy
 from stable_baselines3.common.vec_env import VecMonitor
 
 import acl_gym
+from acl_gym.sb3.actor_critic import A2CSettings, PPOSettings, make_a2c, make_ppo
 from acl_gym.sb3.callback import PolicyCostCallback
 from acl_gym.sb3.dqn import (
     DQNSettings,
@@ -53,6 +54,33 @@ def test_settings_do_not_change() -> None:
     with pytest.raises(FrozenInstanceError):
         TINY.discount = 0.5  # type: ignore[misc]
     assert hash(replace(TINY, net_arch=[8, 8])) == hash(replace(TINY, net_arch=(8, 8)))
+
+
+@pytest.mark.parametrize("settings", [DQNSettings, A2CSettings, PPOSettings])
+@pytest.mark.parametrize("layers", [8, "88", None])
+def test_hidden_layers_must_be_a_sequence(settings: Any, layers: Any) -> None:
+    with pytest.raises(
+        TypeError, match=r"net_arch must be a sequence .*\(64, 64\), got"
+    ):
+        settings(net_arch=layers)
+
+
+@pytest.mark.parametrize(
+    ("make", "kind", "other"),
+    [
+        (make_dqn, DQNSettings, A2CSettings()),
+        (make_a2c, A2CSettings, DQNSettings()),
+        (make_ppo, PPOSettings, A2CSettings()),
+        (make_ppo, PPOSettings, {}),
+    ],
+)
+def test_settings_of_another_model_are_refused(
+    make: Any, kind: Any, other: Any
+) -> None:
+    with pytest.raises(
+        TypeError, match=f"settings must be {kind.__name__} or None, got"
+    ):
+        make("acl_gym/Pendulum-v0", other)
 
 
 @pytest.mark.parametrize(

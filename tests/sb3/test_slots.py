@@ -175,7 +175,7 @@ def test_attributes_of_workers(workers: VectorEnvAdapter) -> None:
     with pytest.raises(ValueError, match=r"all 3 slots, got indices \[1\]"):
         workers.set_attr("length", 1, indices=1)
     assert workers.get_attr("length") == [7, 7, 7]
-    # A worker that is asked for what it has not would end.
+    # A worker would end if it were asked for an attribute that it does not have.
     with pytest.raises(AttributeError, match=r"'height', but slots \[0, 1\]"):
         workers.get_attr("height", 2)
     assert not workers.has_attr("no_such_attribute")

@@ -354,8 +354,23 @@ def test_the_probability_at_its_ends() -> None:
         ({"distances": np.ones((2, 2))}, ValueError, "of 3 to 9 cities"),
         ({"distances": np.ones((10, 10))}, ValueError, "of 3 to 9 cities"),
         ({"distances": np.ones((3, 4))}, ValueError, r"got shape \(3, 4\)"),
-        ({"distances": np.zeros((3, 3))}, ValueError, "> 0 off the diagonal"),
-        ({"distances": -THREE}, ValueError, "> 0 off the diagonal"),
+        (
+            {"distances": np.zeros((3, 3))},
+            ValueError,
+            r"must lie in \[1e-100, 1e\+100\]",
+        ),
+        ({"distances": -THREE}, ValueError, r"off the diagonal must lie in"),
+        # The sum of four such roads, or one over it, is infinite.
+        (
+            {"distances": np.full((4, 4), 1e308)},
+            ValueError,
+            "give them in another unit",
+        ),
+        (
+            {"distances": np.full((4, 4), 1e-320)},
+            ValueError,
+            "give them in another unit",
+        ),
         ({"distances": np.full((3, 3), np.nan)}, ValueError, "distances"),
         ({"distances": "map"}, ValueError, "distances"),
         ({"n_colonies": 0}, ValueError, "n_colonies must be at least 1"),
@@ -398,3 +413,11 @@ def test_small_levels_do_not_lose_their_weight() -> None:
     ]
     assert 0 < found[1].sum() < 2_000
     np.testing.assert_array_equal(*found)
+
+
+def test_a_ratio_beyond_all_floats_leaves_a_probability() -> None:
+    """An only choice is certain; of two, the weaker one is never taken."""
+    found = least_probability(1e-300, 1e300, [1, 2], 2.0)
+    np.testing.assert_array_equal(found, [1.0, 0.0])
+    with pytest.raises(ValueError, match=r"tau_max must not be .* got 1\.0 and 2\.0"):
+        least_probability(2.0, 1.0, 2, 1.0)

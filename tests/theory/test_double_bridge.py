@@ -329,3 +329,9 @@ def test_laws_refuse_what_is_out_of_range() -> None:
             law(3, offset=0.0)
     with pytest.raises(ValueError, match="crossed must lie in"):
         choice_probability(-1, 0)
+
+
+def test_a_law_that_fits_into_no_memory_is_refused() -> None:
+    for law in (crossing_law, linear_crossing_law):
+        with pytest.raises(ValueError, match="10,000,000,000,000 ants must fit into"):
+            law(10**13)

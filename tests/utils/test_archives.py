@@ -535,6 +535,11 @@ def test_the_limit_can_be_raised(saved: bytes, tmp_path: Path) -> None:
     with pytest.raises(ValueError, match=r"the file holds an agent of .*max_bytes"):
         ACL.load(io.BytesIO(saved), max_bytes=100)
     assert ACL.load(path, max_bytes=10**9).trials == 2
+    for wrong in (math.nan, 1.5, None, True):
+        with pytest.raises(TypeError, match="max_bytes must be an integer"):
+            ACL.load(path, max_bytes=wrong)  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match="max_bytes must be at least 1, got -1"):
+        ACL.load(path, max_bytes=-1)
 
 
 # --- hostile files ---------------------------------------------------------------

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import inspect
-from difflib import get_close_matches
 from typing import Any, Protocol, TypeVar
 
 import gymnasium as gym
@@ -31,11 +30,10 @@ def made_system(kind: type[System], parameters: dict[str, Any]) -> System:
     if all(each.kind is not each.VAR_KEYWORD for each in known.values()):
         for name in parameters:
             if name not in known:
-                similar = get_close_matches(name, known, 1)
-                hint = f" Did you mean {similar[0]!r}?" if similar else ""
                 raise TypeError(
                     f"{kind.__name__} has no parameter {name!r}; choose from "
-                    f"{', '.join(known) or 'none'}.{hint}"
+                    f"{', '.join(known) or 'none'}."
+                    f"{validation.did_you_mean(name, known)}"
                 )
     return kind(**parameters)
 

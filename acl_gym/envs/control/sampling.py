@@ -29,7 +29,8 @@ def sample_outside(
         Array of shape `(state_size, count)`.
 
     Raises:
-        ValueError: `MOST_IN_VAIN` states in a row were drawn in vain.
+        ValueError: `MOST_IN_VAIN` states that were drawn one after the other all lie
+            inside the region.
     """
     states = draw(count)
     left, in_vain = count, 0

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import fields, is_dataclass
-from difflib import get_close_matches
 from typing import Any, ClassVar
 
 import numpy as np
@@ -95,11 +94,10 @@ class ControlSystem(ABC):
         known: tuple[Any, ...] = fields(self) if is_dataclass(self) else ()
         numbers = [f.name for f in known if type(getattr(self, f.name)) is float]
         if name not in numbers:
-            similar = get_close_matches(str(name), numbers, 1)
-            hint = f" Did you mean {similar[0]!r}?" if similar else ""
             raise TypeError(
                 f"the parameters of {type(self).__name__} that are real numbers are "
-                f"{', '.join(numbers) or 'none'}, got {validation.shown(name)}.{hint}"
+                f"{', '.join(numbers) or 'none'}, got {validation.shown(name)}."
+                f"{validation.did_you_mean(name, numbers)}"
             )
         return float(getattr(self, name))
 

@@ -21,7 +21,7 @@ MOST_CITIES = 100_000
 """Cities of an instance at most; a matrix of so many takes 80 GB."""
 
 UNNAMED = ("distances", "coordinates", "graph")
-"""Names of instances to which nobody has given one: what they were made of."""
+"""The default names of instances, which say what they were made of."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -284,10 +284,10 @@ def _rebuilt(
 
 
 def checked_instance(value: Any) -> TravellingSalesmanInstance:
-    """Return an instance if it is one.
+    """Return a value that must be an instance.
 
     Raises:
-        TypeError: it is not.
+        TypeError: it is not a `TravellingSalesmanInstance`.
     """
     if not isinstance(value, TravellingSalesmanInstance):
         raise TypeError(
@@ -302,7 +302,7 @@ def checked_tours(tour: Any, n_cities: int) -> NDArray[np.int64]:
     """Return tours as int64 `(n,)` or `(k, n)`, each city once.
 
     Raises:
-        ValueError: they are not.
+        ValueError: the shape is wrong, or a tour misses a city.
     """
     array = validation.as_array(tour)
     if (

@@ -12,8 +12,8 @@ from acl_gym.utils.typing import CellArray, FloatArray
 def tour_length(tour: CellArray, distances: FloatArray) -> float:
     """The length of a tour, the closing arc included.
 
-    Added up in the order of the steps, as an environment does, so that both come to the
-    same number bit for bit.
+    It is added up in the order of the steps, as in an environment, so that both give the
+    same number to the last bit.
 
     Args:
         tour: the cities in their order, int32 `(n,)`; they are not checked.

@@ -180,6 +180,7 @@ def parse_tsplib(
         optimum: the length of a shortest tour, if known.
 
     Raises:
+        TypeError: it is no text.
         ValueError: it is not of TSPLIB's format, see `tsplib`.
     """
     file = _parsed(text, source)
@@ -222,6 +223,7 @@ def parse_tour(text: str, source: str = "TSPLIB text") -> NDArray[np.int32]:
     """Return the tour that a text in TSPLIB's format describes; see `read_tour`.
 
     Raises:
+        TypeError: it is no text.
         ValueError: it is not of that format.
     """
     file = _parsed(text, source)
@@ -275,7 +277,8 @@ def _matrix(file: _File, form: str, n_cities: int) -> FloatArray:
         matrix[np.triu_indices(n_cities, offset)] = numbers
     else:
         matrix[np.tril_indices(n_cities, -offset)] = numbers
-    return matrix + matrix.T  # the diagonal does not count
+    np.fill_diagonal(matrix, 0.0)  # it does not count, and twice as much may overflow
+    return matrix + matrix.T
 
 
 def _read(path: str | os.PathLike[str]) -> tuple[str, str]:
@@ -310,7 +313,17 @@ def _text_of(checked: Path) -> str:
 
 
 def _parsed(text: str, source: str) -> _File:
-    """Divide a text into its header and sections."""
+    """Divide a text into its header and sections.
+
+    Raises:
+        TypeError: it is no text.
+        ValueError: it is not of TSPLIB's format.
+    """
+    if not isinstance(text, str):
+        raise TypeError(
+            f"text must be what stands in a file of TSPLIB, got {validation.shown(text)} of "
+            f"type {type(text).__name__}; read a file with read_tsplib or read_tour."
+        )
     file = _File(source, {}, {})
     words: list[str] | None = None  # of the section that is being read
     # Editors may put a byte-order mark before the first line.

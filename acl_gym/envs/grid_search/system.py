@@ -19,6 +19,10 @@ from acl_gym.envs.grid_search.maps import FREE, GOAL, MAPS, WALL, checked_map, l
 from acl_gym.utils import validation
 from acl_gym.utils.typing import BoolArray, FloatArray, IntArray
 
+LEAST_PROBABILITY = 1e-9
+"""The smallest probability that a move succeeds. T grows by one over it, and with a smaller
+one no evaluation would come to its end."""
+
 NORTH, SOUTH, EAST, WEST = (-1, 0), (1, 0), (0, 1), (0, -1)  # row, column
 
 
@@ -63,7 +67,10 @@ class GridSearch(NumberedSystem):
 
     def _check_moves(self) -> None:
         p = validation.number(
-            "transition_probability", self.transition_probability, above=0, at_most=1
+            "transition_probability",
+            self.transition_probability,
+            at_least=LEAST_PROBABILITY,
+            at_most=1,
         )
         object.__setattr__(self, "transition_probability", p)
         mask = validation.boolean("mask_blocked", self.mask_blocked)
@@ -226,7 +233,7 @@ class GridSearch1D(GridSearch):
 
     Attributes:
         n_states: the length of the row, goal included, 2 to 1,000,000.
-        transition_probability: p, in (0, 1]: a move fails with probability 1 - p.
+        transition_probability: p, in [1e-9, 1]: a move fails with probability 1 - p.
         mask_blocked: whether infos carry `"action_mask"`, U_q of (3.4), which leaves
             out the blocked move of the first state.
     """
@@ -260,7 +267,7 @@ class GridSearch2D(GridSearch):
             `maps` made these. The mean shortest path has 9.99, 19.85 and 19.97 steps.
         desc: a map of your own, as text or as a sequence of rows, instead of
             `map_name`: `#` obstacle, `.` free, `G` goal, one or more.
-        transition_probability: p, in (0, 1]: a move fails with probability 1 - p.
+        transition_probability: p, in [1e-9, 1]: a move fails with probability 1 - p.
         mask_blocked: whether infos carry `"action_mask"`, U_q of (3.4), which leaves
             out the moves against obstacles and the border. The environment still
             takes such a move: the ant stays where it is.

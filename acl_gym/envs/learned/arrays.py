@@ -9,14 +9,21 @@ import numpy as np
 from acl_gym.utils import validation
 from acl_gym.utils.typing import BoolArray, FloatArray, IntArray
 
+LARGEST = 1e100
+"""The largest size of a recorded number. The squares of larger ones might overflow, and
+regressions would then learn nothing from them without saying so."""
+
+_LAST_RUN = 2**53
+"""The largest number of a run, so that runs of several recordings can be counted on."""
+
 
 def checked_table(
     name: str, values: Any, rows: int | None = None, columns: int | None = None
 ) -> FloatArray:
-    """Return finite numbers with a row for each step, `(n, size)`.
+    """Return numbers up to `LARGEST` in size, with a row for each step, `(n, size)`.
 
     Raises:
-        ValueError: they are none, or there are not `rows` and `columns` of them.
+        ValueError: they are no such numbers, or their shape is not `(rows, columns)`.
     """
     array = validation.real_array(name, values, finite=False)
     if array.ndim == 1:
@@ -31,24 +38,24 @@ def checked_table(
         raise ValueError(
             f"{name} must have the {columns} variables of states, got {array.shape[1]}."
         )
-    _check_finite(name, array)
+    _check_size(name, array)
     return np.ascontiguousarray(array)
 
 
 def checked_column(name: str, values: Any, count: int) -> FloatArray:
-    """Return `count` finite numbers.
+    """Return `count` numbers up to `LARGEST` in size.
 
     Raises:
-        ValueError: they are not that many, or not finite.
+        ValueError: their number is another, or one is not finite or too large.
     """
     array = validation.real_array(name, values, finite=False)
     if array.shape != (count,):
         raise ValueError(f"{name} must have shape ({count},), got {array.shape}.")
-    _check_finite(name, array[:, None])
+    _check_size(name, array[:, None])
     return array
 
 
-def _check_finite(name: str, array: FloatArray) -> None:
+def _check_size(name: str, array: FloatArray) -> None:
     finite = np.isfinite(array).all(axis=1)
     if not finite.all():
         row = int(np.argmin(finite))
@@ -57,13 +64,21 @@ def _check_finite(name: str, array: FloatArray) -> None:
             f"({np.count_nonzero(~finite)} rows of {len(array)} are not); leave such "
             "rows out or repair them."
         )
+    large = (np.abs(array) > LARGEST).any(axis=1)
+    if large.any():
+        row = int(np.argmax(large))
+        raise ValueError(
+            f"{name} must be at most {LARGEST:g} in size, got {array[row].tolist()} in row "
+            f"{row} ({np.count_nonzero(large)} rows of {len(array)} are larger); give them "
+            "in a larger unit, or leave such rows out."
+        )
 
 
 def checked_flags(name: str, values: Any, count: int) -> BoolArray:
-    """Return `count` booleans.
+    """Return `count` booleans; 0 and 1 are taken as such.
 
     Raises:
-        ValueError: they are not that many, or no booleans.
+        ValueError: their number is another, or they are no booleans.
     """
     array = validation.as_array(values)
     good = array is not None and array.shape == (count,) and array.dtype.kind in "biuf"
@@ -78,14 +93,19 @@ def checked_runs(values: Any, count: int) -> IntArray:
     """Return the number of the run of each of `count` steps.
 
     Raises:
-        ValueError: they are no integers, or fall.
+        ValueError: they are no integers, they fall, or one is beyond 2^53 in size.
     """
     array = validation.as_array(values)
     good = array is not None and array.shape == (count,) and array.dtype.kind in "iu"
-    if array is None or not good or (np.diff(array.astype(np.int64)) < 0).any():
+    if array is None or not good or (array[1:] < array[:-1]).any():
         raise ValueError(
             f"episodes must be {count} integers that do not fall, got "
             f"{validation.shown(values)}."
+        )
+    if array[0] < -_LAST_RUN or array[-1] > _LAST_RUN:
+        raise ValueError(
+            f"episodes must be integers in [-2^53, 2^53], got {array[0]} to {array[-1]}; "
+            "number the runs from 0."
         )
     return array.astype(np.int64)
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
@@ -76,12 +75,11 @@ def _of_minari_id(name: str) -> Any:
         return minari.load_dataset(name)
     except FileNotFoundError as error:
         there = list(minari.list_local_datasets())
-        similar = get_close_matches(name, there, 1)
-        hint = f" Did you mean {similar[0]!r}?" if similar else ""
         raise FileNotFoundError(
             f"dataset must be the id of a data set of Minari on this machine, got "
             f"{validation.shown(name)}; check the spelling, or download it with "
-            f"minari.download_dataset({validation.shown(name)}).{hint}"
+            f"minari.download_dataset({validation.shown(name)})."
+            f"{validation.did_you_mean(name, there)}"
         ) from error
     except Exception as error:  # whatever Minari and HDF5 raise for a damaged one
         raise ValueError(

@@ -181,12 +181,13 @@ def described(
 
 
 def described_by(env: Any, inputs: Any = None) -> dict[str, Any]:
-    """What an environment tells of its observations and actions.
+    """What an environment says about its observations and actions.
 
     Args:
         env: a single or a vector environment, wrapped or not.
-        inputs: what each of its numbered actions sets, where somebody knows that and it
-            does not tell: `(n_actions,)` or `(n_actions, n_inputs)`.
+        inputs: what each of its numbered actions sets, `(n_actions,)` or
+            `(n_actions, n_inputs)`, where the user knows it and the environment does not
+            say it.
 
     Returns:
         Arguments of `described`, and `size` and `n_inputs`.
@@ -194,7 +195,8 @@ def described_by(env: Any, inputs: Any = None) -> dict[str, Any]:
     Raises:
         TypeError: observations are not a Box of one axis, or actions neither `Discrete`
             nor such a Box.
-        ValueError: `inputs` are not a row for each numbered action, or it tells its own.
+        ValueError: `inputs` are not a row for each numbered action, or the environment
+            says itself what its actions set.
     """
     single = "single_" if hasattr(env, "single_observation_space") else ""
     seen = getattr(env, f"{single}observation_space")
@@ -248,7 +250,7 @@ def _inputs_of_actions(
     """What each of the numbered actions sets, `(n_actions, n_inputs)`, checked."""
     if signals is not None:
         raise ValueError(
-            "inputs belong to continuous actions, or to an environment that does not tell "
+            "inputs belong to continuous actions, or to an environment that does not say "
             f"what its numbered actions set; this one does: {', '.join(signals.inputs)}, "
             f"got inputs={validation.shown(inputs)}; leave them out."
         )
@@ -306,7 +308,7 @@ def rows_of_inputs(inputs: Any, n_inputs: int, name: str = "inputs") -> FloatArr
         name: what messages call them.
 
     Raises:
-        ValueError: they are none.
+        ValueError: they are not such rows.
     """
     array = validation.real_array(name, inputs)
     array = array[:, None] if array.ndim == 1 else array

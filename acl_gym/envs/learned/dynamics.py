@@ -31,8 +31,9 @@ class LearnedDynamics:
             the posterior of a Gaussian process, or of random features. Other kinds of
             regression have the five of cross-validation.
         seed: of the draws; None takes another one each time.
-        begin: dynamics learned from fewer steps; the search for length scales begins
-            there.
+        begin: dynamics learned from fewer steps of the same plant. The search for length
+            scales begins there, and "auto" takes its kind of regression unless there are
+            1.5 times as many steps as when kinds were last compared.
 
     Attributes:
         features: of states and inputs.
@@ -40,7 +41,8 @@ class LearnedDynamics:
     Raises:
         ValueError: there are too few steps, an action was never tried with
             `per_action`, or the seed is negative.
-        TypeError: `per_action` is not True or False, or the seed no integer.
+        TypeError: `transitions` or `begin` are of another type, `per_action` is not True or
+            False, or the seed is no integer.
     """
 
     def __init__(
@@ -53,6 +55,16 @@ class LearnedDynamics:
         seed: int | None = 0,
         begin: LearnedDynamics | None = None,
     ) -> None:
+        if not isinstance(transitions, Transitions):
+            raise TypeError(
+                "transitions must be acl_gym.Transitions, got "
+                f"{validation.shown(transitions)}."
+            )
+        if begin is not None and not isinstance(begin, LearnedDynamics):
+            raise TypeError(
+                "begin must be a LearnedDynamics or None, got "
+                f"{validation.shown(begin)}."
+            )
         kind = checked_kind(regressor)
         if len(transitions) < LEAST_STEPS:
             raise ValueError(
@@ -194,8 +206,9 @@ class LearnedDynamics:
     def distance(self, variables: FloatArray, inputs: FloatArray) -> FloatArray:
         """How far the nearest recorded step is, `(n,)`.
 
-        In features of unit size: 0 is a recorded step, and 1 is as far away as a
-        deviation of one of them. Unlike `spread` it believes in no smoothness.
+        In features of unit size: 0 is a recorded step, and 1 is as far away as the
+        standard deviation of one feature. Unlike `spread`, it does not assume that the
+        dynamics are smooth.
 
         Args:
             variables: `(n_variables, n)`.

@@ -70,15 +70,16 @@ class LearnedVectorEnv(ControlVectorEnv):
         n_draws: see there; only with `uncertain`.
         uncertain: let each slot walk in its own function, drawn anew in each episode
             from all that fit the data, so that a policy is learned that works for all.
-        pessimism: what a step costs more where the model is not sure, for a `spread` of
-            1, >= 0. None takes 0 with one or two state variables, and with more, where no
-            model is right everywhere, a tenth of the most that a step costs.
+        pessimism: how much more a step costs where the model is not sure, for a `spread`
+            of 1, >= 0. None takes 0 with one or two state variables, and with more, where
+            no model is right everywhere, a tenth of the most that a step costs.
         most_spread: where the `spread` of a step is more than this, > 0, the episode
-            ends in failure: the step costs as much as the dearest step does, for itself
-            and for each step that was left. So no policy gains by leaving the data. None
-            lets ants go anywhere.
-        dynamics: what was learned already, in place of learning it.
-        begin: dynamics learned from fewer steps, from which the search begins.
+            ends in failure: it is charged the cost of the most expensive step, for this
+            step and for each step that was left. So no policy gains by leaving the data.
+            None lets ants go anywhere.
+        dynamics: what was learned already from a recording of this plant, in place of
+            learning it.
+        begin: see `LearnedDynamics`.
         seed: of the draws; None takes another one each time.
         autoreset_mode: see `ControlVectorEnv`.
         render_mode: see there.
@@ -90,8 +91,8 @@ class LearnedVectorEnv(ControlVectorEnv):
         learned_goal: the `LearnedGoal`; None where `goal` was given or there is none.
 
     Raises:
-        TypeError: `transitions`, `regressor`, `seed`, `uncertain` or `per_action` are of
-            the wrong kind.
+        TypeError: `transitions`, `regressor`, `seed`, `uncertain`, `per_action`,
+            `dynamics` or `begin` are of the wrong kind.
         ValueError: there are too few steps, no rewards and no cost, or an argument does
             not fit the data.
 
@@ -149,7 +150,9 @@ class LearnedVectorEnv(ControlVectorEnv):
             )
         for doubt in transitions.doubts():
             warnings.warn(DataWarning(doubt), stacklevel=2)
-        if dynamics is None:
+        if dynamics is not None:
+            _check_dynamics(dynamics, transitions)
+        else:
             dynamics = LearnedDynamics(
                 transitions,
                 regressor,
@@ -252,6 +255,26 @@ class LearnedVectorEnv(ControlVectorEnv):
         return made
 
 
+def _check_dynamics(dynamics: Any, transitions: Transitions) -> None:
+    """Check that `dynamics` was learned, and from a plant with these variables.
+
+    Raises:
+        TypeError: it is no `LearnedDynamics`.
+        ValueError: its states or inputs have other names.
+    """
+    if not isinstance(dynamics, LearnedDynamics):
+        raise TypeError(
+            "dynamics must be a LearnedDynamics or None, got "
+            f"{validation.shown(dynamics)}; take that of another LearnedVectorEnv."
+        )
+    difference = dynamics.description.difference(transitions.description)
+    if difference is not None:
+        raise ValueError(
+            f"dynamics must be learned from the plant of transitions, got {difference}; "
+            "leave it out to learn it anew."
+        )
+
+
 def _inputs(inputs: Any, transitions: Transitions) -> Any:
     """The inputs of each action, `(n_actions, n_inputs)`."""
     known = transitions.description
@@ -284,8 +307,7 @@ def _bounds(
     circle = periods_of(known) > 0.0
     centre = None if goal is None or callable(goal) else validation.as_array(goal)
     if centre is not None and centre.shape == bottom.shape:
-        if not np.isfinite(centre.astype(float)).all():
-            raise ValueError(f"goal must be finite, got {validation.shown(goal)}.")
+        centre = validation.real_array("goal", goal)
         half = (top - bottom) / 40
         if tolerance is not None:
             half = validation.real_array("tolerance", tolerance, finite=False)

@@ -1,4 +1,4 @@
-"""What a regression is told of states and inputs, and what it is to predict."""
+"""The features that a regression gets from states and inputs, and what it predicts."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ LINEAR, COSINE, SINE, IS_ACTION = range(4)
 """What a feature is of its variable or input."""
 
 _LEAST = 1e-12
-"""A deviation that is less than this share of the largest number is one of rounding.
+"""A deviation that is less than this share of the largest number comes from rounding.
 
 It is relative, since a plant may be described in any unit."""
 
@@ -33,8 +33,8 @@ class Features:
     Attributes:
         kind: of each feature, `(n_features,)`.
         source: the row that it is made of, states first, then inputs.
-        offset: what is taken off, or the number of the action.
-        scale: by what the rest is multiplied.
+        offset: what is subtracted, or the number of the action.
+        scale: the factor on the difference.
         period: of each variable, 0 where it is not circular, `(n_variables,)`.
         change_mean: of the changes of variables in a step, `(n_variables,)`.
         change_scale: their deviations.

@@ -40,10 +40,16 @@ class LearnedCost:
 
     def __init__(self, transitions: Transitions, regressor: Any = "auto") -> None:
         rewards = transitions.rewards
-        if rewards is None or len(transitions) < LEAST_STEPS:
+        remedy = 'give cost=, such as a function of x and u, (Q, R) or "time"'
+        if rewards is None:
             raise ValueError(
                 "a cost can be learned from rewards only, which this recording lacks; "
-                'give cost=, such as a function of x and u, (Q, R) or "time".'
+                f"{remedy}."
+            )
+        if len(transitions) < LEAST_STEPS:
+            raise ValueError(
+                f"a cost can be learned from {LEAST_STEPS} steps or more, got "
+                f"{len(transitions)}; record more, or {remedy}."
             )
         self._mean = float(-rewards.mean())
         self._scale = float(rewards.std()) or 1.0
@@ -95,7 +101,7 @@ class LearnedGoal:
     """Where episodes end, learned from recorded terminations: a decision tree.
 
     Ends mostly lie behind thresholds, which a tree finds exactly. It knows ends only
-    where it has seen some: a small goal that was never reached is none.
+    where it has seen some: it does not know a small goal that was never reached.
 
     Args:
         transitions: with terminations, of which some are True and some are not.

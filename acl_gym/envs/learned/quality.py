@@ -12,10 +12,10 @@ from acl_gym.utils.angles import FULL_CIRCLE
 from acl_gym.utils.typing import FloatArray, IntArray
 
 FEW = 10
-"""Steps for each variable and input, below which a recording is called short."""
+"""Steps for each variable and input below which a recording is called short."""
 
 MANY_TURNS = 20
-"""Turns of an angle in one recording that are hardly turns."""
+"""Turns of an angle in one recording above which its unit is doubted."""
 
 OFTEN_TWICE = 0.25
 """The share of moving steps that may be there twice; runs with the same start may begin
@@ -34,8 +34,12 @@ ROUGHLY = 0.5
 """The same for factors of parts, which are less certain; those between units are larger."""
 
 FAR = 0.5
-"""How many times its recorded range a goal may lie beyond it, in a variable, before that
-is said."""
+"""How many times its recorded range a goal may lie beyond that range, in a variable, before
+a doubt is raised."""
+
+UNSURE = 0.5
+"""A spread above which a model is called unsure of a step: half of what a step changes on
+the average."""
 
 UNITS = {
     180 / np.pi: "degrees instead of radians",
@@ -111,10 +115,10 @@ def _count(number: int, what: str) -> str:
 def unit_doubts(
     states: FloatArray, next_states: FloatArray, description: Description
 ) -> list[str]:
-    """What speaks for units that are mixed up, a sentence each.
+    """What suggests that units are mixed up, a sentence each.
 
-    A variable is the rate of change of another, but for a factor between units; or an
-    angle goes round more often than any.
+    Either a variable is the rate of change of another except for a factor between units,
+    or an angle makes more turns than angles usually do.
 
     Args:
         states: as they were recorded, `(n, d)`, angles not brought back.

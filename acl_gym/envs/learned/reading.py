@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 import warnings
 from collections.abc import Sequence
-from difflib import get_close_matches
+from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -115,7 +116,8 @@ def arrays_of_frames(
             table["time"] = _seconds(frame, time, name)
         table["run"] = _changes(frame, run, name)
         if time is not None:
-            times.append(_usual_step(table["time"], table["run"], time, name))
+            usual = _usual_step(table["time"], table["run"], time, name)
+            times += [] if usual is None else [usual]
         tables.append(table)
     if sampling_time is None and times:
         sampling_time = float(np.median(times))
@@ -183,7 +185,8 @@ def _steps(
     return part, gaps
 
 
-def _usual_step(time: Any, run: Any, column: str, name: str) -> float:
+def _usual_step(time: Any, run: Any, column: str, name: str) -> float | None:
+    """The median time from a row to the next of its run; None where none has a next."""
     step = np.diff(time)
     inside = run[1:] == run[:-1]
     if inside.any() and not (step[inside] > 0).all():
@@ -193,7 +196,7 @@ def _usual_step(time: Any, run: Any, column: str, name: str) -> float:
             f"and then {time[row + 1]:g} in rows {row} and {row + 1}; sort the rows, "
             "remove those that are there twice, or name the column of the run."
         )
-    return float(np.median(step[inside])) if inside.any() else np.nan
+    return float(np.median(step[inside])) if inside.any() else None
 
 
 def _changes(frame: Any, run: str | None, name: str) -> Any:
@@ -205,7 +208,7 @@ def _changes(frame: Any, run: str | None, name: str) -> Any:
     missing = column.isna().to_numpy()
     if missing.any():
         raise ValueError(
-            f"column {run!r} of {name} must say of each row which run it belongs to, got "
+            f"column {run!r} of {name} must say which run each row belongs to, got "
             f"nothing in row {int(np.argmax(missing))} ({np.count_nonzero(missing)} rows of "
             f"{len(missing)} are empty); fill in the run, or leave such rows out."
         )
@@ -220,13 +223,16 @@ def _numbers(frame: Any, columns: list[str], name: str) -> NDArray[np.float64]:
     found = []
     for column in columns:
         values = _column(frame, column).to_numpy()
+        if values.dtype.kind == "O" and all(map(_is_number, values)):
+            # Numbers of several types; what no float64 holds becomes infinite.
+            values = np.array([_as_float(each) for each in values])
         if values.dtype.kind in "mM":
             raise ValueError(
                 f"column {column!r} of {name} must hold numbers, got dates or times "
                 f"({values.dtype}); only the column of the time may hold these."
             )
         if values.dtype.kind not in "biuf":
-            row = next((i for i, v in enumerate(values) if not _is_number(v)), 0)
+            row = next((i for i, v in enumerate(values) if not _reads_as_number(v)), 0)
             raise ValueError(
                 f"column {column!r} of {name} must hold numbers, got "
                 f"{validation.shown(values[row : row + 1].tolist())} in row {row}, counted "
@@ -288,11 +294,10 @@ def _check_described(described: dict[str, Any]) -> None:
     """Refuse what describes no recording, such as a name that is misspelt."""
     for name in described:
         if name not in DESCRIBED:
-            similar = get_close_matches(name, (*COLUMNS, *DESCRIBED), 1)
-            hint = f" Did you mean {similar[0]!r}?" if similar else ""
             raise TypeError(
                 f"columns of a recording are named by {', '.join(COLUMNS)}, and described "
-                f"by {', '.join(DESCRIBED)}, got {name!r}.{hint}"
+                f"by {', '.join(DESCRIBED)}, got {name!r}."
+                f"{validation.did_you_mean(name, (*COLUMNS, *DESCRIBED))}"
             )
 
 
@@ -314,9 +319,24 @@ def _listed(name: str, columns: Any) -> list[str]:
     return listed
 
 
-def _is_number(value: Any) -> bool:
+def _as_float(value: Real) -> float:
+    try:
+        return float(value)
+    except OverflowError:
+        return math.inf
+
+
+def _reads_as_number(value: Any) -> bool:
+    """Whether a value, which may be text, is a number."""
     try:
         float(value)
     except (TypeError, ValueError):
         return False
+    except OverflowError:  # an integer beyond all floats
+        return True
     return True
+
+
+def _is_number(value: Any) -> bool:
+    """Whether a value is a real number already."""
+    return isinstance(value, Real) and not isinstance(value, bool)

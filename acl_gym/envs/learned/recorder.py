@@ -10,6 +10,7 @@ from gymnasium import spaces
 from gymnasium.vector import AutoresetMode, VectorEnv
 from numpy.typing import NDArray
 
+from acl_gym.envs import received
 from acl_gym.envs.learned.description import described_by
 from acl_gym.utils import validation
 from acl_gym.utils.typing import BoolArray, IntArray
@@ -39,7 +40,8 @@ class Recorder:
         facts: what the environment tells of its numbers, arguments of `Transitions`.
 
     Raises:
-        TypeError: observations or actions are of a kind that cannot be recorded.
+        TypeError: `env` is no environment, `policy` chooses no actions, or observations
+            or actions are of a kind that cannot be recorded.
         ValueError: `inputs` do not fit the actions.
     """
 
@@ -52,6 +54,16 @@ class Recorder:
         inputs: Any = None,
         seed: int | None = None,
     ) -> None:
+        if not all(callable(getattr(env, name, None)) for name in ("reset", "step")):
+            raise TypeError(
+                "env must be an environment of Gymnasium, single or vector, got "
+                f"{validation.shown(env)}; make it with gym.make or gym.make_vec."
+            )
+        if policy is not None and not callable(getattr(policy, "predict", policy)):
+            raise TypeError(
+                "policy must have predict(observations), be a function of observations, "
+                f"or be None, got {validation.shown(policy)}."
+            )
         self.facts = described_by(env, inputs)
         self._size = self.facts.pop("size")
         del self.facts["n_inputs"]
@@ -59,7 +71,7 @@ class Recorder:
         self.hold = validation.integer("hold", hold, at_least=1)
         self._vector = isinstance(env, VectorEnv)
         self.num_envs = env.num_envs if self._vector else 1
-        self._space = env.single_action_space if self._vector else env.action_space
+        self._space: Any = env.single_action_space if self._vector else env.action_space
         # What numbered actions set, where that is known.
         self._values: NDArray[np.float64] | None = None
         if isinstance(self._space, spaces.Discrete) and not self.facts.get("numbered"):
@@ -84,9 +96,12 @@ class Recorder:
 
         Returns:
             Which slots' episodes have ended, `(num_envs,)`.
+
+        Raises:
+            ValueError: actions are not one for each slot from the action space, or the
+                environment returns what cannot be recorded.
         """
-        if actions is None:
-            actions = self._chosen()
+        actions = self._checked(self._chosen() if actions is None else actions)
         if self._vector:
             found, *results, infos = self.env.step(actions)
         else:
@@ -103,11 +118,11 @@ class Recorder:
         mode = self._mode()
         if ended.any() and mode is AutoresetMode.SAME_STEP:
             reached = found.copy()
-            last = infos["final_obs"]
+            last = received.infos(infos, self.num_envs).get("final_obs")
             for slot in np.flatnonzero(ended):
-                reached[slot] = np.asarray(last[slot], dtype=np.float64)
+                reached[slot] = self._last(last, int(slot))
         self._check(reached, rewards)
-        made = ~self._starting  # the step of a slot that restarts is none
+        made = ~self._starting  # a slot that restarts makes no step
         rows = np.flatnonzero(made)
         new = {
             "states": self.observation[rows],
@@ -129,6 +144,61 @@ class Recorder:
             elif mode is not AutoresetMode.SAME_STEP:
                 self._begin(ended)
         return ended
+
+    def _checked(self, actions: Any) -> NDArray[Any]:
+        """Actions, one for each slot, from the action space.
+
+        Raises:
+            ValueError: they are something else.
+        """
+        array = validation.as_array(actions)
+        discrete = isinstance(self._space, spaces.Discrete)
+        shape = (self.num_envs, *(() if discrete else self._space.shape))
+        kinds = "iu" if discrete else "biuf"
+        if array is None or array.shape != shape or array.dtype.kind not in kinds:
+            raise ValueError(
+                f"actions must be {'integers' if discrete else 'numbers'} of shape {shape}, "
+                f"a row for each slot, got {validation.shown(actions)}; check the policy."
+            )
+        if discrete:
+            first, last = (
+                int(self._space.start),
+                int(self._space.start + self._space.n) - 1,
+            )
+            wrong = (array < first) | (array > last)
+            expected = f"in {first}..{last}"
+        else:
+            wrong = ~np.isfinite(array).reshape(self.num_envs, -1).all(axis=1)
+            expected = "finite"
+        if wrong.any():
+            slot = int(np.argmax(wrong))
+            raise ValueError(
+                f"actions must be {expected}, got {validation.shown(array[slot].tolist())} "
+                f"in slot {slot}; check the policy."
+            )
+        return array
+
+    def _last(self, observations: Any, slot: int) -> NDArray[np.float64]:
+        """The last observation of an episode, which SAME_STEP hands out in infos.
+
+        Raises:
+            ValueError: infos do not hold it.
+        """
+        found = validation.as_array(
+            None if observations is None else observations[slot]
+        )
+        if (
+            found is None
+            or found.shape != (self._size,)
+            or found.dtype.kind not in "biuf"
+        ):
+            raise ValueError(
+                "infos['final_obs'] must hold the last observation of each slot that has "
+                f"finished, {self._size} numbers, got {validation.shown(observations)} "
+                f"for slot {slot}; check the environment and its wrappers. Nothing of that "
+                "step was kept."
+            )
+        return found.astype(np.float64)
 
     def _numbers(self, found: Any) -> NDArray[np.float64]:
         """Observations `(num_envs, size)` as numbers.
@@ -173,7 +243,7 @@ class Recorder:
         return array.reshape(self.num_envs)
 
     def _check(self, reached: NDArray[np.float64], rewards: Any) -> None:
-        """Refuse what is not finite before it is kept: nobody could learn from it."""
+        """Refuse what is not finite before it is kept: a model cannot learn from it."""
         good = np.isfinite(reached).all(axis=1) & np.isfinite(rewards)
         if not good.all():
             slot = int(np.argmin(good))
@@ -248,21 +318,21 @@ class Recorder:
             return self._drawn
         predict: Any = getattr(self.policy, "predict", self.policy)
         found: Any = predict(self.observation)
-        return np.asarray(found[0] if isinstance(found, tuple) else found)
+        return found[0] if isinstance(found, tuple) and found else found
 
-    def _inputs(self, actions: Any) -> NDArray[np.float64]:
+    def _inputs(self, actions: NDArray[Any]) -> NDArray[np.float64]:
         """What the actions set, `(num_envs, n_inputs)`."""
-        array = np.asarray(actions)
         if self._values is not None:
-            return np.asarray(self._values[array - int(self._space.start)])
-        return array.reshape(self.num_envs, -1).astype(np.float64)
+            return np.asarray(self._values[actions - int(self._space.start)])
+        return np.asarray(actions.reshape(self.num_envs, -1).astype(np.float64))
 
-    def _single(self, actions: Any) -> Any:
-        action = np.asarray(actions)[0]
+    def _single(self, actions: NDArray[Any]) -> Any:
+        action = actions[0]
         return int(action) if isinstance(self._space, spaces.Discrete) else action
 
     def _mode(self) -> Any:
-        return self.env.metadata.get("autoreset_mode") if self._vector else None
+        """What a vector environment does with slots that have finished."""
+        return received.autoreset_mode_of(self.env) if self._vector else None
 
     def _reset(self, **how: Any) -> NDArray[np.float64]:
         found, _ = self.env.reset(**how)

@@ -130,7 +130,7 @@ class OfLibrary(Regression):
 
 
 def _predicted(estimator: Any, rows: FloatArray) -> FloatArray:
-    """What an estimator predicts, `(n,)`, whoever wrote it.
+    """What an estimator of any author predicts, `(n,)`, checked.
 
     Raises:
         ValueError: it predicts something else than a finite number for each row.
@@ -163,7 +163,8 @@ class Fit:
         n_draws: draws from the posterior beside the mean.
         seed: of the draws.
         begin: the fit of fewer data. Scales are searched for and kinds compared anew
-            only where there are `AGAIN` times as many data as at the last time.
+            only where there are `AGAIN` times as many data as at the last time; until
+            then "auto" takes the kind of that fit.
 
     Attributes:
         regression: what predicts.
@@ -183,7 +184,7 @@ class Fit:
         seed: int = 0,
         begin: Fit | None = None,
     ) -> None:
-        # Before threads are limited: only libraries that are loaded are told.
+        # Before threads are limited, which reaches only libraries that are loaded.
         import sklearn.ensemble
         import sklearn.neighbors  # noqa: F401
         from threadpoolctl import threadpool_limits
@@ -212,11 +213,18 @@ class Fit:
         self.scales: list[Scales]
         self.searched_at: int
         count, n_features = outputs[0].every.size, outputs[0].rows.shape[1]
-        if begin is not None and begin.scales[0].lengths.size != n_features:
+        if begin is not None and (
+            len(begin.scales) != len(outputs)
+            or begin.scales[0].lengths.size != n_features
+        ):
             begin = None
         if begin is not None and count < AGAIN * begin.searched_at:
             self.scales, self.searched_at = begin.scales, begin.searched_at
-            kinds = [begin.regression.name if isinstance(kind, str) else kind]
+            known = begin.regression.name
+            again = (
+                kind == "auto" and known in KINDS
+            )  # else it is an object of the user's
+            kinds = [known] if again else _candidates(kind, count)
         else:
             self.searched_at = count
             self.scales = [
@@ -254,10 +262,10 @@ class Fit:
         return self._with_lines(rows, self.regression.of_members(rows, members))
 
     def deviation(self, rows: FloatArray) -> FloatArray:
-        """What is not known of each output, `(n, n_outputs)`: of the line and of the rest.
+        """How uncertain each output is, `(n, n_outputs)`: its line and the rest together.
 
-        What the line leaves counts as its noise. So where it leaves much, or has seen
-        little, a point far from the data is not certain.
+        What the line leaves unexplained counts as its noise. So a point far from the
+        data is uncertain where the line leaves much, or was fitted to few data.
         """
         found = self._certainty.deviation(rows)
         add_leverage(rows, self._unsure, self._scale, found)

@@ -13,7 +13,7 @@ from acl_gym.utils import archives
 from acl_gym.utils.validation import shown
 
 MOST_BYTES = 2**32
-"""What a file of transitions may hold unpacked, unless `load` is told otherwise."""
+"""What a file of transitions may hold unpacked, unless `load` gets another limit."""
 
 _ARRAYS = ("states", "inputs", "next_states", "rewards", "terminated", "episodes")
 _FLAT = ("state_names", "input_names", "circular", "angles", "numbered")

@@ -19,8 +19,8 @@ MEMBER = "member"
 """The name of the uncertain parameter that says which function a slot walks in."""
 
 CAUTION = 0.1
-"""What a step of which the model knows nothing costs more if nothing else is said, as a
-share of the most that a step costs; with more than two variables."""
+"""By how much a step of which the model knows nothing costs more by default, as a share of
+the most that a step costs; only with more than two variables."""
 
 
 class LearnedSystem(Plant):

@@ -40,14 +40,16 @@ class Transitions:
     (300, (300, 2), ('torque u, N m',))
 
     Args:
-        states: x(t), `(n, state_size)`, or `(n,)` for one variable; finite.
-        inputs: u(t), `(n, n_inputs)`, or `(n,)` for one input; finite.
+        states: x(t), `(n, state_size)`, or `(n,)` for one variable; up to 1e100 in size,
+            as all numbers are.
+        inputs: u(t), `(n, n_inputs)`, or `(n,)` for one input.
         next_states: x(t+1), in the shape of `states`.
-        rewards: what the steps gave, `(n,)`; None if that is not known.
+        rewards: of the steps, `(n,)`; None if they are not known.
         terminated: whether an episode ended with the step, in its goal or in failure,
             `(n,)`; None if that is not known.
-        episodes: the number of the run that each step belongs to, `(n,)`, in order; None
-            begins a new one wherever a state is not the next state of the step before.
+        episodes: the number of the run that each step belongs to, `(n,)`, in order, up to
+            2^53 in size; None begins a new run wherever a state is not the next state of
+            the step before.
         state_names: of the variables, with units.
         input_names: of the inputs.
         low: lower end of each variable, None where it is unknown.
@@ -62,7 +64,9 @@ class Transitions:
         sampling_time: s, > 0, where it is known.
 
     Raises:
-        ValueError: the arrays do not belong together, or hold NaN; or see `described`.
+        ValueError: the arrays do not belong together, or hold NaN or numbers that are too
+            large; a name, bound or axis is not valid.
+        TypeError: `circular` or `angles` are of the wrong kind.
     """
 
     def __init__(
@@ -137,7 +141,7 @@ class Transitions:
 
     @property
     def rewards(self) -> FloatArray | None:
-        """What the steps gave, `(n,)`, read-only; None if that is not known."""
+        """The rewards of the steps, `(n,)`, read-only; None if they are not known."""
         return self._arrays.get("rewards")
 
     @property
@@ -196,16 +200,18 @@ class Transitions:
             ValueError: none are left, or the mask has another length.
         """
         if not isinstance(rows, slice):
-            rows = validation.as_array(rows)
-            if rows is None or rows.dtype != np.bool_:
+            mask = validation.as_array(rows)
+            if mask is None or mask.dtype != np.bool_:
                 raise TypeError(
-                    "steps are chosen by a slice or a mask of booleans, got "
-                    f"{validation.shown(rows)}."
+                    "steps must be chosen by a slice or a mask of booleans, got "
+                    f"{validation.shown(rows)}; for step i use [i : i + 1]."
                 )
-            if rows.shape != (len(self),):
+            if mask.shape != (len(self),):
                 raise ValueError(
-                    f"the mask must have shape ({len(self)},), got {rows.shape}."
+                    f"the mask must have shape ({len(self)},), one for each step, got "
+                    f"{mask.shape}."
                 )
+            rows = mask
         kept = {name: array[rows] for name, array in self._arrays.items()}
         if not len(kept["states"]):
             raise ValueError("at least one step must be left, got none.")
@@ -243,8 +249,8 @@ class Transitions:
     def doubts(self) -> list[str]:
         """What speaks against learning from this data, a sentence each; empty if nothing.
 
-        Few steps, inputs that never change, rows that are there twice, variables that
-        never change, and units that do not fit together.
+        Looked for are few steps, inputs and variables that never change, rows that are
+        there twice, and units that do not fit together.
         """
         found = doubts(
             self.states, self.inputs, self.next_states, self.episodes, self.description
@@ -272,7 +278,7 @@ class Transitions:
 
         Raises:
             FileNotFoundError: there is no such file.
-            ValueError: it is none of this package, or is damaged.
+            ValueError: it is not a file of this package, or is damaged.
         """
         found, told = saving.load(
             path, max_bytes, lambda facts, told: (cls(**facts), told)
@@ -380,7 +386,7 @@ class Transitions:
     def _made(
         cls, description: Description, arrays: dict[str, Any], unit_doubts: list[str]
     ) -> Self:
-        """From arrays that are known to be good."""
+        """Make a recording of arrays that were checked before."""
         made = cls.__new__(cls)
         made.description, made._arrays = description, arrays
         made._unit_doubts = list(unit_doubts)

@@ -20,6 +20,9 @@ from acl_gym.envs.pendulum.kernels import TWO_PI
 from acl_gym.utils import threads, validation
 from acl_gym.utils.typing import BoolArray, FloatArray
 
+_LARGEST_ANGLE = 1e5
+"""rad; beyond it `fast_math.sine` is not valid."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Pendulum(BlockSystem):
@@ -97,7 +100,9 @@ class Pendulum(BlockSystem):
             "substeps": int(self.substeps),
         }
         parameters.set_canonical(self, canonical)
-        self._check_step()
+        with np.errstate(over="ignore", invalid="ignore"):  # the checks look for it
+            self._check_step()
+            self._check_cost()
 
     @cached_property
     def _dynamics(self) -> tuple[Any, ...]:
@@ -287,6 +292,24 @@ class Pendulum(BlockSystem):
                 "sampling_time / substeps must be well below the fastest time constant "
                 f"of the pendulum, {1 / fastest:.3g} s, got {step:g} s; use more "
                 "substeps or check inertia, mass, length, gravity and damping."
+            )
+        # How far the pendulum can turn in a sampling time, before omega is clipped.
+        fastest_turn = self.omega_max + self.sampling_time * (
+            np.abs(pushes).max() + stiffness
+        )
+        turned = TWO_PI + self.sampling_time * fastest_turn
+        if not turned < _LARGEST_ANGLE:
+            raise ValueError(
+                "sampling_time, omega_max and torques * motor_gain / inertia must keep the "
+                f"angle below {_LARGEST_ANGLE:g} rad in one step, got up to {turned:.3g} "
+                "rad; use smaller ones."
+            )
+
+    def _check_cost(self) -> None:
+        if not math.isfinite(self.max_stage_cost):
+            raise ValueError(
+                "state_weight and torque_weight must give a finite stage cost, got "
+                f"{self.max_stage_cost}; use smaller ones."
             )
 
     def _in_goal(self, states: FloatArray) -> BoolArray:

@@ -47,6 +47,7 @@ class Equations:
         self._discrete_time = discrete_time
         self._parameters = parameters
         self._compiled: kernels.Advance | None = None
+        self._reuses_memory = False
         drawn = parameters.draw(np.random.default_rng(1), samples.shape[1])
         if is_model(dynamics):
             self._dynamics = _checked_model(
@@ -67,6 +68,12 @@ class Equations:
             self._check_compiled(samples, inputs, drawn)
         else:
             _check(dynamics, samples, inputs, parameters, drawn)
+        if not isinstance(self._dynamics, Dispatcher):
+            f, u = (
+                _bound(self._dynamics, parameters, drawn),
+                _inputs_for(samples, inputs),
+            )
+            self._reuses_memory = _reuses_memory(f, samples, u)
 
     def __getstate__(self) -> dict[str, Any]:
         """A kernel is compiled again in each process."""
@@ -90,18 +97,19 @@ class Equations:
             return self._compiled(states, actions, inputs, step, substeps, *more)
         f, u = _bound(self._dynamics, parameters, own), inputs.T[:, actions]
         u.setflags(write=False)
+        copied = self._reuses_memory
         # What is not finite is an error of its own; no need to warn of it as well.
         with np.errstate(all="ignore"):
             x = states
             if self._discrete_time:
-                x = _evaluated(f, validation.read_only(x), u)
+                x = _evaluated(f, validation.read_only(x), u, copied)
             else:
                 for _ in range(substeps):
                     # The others are temporary arrays.
-                    k1 = _evaluated(f, validation.read_only(x), u)
-                    k2 = _evaluated(f, x + 0.5 * step * k1, u)
-                    k3 = _evaluated(f, x + 0.5 * step * k2, u)
-                    k4 = _evaluated(f, x + step * k3, u)
+                    k1 = _evaluated(f, validation.read_only(x), u, copied)
+                    k2 = _evaluated(f, x + 0.5 * step * k1, u, copied)
+                    k3 = _evaluated(f, x + 0.5 * step * k2, u, copied)
+                    k4 = _evaluated(f, x + step * k3, u, copied)
                     x = x + step / 6.0 * (k1 + 2.0 * (k2 + k3) + k4)
             finite = np.isfinite(x)
         if finite.all():
@@ -206,8 +214,27 @@ def _expects(size: int, n_inputs: int, names: tuple[str, ...] = ()) -> str:
     )
 
 
-def _evaluated(dynamics: Any, x: FloatArray, u: FloatArray) -> FloatArray:
+def _reuses_memory(
+    f: Callable[[FloatArray, FloatArray], Any], x: FloatArray, u: FloatArray
+) -> bool:
+    """Whether each call writes to the array that the call before it returned."""
+    x, u = validation.read_only(x), validation.read_only(u)
+    with np.errstate(all="ignore"):
+        one, other = f(x, u), f(x, u)
+    arrays = isinstance(one, np.ndarray) and isinstance(other, np.ndarray)
+    return arrays and np.may_share_memory(one, other)
+
+
+def _evaluated(
+    dynamics: Any, x: FloatArray, u: FloatArray, copied: bool = False
+) -> FloatArray:
     """f(x, u) as an array.
+
+    Args:
+        dynamics: f.
+        x: states, `(state_size, n)`.
+        u: inputs, `(n_inputs, n)`.
+        copied: whether the result is needed beyond the next call, which overwrites it.
 
     Raises:
         ValueError: it writes to read-only arguments, or does not give a row of real
@@ -228,7 +255,7 @@ def _evaluated(dynamics: Any, x: FloatArray, u: FloatArray) -> FloatArray:
         and given.shape == shape
         and given.dtype.kind in "iuf"
     ):
-        return given
+        return given.copy() if copied else given
     stacked = np.empty(shape)
     try:
         for row, value in zip(stacked, given, strict=True):

@@ -202,13 +202,15 @@ def plant(
         return PlantVectorEnv(
             num_envs,
             max_episode_steps=steps,
-            autoreset_mode=autoreset_mode or AutoresetMode.NEXT_STEP,
+            autoreset_mode=(
+                AutoresetMode.NEXT_STEP if autoreset_mode is None else autoreset_mode
+            ),
             render_mode=render_mode,
             **settings,
         )
     if autoreset_mode is not None:
         raise ValueError(
             "autoreset_mode belongs to a vector environment, got "
-            f"{autoreset_mode!r}; give num_envs as well, or leave it out."
+            f"{validation.shown(autoreset_mode)}; give num_envs as well, or leave it out."
         )
     return TimeLimit(PlantEnv(render_mode, **settings), steps)

@@ -33,7 +33,8 @@ class Model:
     def __init__(self, system: Any, one_by_one: bool = False) -> None:
         self.system, self.one_by_one = system, one_by_one
         timebase = system.dt
-        # 0 and None are continuous time, True is discrete without a sampling time.
+        # 0 and None mean continuous time; True means discrete time without a sampling
+        # time.
         self.discrete_time = timebase is True or bool(timebase)
         self.sampling_time = (
             float(timebase) if timebase and timebase is not True else None
@@ -45,7 +46,7 @@ class Model:
         """Check that the system has parameters of these names.
 
         Raises:
-            ValueError: it has not.
+            ValueError: it lacks one of them.
         """
         known = () if self._is_linear else tuple(getattr(self.system, "params", ()))
         unknown = [name for name in names if name not in known]
@@ -74,7 +75,7 @@ class Model:
         return self.at(0.0, x, u, p)
 
     def at(self, time: float, x: FloatArray, u: FloatArray, p: Any = None) -> Any:
-        """The same at a time; a system that depends on it is refused."""
+        """Evaluate as `__call__` does, at some time; `Equations` refuses systems that depend on it."""
         system = self.system
         own = {} if p is None else p._asdict()
         if self.one_by_one:

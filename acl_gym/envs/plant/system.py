@@ -341,7 +341,15 @@ def _bounds(low: Any, high: Any) -> tuple[FloatArray, FloatArray]:
     if bottom.ndim != 1 or bottom.shape != top.shape or not (bottom < top).all():
         raise ValueError(
             "low and high must hold the ends of each state variable, low < high, got "
-            f"low={low!r} and high={high!r}."
+            f"low={validation.shown(low)} and high={validation.shown(high)}."
+        )
+    with np.errstate(over="ignore"):
+        span = top - bottom
+    if not np.isfinite(span).all():
+        raise ValueError(
+            "high - low must be a finite number for each state variable, got "
+            f"low={validation.shown(low)} and high={validation.shown(high)}; narrow the "
+            "bounds to where the plant is used."
         )
     return bottom, top
 

@@ -56,7 +56,8 @@ class Goal:
             if tolerance is not None:
                 raise ValueError(
                     "tolerance belongs to a goal that is a state, got tolerance="
-                    f"{tolerance!r} with goal={goal!r}; leave it out."
+                    f"{validation.shown(tolerance)} with goal={validation.shown(goal)}; "
+                    "leave it out."
                 )
             return
         array = validation.real_array("goal", goal, finite=False)
@@ -71,7 +72,7 @@ class Goal:
             if tolerance is not None:
                 raise ValueError(
                     "tolerance belongs to a goal that is a state, not to a pair of "
-                    f"bounds, got tolerance={tolerance!r}; widen the bounds."
+                    f"bounds, got tolerance={validation.shown(tolerance)}; widen the bounds."
                 )
             self._set_box(np.maximum(array[0], low), np.minimum(array[1], high), goal)
         else:
@@ -169,7 +170,7 @@ class Cost:
         if isinstance(cost, str):
             validation.one_of("cost", cost, ("time",))
             self._action_costs[:] = sampling_time
-        elif isinstance(cost, Sequence) and len(cost) == 2:
+        elif isinstance(cost, Sequence) and len(cost) == 2 and type(cost) is not bytes:
             if goal.centre is None:
                 raise ValueError(
                     "cost=(Q, R) weighs the error from the goal, which must be a state "
@@ -177,7 +178,13 @@ class Cost:
                 )
             self._weight = _matrix("Q", cost[0], goal.centre.size)
             self._on_inputs = _matrix("R", cost[1], inputs.shape[1])
-            self._action_costs = self._costs_of(inputs)
+            with np.errstate(over="ignore", invalid="ignore"):
+                self._action_costs = self._costs_of(inputs)
+            if not np.isfinite(self._action_costs).all():
+                raise ValueError(
+                    "R of cost=(Q, R) must give each action a finite cost u' R u, got "
+                    f"{validation.shown(cost[1])}; give smaller weights."
+                )
         else:
             raise ValueError(
                 'cost must be "time", a pair (Q, R) of weights on error and input, or a '
@@ -311,7 +318,7 @@ def _half_widths(tolerance: Any, default: FloatArray) -> FloatArray:
     if array.shape not in ((), (1,), default.shape) or not (array >= 0).all():
         raise ValueError(
             f"tolerance must be a number >= 0 or {default.size} of them, got "
-            f"{tolerance!r}."
+            f"{validation.shown(tolerance)}."
         )
     return np.broadcast_to(array, default.shape).copy()
 
@@ -338,8 +345,8 @@ class _Function:
     Args:
         name: for messages.
         function: takes states `(state_size, n)`, and other arrays; returns `(n,)`.
-        kinds: of NumPy's types that it may return.
-        what: these are, for messages.
+        kinds: letters of the NumPy types that it may return.
+        what: what these are called in messages.
     """
 
     def __init__(self, name: str, function: Any, kinds: str, what: str) -> None:
@@ -350,7 +357,7 @@ class _Function:
         self._handed_out = np.copy if compiled else validation.read_only
 
     def __call__(self, states: FloatArray, *others: FloatArray) -> NDArray[Any]:
-        """Evaluate states, which it cannot write to; `others` are its own to change.
+        """Evaluate states, which it cannot write to; it may change `others`.
 
         Raises:
             ValueError: it fails, writes to the states, or returns something else.

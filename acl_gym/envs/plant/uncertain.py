@@ -112,7 +112,7 @@ class PlantParameters:
         return (self.nominal, self.drawn, own) if self.names else ()
 
     def check_rows(self, rows: FloatArray) -> None:
-        """Check values of the uncertain ones, `(n, m)`, that somebody gives.
+        """Check given values of the uncertain ones, `(n, m)`.
 
         Raises:
             ValueError: one lies outside its range.
@@ -161,12 +161,12 @@ def _range(name: str, ends: Any) -> tuple[float, float]:
     if array is None or array.shape != (2,) or array.dtype.kind not in "iuf":
         raise ValueError(
             f"uncertain[{name!r}] must be a pair (low, high) of numbers, got "
-            f"{validation.shown(ends)}; what is known belongs into parameters=."
+            f"{validation.shown(ends)}; give what is known in parameters=."
         )
     low, high = map(float, array)
     if not (np.isfinite(high - low) and low < high):
         raise ValueError(
             f"uncertain[{name!r}] must be finite with low < high, got "
-            f"{validation.shown(ends)}; what is known belongs into parameters=."
+            f"{validation.shown(ends)}; give what is known in parameters=."
         )
     return low, high

@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from acl_gym.envs.wrappers.shield import Shield
     from acl_gym.envs.wrappers.state_feedback import StateFeedback
 
-# Imported on first use: they know the systems of this package and load compiled kernels,
-# which new worker processes, that import this folder, need not wait for.
+# Imported on first use: they know the systems of this package and load compiled kernels.
+# New worker processes, which import this folder, do not have to wait for that.
 _LAZY = {
     "ActionGrid": "acl_gym.envs.wrappers.action_grid",
     "ChangingVectorEnv": "acl_gym.envs.wrappers.changing",

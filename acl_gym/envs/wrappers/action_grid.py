@@ -15,12 +15,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from acl_gym.envs.control.bookkeeping import checked_actions
 from acl_gym.utils import validation
-from acl_gym.utils.boxes import input_bounds
+from acl_gym.utils.boxes import MOST_ACTIONS, input_bounds
 from acl_gym.utils.typing import FloatArray
 from acl_gym.utils.vector_envs import require_vector_env
-
-MOST_ACTIONS = 10_000
-"""More actions than any table is good for."""
 
 
 class ActionGrid(VectorActionWrapper[Any, Any, Any, Any]):
@@ -31,8 +28,8 @@ class ActionGrid(VectorActionWrapper[Any, Any, Any, Any]):
     `agent.interpolated_policy()` chooses between neighbouring points afterwards: real
     inputs for the environment without this wrapper.
 
-    `gymnasium.wrappers.DiscretizeAction` does so for single environments, with values in
-    the middle of equal parts of the range, of which the bounds are none.
+    `gymnasium.wrappers.DiscretizeAction` does so for single environments; its values lie
+    in the middle of equal parts of the range, so that none is a bound.
 
     Args:
         env: a vector environment whose actions are a bounded Box of one axis.

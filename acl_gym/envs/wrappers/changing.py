@@ -75,7 +75,7 @@ class Drift(Change):
 
     Attributes:
         start: after so many steps it begins to change, >= 0.
-        end: after so many steps it comes to its last value, > `start`.
+        end: after so many steps it has its last value, > `start`.
         to: the last value.
         stages: equal ones into which the drift is divided, 1 to 1,000; at most one a
             step.
@@ -157,8 +157,8 @@ class ChangingVectorEnv(VectorWrapper[Any, Any, Any, Any]):
         steps: how many were made before, >= 0, for instance by an agent that was saved.
 
     Raises:
-        TypeError: `env` is of another package, a schedule is none, or there is no such
-            parameter.
+        TypeError: `env` is of another package, a schedule is not a `Jump` or a `Drift`, or
+            there is no such parameter.
         ValueError: changes of one parameter overlap, a value is not valid, a change
             would change what can be observed or done, or `env` changes already.
     """

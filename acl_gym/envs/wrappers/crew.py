@@ -175,7 +175,7 @@ class Crew:
         question: Question,
         repeats: Callable[[range], list[Repeat]],
     ) -> None:
-        """Ask a worker; if there is none, or it is behind, let episodes be repeated."""
+        """Ask a worker. A new one, or one that is behind, first repeats its episodes."""
         member, limit = self._members[number], self._timeout
         worker = member.worker
         missing = worker is None or member.behind

@@ -42,7 +42,7 @@ class WorkerLostError(Exception):
 
 
 class Worker(Protocol):
-    """Environments of some slots, at work somewhere; one request at a time."""
+    """Environments of some slots in some process; it takes one request at a time."""
 
     def send(self, request: Request) -> None:
         """Ask something."""
@@ -66,7 +66,7 @@ Hire = Callable[[int], Worker]
 
 
 def hiring(executor: str, env_fns: Sequence[Any], blocks: Sequence[range]) -> Hire:
-    """How to come by workers.
+    """Return what makes workers.
 
     Args:
         executor: one of `EXECUTORS`.
@@ -193,7 +193,7 @@ def _serve(connection: Any, parent: int, first: int, env_fns: bytes) -> None:
         while True:
             request = pickle.loads(connection.recv_bytes())
             connection.send_bytes(packed_answer(host.answer(request), first))
-    with contextlib.suppress(Exception):  # nobody is there to hear of it
+    with contextlib.suppress(Exception):  # there is nobody left to tell
         host.close()
 
 

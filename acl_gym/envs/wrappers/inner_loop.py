@@ -246,7 +246,7 @@ def require_array_observations(env: VectorEnv[Any, Any, Any]) -> None:
     """Refuse observations that are dicts, tuples, graphs or texts.
 
     Raises:
-        ValueError: they are.
+        ValueError: the observations are not arrays.
     """
     space = env.single_observation_space
     arrays = (spaces.Box, spaces.Discrete, spaces.MultiDiscrete, spaces.MultiBinary)

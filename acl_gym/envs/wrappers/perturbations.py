@@ -20,9 +20,12 @@ from gymnasium.vector import (
 from gymnasium.vector.utils import batch_space
 from numpy.typing import ArrayLike, NDArray
 
+from acl_gym.envs.control.bookkeeping import checked_actions
 from acl_gym.envs.control.environments import ControlVectorEnv
 from acl_gym.utils import validation
+from acl_gym.utils.boxes import finite_bounds
 from acl_gym.utils.typing import FloatArray, IntArray
+from acl_gym.utils.vector_envs import require_discrete_actions, require_vector_env
 
 Element = TypeVar("Element", bound=np.generic)
 AnyVectorEnv = VectorEnv[Any, Any, Any]
@@ -81,9 +84,16 @@ class ActionNoise(VectorActionWrapper[Any, Any, Any, Any]):
         env: with discrete actions.
         probability: of a replacement, for each slot and step, in [0, 1]. The draw may
             give the chosen action again.
+
+    Raises:
+        TypeError: `env` is not a vector environment, or `probability` not a number.
+        ValueError: actions are not discrete, or `probability` is out of range.
     """
 
     def __init__(self, env: AnyVectorEnv, probability: float) -> None:
+        require_vector_env(env)
+        space = require_discrete_actions(env)
+        self._first, self._count = int(space.start), int(space.n)
         super().__init__(env)
         self.probability = validation.number(
             "probability", probability, at_least=0, at_most=1
@@ -100,11 +110,20 @@ class ActionNoise(VectorActionWrapper[Any, Any, Any, Any]):
         return super().reset(seed=seed, options=options)
 
     def actions(self, actions: ArrayLike) -> IntArray:
-        """Return the actions that are carried out, `(num_envs,)`."""
-        space: Any = self.single_action_space
+        """Return the actions that are carried out, `(num_envs,)`.
+
+        Raises:
+            TypeError: the actions are not integers.
+            ValueError: there is not one for each slot, or one is out of range.
+        """
+        given = validation.as_array(actions)
+        if given is not None and self._first and given.dtype.kind in "iu":
+            given = given.astype(np.int64) - self._first
+        wanted = actions if given is None else given
+        chosen = checked_actions(wanted, self.num_envs, self._count)
         draws = self._rng.random((2, self.num_envs))
-        others = (draws[1] * int(space.n)).astype(np.int64)
-        return np.where(draws[0] < self.probability, others, actions)
+        others = (draws[1] * self._count).astype(np.int64)
+        return np.where(draws[0] < self.probability, others, chosen) + self._first
 
 
 class ObservationNoise(VectorObservationWrapper[FloatArray, Any, Any, Any]):
@@ -117,6 +136,10 @@ class ObservationNoise(VectorObservationWrapper[FloatArray, Any, Any, Any]):
         deviations: the standard deviation of each variable's noise, in its unit, >= 0.
         circular: variables that are wrapped at their bounds, such as angles; the others
             are clipped.
+
+    Raises:
+        TypeError: `env` is not a vector environment, or `circular` holds no integers.
+        ValueError: the observations are not such a box, or an argument does not fit them.
     """
 
     def __init__(
@@ -125,6 +148,7 @@ class ObservationNoise(VectorObservationWrapper[FloatArray, Any, Any, Any]):
         deviations: Sequence[float],
         circular: Sequence[int] = (),
     ) -> None:
+        require_vector_env(env)
         super().__init__(env)
         space = _box(self.single_observation_space)
         self._low, self._high = space.low, space.high
@@ -137,7 +161,13 @@ class ObservationNoise(VectorObservationWrapper[FloatArray, Any, Any, Any]):
                 f"deviations must be {space.shape[0]} numbers >= 0, one a variable, got "
                 f"{validation.shown(deviations)}."
             )
-        self._circular = tuple(circular)
+        self._circular = _integers("circular", circular)
+        if max(self._circular, default=0) >= space.shape[0]:
+            raise ValueError(
+                f"circular must hold variables of 0..{space.shape[0] - 1}, got "
+                f"{validation.shown(circular)}."
+            )
+        finite_bounds(space)
         self._rng = np.random.default_rng()
 
     def reset(
@@ -168,18 +198,25 @@ class RoundedObservation(VectorObservationWrapper[FloatArray, Any, Any, Any]):
     Args:
         env: whose observations are a bounded box of one axis.
         counts: for each variable how many values it has, its bounds included, >= 2;
-            0 does not round it.
+            0 does not round it, and it needs no bounds then.
+
+    Raises:
+        TypeError: `env` is not a vector environment, or `counts` are no integers.
+        ValueError: the observations are not such a box, or `counts` do not fit them.
     """
 
     def __init__(self, env: AnyVectorEnv, counts: Sequence[int]) -> None:
+        require_vector_env(env)
         super().__init__(env)
-        size = _box(self.single_observation_space).shape[0]
+        space = _box(self.single_observation_space)
+        size = space.shape[0]
         self._counts = _integers("counts", counts)
         if len(self._counts) != size or not all(n == 0 or n >= 2 for n in self._counts):
             raise ValueError(
                 f"counts must be {size} integers, one a variable, each 0 or >= 2, got "
                 f"{validation.shown(counts)}."
             )
+        finite_bounds(space, np.flatnonzero(self._counts))
 
     def observations(self, observations: FloatArray) -> FloatArray:
         """Return rounded observations, `(num_envs, d)`."""
@@ -205,9 +242,15 @@ class HiddenVariables(VectorObservationWrapper[FloatArray, Any, Any, Any]):
 
     Attributes:
         shown: the variables that are left, in order.
+
+    Raises:
+        TypeError: `env` is not a vector environment, or `variables` are no integers.
+        ValueError: the observations are not such a box, a variable is not among them, or
+            none would be left.
     """
 
     def __init__(self, env: AnyVectorEnv, variables: Sequence[int]) -> None:
+        require_vector_env(env)
         super().__init__(env)
         space = _box(env.single_observation_space)
         hidden = set(_integers("variables", variables))
@@ -243,9 +286,11 @@ class ReversedSlots(VectorWrapper[Any, Any, Any, Any]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Any, dict[str, Any]]:
-        """Start episodes; `options["state"]`, if given, is in reverse order too."""
-        if options is not None and "state" in options:
-            options = {**options, "state": np.asarray(options["state"])[::-1]}
+        """Start episodes; `"state"` and `"reset_mask"` of options are reversed too."""
+        if isinstance(options, dict):
+            by_slot = {"state", "reset_mask"} & set(options)
+            reversed_too = {key: _reversed(np.asarray(options[key])) for key in by_slot}
+            options = {**options, **reversed_too}
         observations, infos = self.env.reset(seed=seed, options=options)
         return _reversed(observations), infos
 

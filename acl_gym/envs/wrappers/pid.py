@@ -121,7 +121,7 @@ class PID:
             ValueError: the shapes do not fit, or there are not as many slots as in
                 `restart`.
         """
-        seen = np.asarray(observations, dtype=np.float64)
+        seen = validation.real_array("observations", observations, finite=False)
         if (
             seen.ndim != 2
             or seen.shape[1] <= self._variable
@@ -152,8 +152,8 @@ class PID:
         """The gains, one row for each, and the set point."""
         width = 3 * (self._gains is None) + (self._set_point is None)
         rows: FloatArray = np.zeros((n, 0))
-        if parameters is not None:
-            rows = np.asarray(parameters, dtype=np.float64)
+        if parameters is not None and np.shape(parameters) != (n, 0):
+            rows = validation.real_array("parameters", parameters, finite=False)
         if rows.shape != (n, width):
             raise ValueError(
                 f"parameters must be rows of {width} numbers, those of K_p, K_i, K_d and "

@@ -15,8 +15,9 @@ from gymnasium.vector import AutoresetMode, VectorEnv, VectorObservationWrapper
 from gymnasium.vector.utils import batch_space
 from numpy.typing import ArrayLike, NDArray
 
+from acl_gym.envs import received
 from acl_gym.utils import validation
-from acl_gym.utils.boxes import declared_bounds
+from acl_gym.utils.boxes import finite_bounds
 from acl_gym.utils.typing import Float32Array
 from acl_gym.utils.vector_envs import require_vector_env
 
@@ -61,13 +62,25 @@ class Scaling:
         """Return the features of one observation `(d,)` or of a batch `(n, d)`.
 
         Raises:
-            ValueError: the last axis does not have the length d of the space.
+            ValueError: the last axis does not have the length d of the space, or an entry
+                is not a finite number.
         """
-        values = np.asarray(observation, dtype=np.float64)
+        array = validation.as_array(observation)
+        if array is None or array.dtype.kind not in "biuf":
+            raise ValueError(
+                f"observations must be real numbers, got {validation.shown(observation)}; "
+                "check the environment."
+            )
+        values = array.astype(np.float64)
         if values.shape[-1:] != self._low.shape:
             raise ValueError(
                 f"observations must have {self._low.size} variables on their last "
                 f"axis, got shape {values.shape}."
+            )
+        if not np.isfinite(values).all():
+            raise ValueError(
+                f"observations must be finite, got {validation.shown(observation)}; check "
+                "the environment."
             )
         place = (values - self._low) / self._range
         features = np.empty((*values.shape[:-1], self._size), dtype=np.float32)
@@ -141,7 +154,7 @@ class ScaledVectorObservation(
         require_vector_env(env)
         # The base class refuses this mode too, since the last observations would
         # stay as they were in infos["final_obs"]; here the message has a remedy.
-        if env.metadata.get("autoreset_mode") is AutoresetMode.SAME_STEP:
+        if received.autoreset_mode_of(env) is AutoresetMode.SAME_STEP:
             raise ValueError(
                 "env must have autoreset mode NEXT_STEP or DISABLED, got SAME_STEP, "
                 "whose infos['final_obs'] an observation wrapper does not reach; "
@@ -164,15 +177,7 @@ def _bounds(space: spaces.Space[Any]) -> tuple[NDArray[np.float64], ...]:
             f"{validation.shown(space)}; use "
             "gymnasium's FlattenObservation first."
         )
-    low, high = declared_bounds(space)
-    for axis in range(low.size):
-        if not (np.isfinite([low[axis], high[axis]]).all() and low[axis] < high[axis]):
-            raise ValueError(
-                "every variable must have finite bounds, low < high, got "
-                f"[{low[axis]:g}, {high[axis]:g}] of variable {axis}; give the "
-                "environment a bounded space with gymnasium's TransformObservation."
-            )
-    return low, high
+    return finite_bounds(space)
 
 
 def _checked_axes(circular: Iterable[int], size: int) -> NDArray[np.int64]:

@@ -31,9 +31,9 @@ class Shield(VectorWrapper[Any, Any, Any, Any]):
     all; otherwise the baseline acts at once.
 
     What the learner learns of an action that was replaced: agents of this package record
-    what they chose, and so learn that choosing it hands over to the baseline and is worth
-    what that comes to. This is the right value as long as the shield stays. Their policy
-    is one for the plant with its shield; take both home. An action that is never carried
+    what they chose, and so learn what it is worth to hand over to the baseline. This is
+    the right value as long as the shield stays. Their policy is one for the plant with its
+    shield; use both together. An action that is never carried
     out tells nothing of the plant itself. With `mask_actions=True` the actions that would
     be replaced are forbidden beforehand, in `infos["action_mask"]`, which agents of this
     package heed: then what is chosen is what is carried out.
@@ -76,7 +76,8 @@ class Shield(VectorWrapper[Any, Any, Any, Any]):
         interventions: steps in which the action of each slot was replaced by another.
 
     Raises:
-        TypeError: `env` is not a vector environment, or a function is none.
+        TypeError: `env` is not a vector environment, or `baseline`, `safe` or `predict` is
+            not a function.
         ValueError: an argument does not fit the environment or the others.
 
     Example:
@@ -165,7 +166,7 @@ class Shield(VectorWrapper[Any, Any, Any, Any]):
 
     @property
     def interventions(self) -> IntArray:
-        """Steps in which the action of each slot was replaced, likewise."""
+        """Steps in which the action of each slot was replaced, `(num_envs,)`, a copy."""
         return self._interventions.copy()
 
     def reset_counters(self) -> None:

@@ -30,8 +30,8 @@ class StateFeedback:
         circular: variables that wrap around, whose error is taken the short way: their
             numbers, where the period is 2 pi, or number -> period, > 0.
         low: the least inputs, a number or `(m,)`; None: no limit.
-        high: the greatest inputs, likewise, not less than `low`.
-        n_inputs: m, >= 1, where the gain is a parameter; else it says itself.
+        high: the greatest inputs, in the same form, not less than `low`.
+        n_inputs: m, 1 to 1,000, where the gain is a parameter; else it says itself.
 
     Attributes:
         gain: K as rows, or None.
@@ -71,7 +71,7 @@ class StateFeedback:
         high: Any = None,
         n_inputs: int = 1,
     ) -> None:
-        n_inputs = validation.integer("n_inputs", n_inputs, at_least=1)
+        n_inputs = validation.integer("n_inputs", n_inputs, at_least=1, at_most=1_000)
         size = None
         if gain is not None:
             rows = np.atleast_2d(validation.real_array("gain", gain))
@@ -115,7 +115,7 @@ class StateFeedback:
         Raises:
             ValueError: the shapes do not fit.
         """
-        seen = np.asarray(observations, dtype=np.float64)
+        seen = validation.real_array("observations", observations, finite=False)
         if seen.ndim != 2:
             raise ValueError(
                 f"observations must be rows of variables, (n, d), got {seen.shape}."
@@ -148,8 +148,8 @@ class StateFeedback:
             )
         width = self.n_inputs * d * (self.gain is None) + d * (self.set_point is None)
         rows: FloatArray = np.zeros((n, 0))
-        if parameters is not None:
-            rows = np.asarray(parameters, dtype=np.float64)
+        if parameters is not None and np.shape(parameters) != (n, 0):
+            rows = validation.real_array("parameters", parameters, finite=False)
         if rows.shape != (n, width):
             raise ValueError(
                 f"parameters must be rows of {width} numbers, shape {(n, width)}, got "

@@ -77,7 +77,7 @@ class WaitingSlots(VectorEnv[Any, Any, NDArray[Any]]):
         Raises:
             TypeError: a seed is not an integer, or the mask no bool array.
             ValueError: a seed is negative, there is not one for each slot, the mask
-                fits not, or an environment does not return what it should.
+                does not fit, or an environment does not return what it should.
             ResetNeeded: the first reset has a mask.
         """
         seeds = self._seeds(seed)
@@ -154,7 +154,7 @@ class WaitingSlots(VectorEnv[Any, Any, NDArray[Any]]):
 
 
 def _no_numbers(slot: int, given: Any) -> ValueError:
-    """The error for a reward or flags that are none."""
+    """The error for a reward that is no number, or flags that are no booleans."""
     return ValueError(
         "step must return a number as reward, then True or False for terminated and "
         f"truncated, got {', '.join(map(validation.shown, given[1:4]))} in slot {slot}; "
@@ -231,7 +231,7 @@ def _parts(name: str, given: Any, count: int) -> Any:
     """What a single environment returned, if it has so many parts.
 
     Raises:
-        ValueError: it has not.
+        ValueError: it is no tuple, or has another number of parts.
     """
     if not isinstance(given, (tuple, list)) or len(given) != count:
         raise ValueError(

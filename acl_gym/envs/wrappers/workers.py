@@ -49,9 +49,9 @@ class WorkersVectorEnv(WaitingSlots):
 
     When a worker dies (killed, out of memory, or by a fault of a simulator), a new one
     resets its slots with the same seeds and repeats the actions of the episodes under
-    way, and the run goes on with the same bits; the logger `acl_gym` tells of it. That
-    needs environments whose chance is that of the generator which `reset(seed=...)`
-    seeds. Where the repetition leads elsewhere, a `RuntimeWarning` says so, and the
+    way, and the run goes on with the same bits; the logger `acl_gym` says so. That
+    needs environments that draw all random numbers from the generator which
+    `reset(seed=...)` seeds. Where the repetition leads elsewhere, a `RuntimeWarning` says so, and the
     episode ends there, truncated. An exception that an environment raises is raised here;
     after it everything is as before the call.
 
@@ -273,9 +273,9 @@ class WorkersVectorEnv(WaitingSlots):
     def _ended_here(self, slot: int) -> tuple[Any, ...]:
         """The step of an episode that could not be repeated."""
         warnings.warn(
-            f"the episode of slot {slot} was repeated in a new worker and came elsewhere, "
-            "so it ends where it was, truncated; an environment's chance should be that "
-            "of the generator which reset(seed=...) seeds.",
+            f"the episode of slot {slot} was repeated in a new worker and led to another "
+            "observation, so it ends where it was, truncated; an environment should draw "
+            "its random numbers from the generator that reset(seed=...) seeds.",
             RuntimeWarning,
             stacklevel=4,
         )
@@ -346,8 +346,8 @@ def _env_fns_by_spec(env: Any) -> list[Any]:
         raise ValueError(
             "env must be a SyncVectorEnv or WaitingVectorEnv, or made by gym.make_vec, "
             f"without vector wrappers, to be spread over workers, got "
-            f"{validation.shown(env)}; pass acl_gym.WorkersVectorEnv([make_env] * 20, "
-            "workers=2), in wrappers or not, and no workers."
+            f"{validation.shown(env)}; make acl_gym.WorkersVectorEnv([make_env] * 20, "
+            "workers=2), wrap it as you like, and leave workers= out here."
         )
     if getattr(env, "slots_share_a_world", False):
         raise ValueError(

@@ -59,7 +59,7 @@ def compare(
 
     Args:
         system: one of `tasks.SYSTEMS`.
-        preset: a key of `tasks.PRESETS`.
+        preset: a key of `names.PRESETS`.
         agents: some of those of the system; None takes them all.
         seeds: runs of each agent; None takes the preset's number.
         directory: receives results.json, results.parquet, report.html and figures, in

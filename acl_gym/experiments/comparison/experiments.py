@@ -56,7 +56,7 @@ Rows = dict[str, dict[str, Study]]
 
 
 def _tuned_words(tasks: Iterable[str]) -> str:
-    """How the methods have come by their settings on some tasks."""
+    """How the settings of the methods on some tasks were chosen."""
     pairs = [(name, method) for name in tasks for method in TASKS[name].methods]
     lacking = {method for name, method in pairs if not is_tuned(name, method)}
     names = " and ".join(each.label for m, each in METHODS.items() if m in lacking)

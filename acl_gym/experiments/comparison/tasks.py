@@ -152,7 +152,7 @@ class System:
 
         Args:
             name: a key of `agents`.
-            preset: a key of `PRESETS`.
+            preset: a key of `names.PRESETS`.
         """
         _, method, kind = self.agents[one_of("agent", name, tuple(self.agents))]
         budget, task = self.budgets[preset], self.task

@@ -149,7 +149,7 @@ def _measured(x: FloatArray, k: int, time_step: float) -> Row:
 def _foraged(profile: str, now: FloatArray, start: FloatArray, seconds: float) -> Row:
     """How far agents, and their centre, are from where the profile leads them.
 
-    That is the minimum, or, on the plane, where the centre comes to without noise.
+    That is the minimum, or, on the plane, where the centre would be without noise.
     """
     goal = centre(start) - SLOPE * seconds if profile == "plane" else FOOD
     away = np.square(now - goal).sum(axis=1)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -245,6 +246,22 @@ def test_broken_tours(old: str, new: str, message: str) -> None:
         parse_tour(
             WAY.replace(f" : {old}", f" : {new}").replace(f"\n{old}", f"\n{new}")
         )
+
+
+@pytest.mark.parametrize("parse", [parse_tsplib, parse_tour])
+@pytest.mark.parametrize("text", [b"NAME: a", None])
+def test_what_is_no_text_is_refused(parse: Any, text: Any) -> None:
+    with pytest.raises(TypeError, match="text must be what stands in a file of TSPLIB"):
+        parse(text)
+
+
+def test_the_diagonal_of_a_triangle_may_be_as_large_as_it_likes() -> None:
+    text = (
+        "TYPE: TSP\nDIMENSION: 3\nEDGE_WEIGHT_TYPE: EXPLICIT\n"
+        "EDGE_WEIGHT_FORMAT: UPPER_DIAG_ROW\nEDGE_WEIGHT_SECTION\n"
+        "1e308 1 2 1e308 3 1e308\nEOF"
+    )
+    assert parse_tsplib(text).length([0, 1, 2]) == 6.0
 
 
 def test_empty_text() -> None:

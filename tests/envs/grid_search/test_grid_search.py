@@ -353,7 +353,7 @@ def test_no_masks_unless_asked_for() -> None:
     [
         *(
             ("transition_probability", v)
-            for v in (0.0, -0.1, 1.1, NAN, "1", None, True)
+            for v in (0.0, 5e-324, -0.1, 1.1, NAN, "1", None, True)
         ),
         *(("mask_blocked", value) for value in (1, None, "yes")),
     ],

@@ -261,6 +261,24 @@ def test_the_same_data_give_the_same_bits() -> None:
     np.testing.assert_array_equal(predicted(one, other()), predicted(two, other()))
 
 
+def test_a_regressor_that_is_named_is_taken_wherever_the_search_begins() -> None:
+    first, own = LearnedDynamics(pendulum(60)), LearnedDynamics(pendulum(60), Ridge())
+    for begin in (first, own):
+        found = LearnedDynamics(pendulum(70), "nearest neighbours", begin=begin)
+        assert found.regressor == "nearest neighbours"
+    # What is somebody's own cannot be made again by its name.
+    assert LearnedDynamics(pendulum(70), begin=own).regressor in KINDS
+
+
+def test_dynamics_check_what_they_are_made_of() -> None:
+    with pytest.raises(TypeError, match=r"transitions must be acl_gym\.Transitions"):
+        LearnedDynamics(3)  # type: ignore[arg-type]
+    with pytest.raises(
+        TypeError, match="begin must be a LearnedDynamics or None, got 3"
+    ):
+        LearnedDynamics(pendulum(), begin=3)  # type: ignore[arg-type]
+
+
 def test_a_search_begins_with_what_was_found() -> None:
     first = LearnedDynamics(pendulum())
     more = LearnedDynamics(pendulum(70), begin=first)

@@ -319,7 +319,12 @@ def test_a_goal_far_from_the_data_is_warned_of() -> None:
         ({"pessimism": -1.0}, ValueError, "pessimism must lie in"),
         ({"max_episode_steps": 0}, ValueError, "max_episode_steps must be"),
         ({"inputs": [1.0]}, ValueError, "two actions or more, got the one input"),
-        ({"goal": [np.nan]}, ValueError, "goal must be finite"),
+        (
+            {"goal": [np.nan]},
+            ValueError,
+            "goal must be an array of finite real numbers",
+        ),
+        ({"goal": ["up"]}, ValueError, "goal must be an array of finite real numbers"),
         (
             {"goal": [0.0], "tolerance": [1, 2]},
             ValueError,
@@ -362,6 +367,17 @@ def test_a_function_of_initial_states_is_named(initial: Any, words: str) -> None
 def test_what_is_no_recording_is_refused() -> None:
     with pytest.raises(TypeError, match=r"transitions must be acl_gym\.Transitions"):
         LearnedVectorEnv(np.zeros((5, 3)), cost="time")  # type: ignore[arg-type]
+
+
+def test_dynamics_must_be_those_of_the_plant() -> None:
+    how: dict[str, Any] = {"goal": [np.pi, 0.0], "cost": "time"}
+    with pytest.raises(TypeError, match="dynamics must be a LearnedDynamics or None"):
+        LearnedVectorEnv(pendulum(), dynamics=3, **how)  # type: ignore[arg-type]
+    other = LearnedDynamics(Transitions(**line()))
+    with pytest.raises(
+        ValueError, match="learned from the plant of transitions, got st"
+    ):
+        LearnedVectorEnv(pendulum(), dynamics=other, **how)
 
 
 def test_continuous_inputs_must_be_chosen_from() -> None:

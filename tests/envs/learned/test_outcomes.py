@@ -39,6 +39,13 @@ def test_without_rewards_there_is_nothing_to_learn() -> None:
         LearnedCost(Transitions(**line()))
 
 
+def test_too_few_rewards_are_called_too_few() -> None:
+    with pytest.raises(
+        ValueError, match="from 5 steps or more, got 3; record more, or"
+    ):
+        LearnedCost(pendulum(60)[:3])
+
+
 def test_ends_behind_thresholds_are_found() -> None:
     """A pole has fallen beyond 12 degrees, a cart has left beyond 2.4."""
     env = gym.make("CartPole-v1")

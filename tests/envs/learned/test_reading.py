@@ -145,6 +145,26 @@ def test_files_of_older_programs_are_read(encoding: str, tmp_path: Path) -> None
     np.testing.assert_allclose(data.states, [[1.0, 2.0]])
 
 
+def test_numbers_of_several_types_are_read() -> None:
+    expected = Transitions.from_frame(table(), **COLUMNS)
+    found = Transitions.from_frame(table().astype(object), **COLUMNS)
+    assert (found.states == expected.states).all()
+    large = table().astype(object).assign(u=10**400)
+    with pytest.raises(
+        ValueError, match=r"\['u'\] of the frame must be finite, got \[inf"
+    ):
+        Transitions.from_frame(large, **COLUMNS)
+
+
+def test_a_file_of_one_row_has_no_sampling_time(tmp_path: Path) -> None:
+    paths = tmp_path / "long.csv", tmp_path / "short.csv"
+    table().to_csv(paths[0], index=False)
+    table()[:1].to_csv(paths[1], index=False)
+    found = Transitions.from_csv(list(paths), **COLUMNS, time="t")
+    whole = Transitions.from_csv(paths[0], **COLUMNS, time="t")
+    assert (len(found), found.sampling_time) == (len(whole), whole.sampling_time)
+
+
 def test_a_column_tells_runs_apart() -> None:
     frame = pd.concat([table(10), table(20, seed=1)])
     frame["run"] = ["a"] * 10 + ["b"] * 20
@@ -189,7 +209,7 @@ def test_rows_may_be_steps_already() -> None:
         (
             lambda f: f.assign(run=np.where(f.index < 20, np.nan, 1.0)),
             {"run": "run"},
-            r"which run it belongs to, got nothing in row 0 \(20 rows of 50 are empty\)",
+            r"which run each row belongs to, got nothing in row 0 \(20 rows of 50 are empty\)",
         ),
         (
             lambda f: f.assign(run=["a"] * 49 + [None]),

@@ -12,7 +12,7 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 import pytest
-from gymnasium.vector import AutoresetMode, SyncVectorEnv
+from gymnasium.vector import AutoresetMode, SyncVectorEnv, VectorWrapper
 
 from acl_gym import Transitions
 from tests.envs.learned.recordings import line, pendulum
@@ -261,6 +261,13 @@ def test_actions_of_joined_recordings() -> None:
     assert (made([-1, 1]) + made([-1, 1])).description.values == ((-1.0,), (1.0,))
 
 
+def test_a_step_is_not_chosen_by_its_number() -> None:
+    with pytest.raises(
+        TypeError, match=r"got \[1, \[2\]\]; for step i use \[i : i \+ 1\]"
+    ):
+        pendulum()[[1, [2]]]
+
+
 def test_arrays_cannot_be_changed() -> None:
     with pytest.raises(ValueError, match="read-only"):
         pendulum().states[0] = 0.0
@@ -282,6 +289,16 @@ NAN = np.where(np.arange(40)[:, None] == 7, np.nan, 0.0)
         ({"rewards": np.full(40, np.nan)}, "rewards must be finite"),
         ({"terminated": np.full(40, 2)}, "terminated must be 40 booleans"),
         ({"episodes": np.arange(40)[::-1]}, "episodes must be 40 integers that do not"),
+        # The difference of these two is 1 where it overflows.
+        ({"episodes": [2**63 - 1] * 39 + [-(2**63)]}, "40 integers that do not fall"),
+        (
+            {"episodes": [0] * 39 + [2**60]},
+            r"integers in \[-2\^53, 2\^53\], got 0 to 115",
+        ),
+        # Their squares overflow, so that a deviation is infinite and features vanish.
+        ({"states": np.full(40, 1e200)}, r"states must be at most 1e\+100 in size"),
+        ({"inputs": np.full(40, -1e200)}, r"inputs must be at most 1e\+100 in size"),
+        ({"rewards": np.full(40, 1e200)}, r"rewards must be at most .* in row 0 \(40"),
         ({"state_names": ["a", "b"]}, "state_names must be 1 strings"),
         ({"circular": ["theta"]}, "circular must hold names or numbers"),
         ({"circular": [0], "low": [0.0]}, "must both be given, or neither"),
@@ -435,6 +452,68 @@ def test_what_a_plant_returns_is_checked(
 
     with pytest.raises(ValueError, match=message):
         Transitions.record(Broken(gym.make("acl_gym/Pendulum-v0")), 5, seed=0)
+
+
+@pytest.mark.parametrize(
+    "policy",
+    [
+        lambda seen: None,
+        lambda seen: 1,
+        lambda seen: np.array([1.0]),
+        lambda seen: np.array([1, 2]),
+        lambda seen: np.array([[1]]),
+        lambda seen: np.array([-1]),
+        lambda seen: np.array([3]),
+        lambda seen: (np.array([3]), None),
+    ],
+)
+def test_what_a_policy_chooses_is_checked(policy: Any) -> None:
+    """In CartPole-v1 an action of 1.5 is a step like any other."""
+    for env in (gym.make("acl_gym/Pendulum-v0"), gym.make("CartPole-v1")):
+        with pytest.raises(ValueError, match=r"actions must be .*; check the policy\."):
+            Transitions.record(env, 5, policy, seed=0)
+
+
+@pytest.mark.parametrize("chosen", [[[np.nan]], [[1.0, 2.0]], [1.0], [["a"]]])
+def test_real_inputs_of_a_policy_are_checked(chosen: Any) -> None:
+    """Pendulum-v1 takes a second number, and passes it by."""
+    with pytest.raises(ValueError, match=r"actions must be .*; check the policy\."):
+        Transitions.record(gym.make("Pendulum-v1"), 5, lambda seen: chosen, seed=0)
+
+
+def test_what_cannot_be_run_is_refused() -> None:
+    with pytest.raises(TypeError, match="env must be an environment of Gymnasium"):
+        Transitions.record("CartPole-v1", 5)
+    with pytest.raises(TypeError, match=r"policy must have predict\(observations\)"):
+        Transitions.record(gym.make("CartPole-v1"), 5, 3)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("final", [None, np.array([None, None]), np.zeros((2, 3))])
+def test_last_observations_are_checked(final: Any) -> None:
+    class Forgetful(VectorWrapper[Any, Any, Any]):
+        def step(self, actions: Any) -> Any:
+            *found, infos = self.env.step(actions)
+            infos = {**infos, "final_obs": final}
+            return *found, {key: v for key, v in infos.items() if v is not None}
+
+    env = SyncVectorEnv(
+        [lambda: gym.make("CartPole-v1")] * 2, autoreset_mode=AutoresetMode.SAME_STEP
+    )
+    with pytest.raises(
+        ValueError, match=r"final_obs'\] must hold the last observation"
+    ):
+        Transitions.record(Forgetful(env), 200, seed=0)
+
+
+def test_the_mode_of_autoreset_may_be_text() -> None:
+    def made() -> SyncVectorEnv:
+        cars = [lambda: gym.make("CartPole-v1")] * 2
+        return SyncVectorEnv(cars, autoreset_mode=AutoresetMode.SAME_STEP)
+
+    env = made()
+    env.metadata = {**env.metadata, "autoreset_mode": "SameStep"}
+    found = Transitions.record(env, 200, seed=0)
+    assert same(found, Transitions.record(made(), 200, seed=0))
 
 
 def test_a_reward_may_be_an_array_of_one_number() -> None:

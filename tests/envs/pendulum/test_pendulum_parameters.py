@@ -244,3 +244,29 @@ def test_message_names_the_first_bad_row() -> None:
         Pendulum().checked_states([[0, 0], [NAN, 0], [NAN, 0]])
     with pytest.raises(ValueError, match=r"row 2\b.*omega_max"):
         Pendulum().checked_states([[0, 0], [0, 9], [0, -10]])
+
+
+@pytest.mark.parametrize(
+    ("changed", "message"),
+    [
+        (
+            {"torques": [-1e10, 1e10]},
+            r"keep the angle below 100000 rad .* up to 2e\+09",
+        ),
+        ({"omega_max": 1e300}, "keep the angle below 100000 rad in one step"),
+        (
+            {"state_weight": [[1e308, 0.0], [0.0, 1e308]]},
+            "must give a finite stage cost",
+        ),
+        (
+            {"torque_weight": 1e308, "torques": [-1e3, 1e3]},
+            "finite stage cost, got inf",
+        ),
+    ],
+)
+def test_parameters_whose_steps_are_no_numbers_are_refused(
+    changed: dict[str, Any], message: str
+) -> None:
+    """They gave NaN as state and reward, or minus infinity."""
+    with pytest.raises(ValueError, match=message):
+        Pendulum(**changed)

@@ -370,3 +370,28 @@ def test_a_goal_over_the_end_of_a_circle_is_drawn_at_both_ends() -> None:
     left, right = np.split(row, 2)
     assert left.any()
     assert right.any()
+
+
+@pytest.mark.parametrize("discrete_time", [False, True])
+def test_a_function_may_return_the_same_array_each_time(discrete_time: bool) -> None:
+    """The four slopes of a step would else all be the last one."""
+    buffers: dict[tuple[int, ...], Any] = {}
+
+    def reusing(x: Any, u: Any) -> Any:
+        found = buffers.setdefault(x.shape, np.empty(x.shape))
+        found[0], found[1] = x[1], 9.81 * np.sin(x[0]) + u[0]
+        return found
+
+    def fresh(x: Any, u: Any) -> Any:
+        return np.stack([x[1], 9.81 * np.sin(x[0]) + u[0]])
+
+    results = []
+    for dynamics in (fresh, reusing):
+        env = acl_gym.plant(
+            dynamics,
+            **{**PENDULUM, "discrete_time": discrete_time},
+            num_envs=3,
+        )
+        env.reset(options={"state": [[1.0, 0.0], [2.0, 1.0], [0.5, -1.0]]})
+        results.append(env.step([0, 1, 2])[0])
+    assert np.array_equal(*results)

@@ -80,6 +80,13 @@ NARROW = spaces.Box(-0.1, 0.1, (2,), np.float64)
     [
         ({"low": [1.0, -1.0]}, "low < high"),
         ({"low": [-1.0]}, "low < high"),
+        ({"low": [-1e308, -1.0], "high": [1e308, 1.0]}, "high - low must be a finite"),
+        (
+            {"cost": (1.0, 1e308), "inputs": [-9.0, 9.0]},
+            "R of cost=.* finite cost u' R u",
+        ),
+        ({"cost": b"ab"}, 'cost must be "time", a pair'),
+        ({"autoreset_mode": "", "num_envs": 2}, "autoreset_mode must be"),
         ({"low": [-np.inf, -1.0]}, "low must be an array of finite real numbers"),
         ({"inputs": [[[1.0]]]}, "inputs must hold the input of each action"),
         ({"inputs": []}, "inputs must be an array"),

@@ -403,7 +403,11 @@ MASS = {"mass": (1.0, 2.0)}
         ({"uncertain": 3}, TypeError, "uncertain must be a dict from names to values"),
         ({"uncertain": {"mass": 1.0}}, ValueError, r"must be a pair \(low, high\)"),
         ({"uncertain": {"mass": (2.0, 1.0)}}, ValueError, "finite with low < high"),
-        ({"uncertain": {"mass": (1.0, 1.0)}}, ValueError, "belongs into parameters="),
+        (
+            {"uncertain": {"mass": (1.0, 1.0)}},
+            ValueError,
+            "give what is known in parameters=",
+        ),
         ({"uncertain": {"mass": (1.0, np.nan)}}, ValueError, "finite with low < high"),
         ({"uncertain": {"mass": (-1e308, 1e308)}}, ValueError, "finite with low"),
         ({"uncertain": {"mass": ("a", "b")}}, ValueError, "a pair .* of numbers"),

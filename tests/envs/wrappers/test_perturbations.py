@@ -132,3 +132,82 @@ def test_reversed_draws_are_those_of_the_generator() -> None:
     reverse, plain = ReversedDraws(np.random.default_rng(5)), np.random.default_rng(5)
     assert np.array_equal(reverse.random((2, 4))[:, ::-1], plain.random((2, 4)))
     assert reverse.integers(1_000) == plain.integers(1_000)
+
+
+@pytest.mark.parametrize(
+    ("wrap", "error", "message"),
+    [
+        (
+            lambda: ActionNoise(pendulums(2, continuous=True), 0.1),
+            ValueError,
+            "Discrete",
+        ),
+        (lambda: ActionNoise(gym.make("CartPole-v1"), 0.1), TypeError, "env must be a"),
+        (
+            lambda: ObservationNoise(pendulums(2), [0, 0], [2]),
+            ValueError,
+            r"0\.\.1, got",
+        ),
+        (
+            lambda: ObservationNoise(pendulums(2), [0, 0], "a"),
+            TypeError,
+            "circular must",
+        ),
+        # A circle without ends would turn every observation into NaN.
+        (
+            lambda: ObservationNoise(carts(), [0.1] * 4, [1]),
+            ValueError,
+            "finite bounds",
+        ),
+        (
+            lambda: RoundedObservation(carts(), [0, 3, 0, 0]),
+            ValueError,
+            "of variable 1",
+        ),
+        (
+            lambda: HiddenVariables(gym.make("CartPole-v1"), [0]),
+            TypeError,
+            "env must be",
+        ),
+    ],
+)
+def test_what_cannot_be_perturbed_is_refused(
+    wrap: Any, error: type[Exception], message: str
+) -> None:
+    with pytest.raises(error, match=message):
+        wrap()
+
+
+def carts() -> Any:
+    """Two of the four variables of an observation have no bounds."""
+    return gym.make_vec("CartPole-v1", num_envs=2, vectorization_mode="sync")
+
+
+def test_variables_that_are_not_rounded_need_no_bounds() -> None:
+    env = RoundedObservation(carts(), [3, 0, 0, 0])
+    seen, _ = env.reset(seed=0)
+    assert np.isfinite(seen).all()
+
+
+@pytest.mark.parametrize("actions", [[1], 1, [0, 3], [0.0, 1.0]])
+def test_actions_are_checked_before_they_are_replaced(actions: Any) -> None:
+    """One action would otherwise be that of all slots."""
+    env = ActionNoise(pendulums(2), 0.5)
+    env.reset(seed=0)
+    with pytest.raises((ValueError, TypeError), match="actions must"):
+        env.step(actions)
+
+
+def test_actions_may_be_counted_from_another_number() -> None:
+    env = pendulums(500)
+    env.single_action_space = gym.spaces.Discrete(3, start=4)
+    noisy = ActionNoise(env, 0.5)
+    noisy.reset(seed=0)
+    assert set(noisy.actions(np.full(500, 6)).tolist()) == {4, 5, 6}
+
+
+def test_reversed_slots_are_reset_where_they_are_told_to() -> None:
+    env = ReversedSlots(pendulums(3, autoreset_mode="Disabled"))
+    before, _ = env.reset(seed=0)
+    after, _ = env.reset(options={"reset_mask": np.array([True, False, False])})
+    assert (before != after).any(axis=1).tolist() == [True, False, False]

@@ -204,3 +204,11 @@ def test_wrapped_environments_can_be_made_again() -> None:
     again = gym.make(env.spec)
     assert again.observation_space.shape == (3,)
     assert pickle.loads(pickle.dumps(env.scaling)).circular == (0,)
+
+
+@pytest.mark.parametrize("observation", ["ab", [1j, 0.0], [np.nan, 0.0], [np.inf, 0.0]])
+def test_what_is_no_finite_observation_is_refused(observation: object) -> None:
+    """NaN would otherwise reach a network."""
+    scaling = Scaling(gym.spaces.Box(-1.0, 1.0, (2,)))
+    with pytest.raises(ValueError, match="observations must be"):
+        scaling(observation)  # type: ignore[arg-type]

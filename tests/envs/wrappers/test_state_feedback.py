@@ -122,3 +122,14 @@ def test_what_does_not_fit(
 ) -> None:
     with pytest.raises(ValueError, match=words):
         controller(seen, parameters)
+
+
+def test_what_are_no_numbers_is_refused() -> None:
+    with pytest.raises(
+        ValueError, match="observations must be an array of real numbers"
+    ):
+        StateFeedback([1.0, 0.0], [0.0, 0.0])([["a", "b"]])
+    with pytest.raises(ValueError, match="parameters must be an array of real numbers"):
+        StateFeedback(set_point=[0.0, 0.0])([[1.0, 2.0]], [["a", "b"]])
+    with pytest.raises(ValueError, match="n_inputs must be at most 1000"):
+        StateFeedback(set_point=[0.0, 0.0], n_inputs=10**12)

@@ -79,7 +79,8 @@ def _systems(base: Any) -> list[Any]:
     if not isinstance(seen, spaces.Discrete) or seen != chosen:
         return []
     if isinstance(base, AsyncVectorEnv):
-        # A worker that is asked for what it has not ends, and with it the environment.
+        # A worker ends if it is asked for an attribute that it does not have, and the
+        # environment ends with it.
         for name in ("system", "instance", "optimum"):
             if not all(base.call("has_wrapper_attr", name)):
                 return []

@@ -201,7 +201,7 @@ class TravellingSalesman(ControlSystem):
         return array + 0.0  # no -0
 
     def _are_tours(self, states: FloatArray) -> BoolArray:
-        """Whether each row is a state that a walk can come to, `(n,)`."""
+        """Whether each row is a state that a walk can reach, `(n,)`."""
         n = self.n_cities
         arcs = states[:, ARCS]
         good = np.isin(arcs, np.arange(n + 1)) & (
@@ -258,8 +258,8 @@ class TravellingSalesman(ControlSystem):
     def action_mask(self, states: FloatArray) -> MaskArray:  # type: ignore[override]
         """Return which cities may be next, int8 `(n, n_cities)`.
 
-        Those not visited; in the last step the first city only. After that, which
-        nobody need use, those of a new tour from there.
+        They are those that have not been visited, and in the last step the first city
+        only. After the last step they are those of a new tour from there.
         """
         mask = np.empty((states.shape[1], self.n_cities), np.int8)
         kernels.allowed(states, mask)

@@ -192,7 +192,11 @@ class Delayed(ChannelWrapper):
         self._under_way.append((own, np.array(x)))
         if len(self._under_way) > self.steps + 1:
             self._under_way.popleft()
-        return self.channel.deliver(*self._under_way[0], rng)
+        messages, positions = self._under_way[0]
+        if len(self._under_way) <= self.steps:
+            # They are delivered again, also if agents change what they receive.
+            messages = {name: np.array(rows) for name, rows in messages.items()}
+        return self.channel.deliver(messages, positions, rng)
 
     def __repr__(self) -> str:
         """The call that makes it."""

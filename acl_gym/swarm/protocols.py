@@ -136,7 +136,8 @@ class DynamicAgents(ABC):
         """Take in the messages w_i; the second part of h_i, by default nothing.
 
         Args:
-            inbox: what has arrived. Its arrays may be those that `send` has returned.
+            inbox: what has arrived. Its arrays may be those that `send` has returned:
+                copy what is to be changed, or the agents' own state changes with it.
         """
 
     @abstractmethod

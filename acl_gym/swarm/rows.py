@@ -40,11 +40,7 @@ def checked_positions(positions: Any, n: int | None = None) -> FloatArray:
         or array.size == 0
         or (n is not None and len(array) != n)
     ):
-        many = "n" if n is None else n
-        raise ValueError(
-            f"positions must be an array of numbers of shape ({many}, dim), a row for "
-            f"each agent, got {validation.shown(positions)}."
-        )
+        raise _no_positions(positions, array, n)
     rows = validation.float64(array)
     agent = _first_beyond(rows, FARTHEST)
     if agent >= 0:
@@ -53,6 +49,27 @@ def checked_positions(positions: Any, n: int | None = None) -> FloatArray:
             f"agent {agent}; look for what makes it diverge, such as too large a step."
         )
     return rows
+
+
+def _no_positions(
+    positions: Any, array: NDArray[Any] | None, n: int | None
+) -> ValueError:
+    """Say what is wrong with positions."""
+    got = validation.shown(positions)
+    if array is not None and array.ndim == 2 and array.dtype.kind not in "iuf":
+        return ValueError(
+            f"positions must be real numbers, got {got} of dtype {array.dtype}."
+        )
+    if n == 0 or (array is not None and array.ndim == 2 and len(array) == 0):
+        return ValueError(
+            f"positions must have a row for each agent, and there must be at least one "
+            f"agent, got {got}."
+        )
+    many = "n" if n is None else n
+    return ValueError(
+        f"positions must be an array of numbers of shape ({many}, dim), a row for "
+        f"each agent and dim >= 1, got {got}."
+    )
 
 
 def checked_rows(name: str, values: Any, shape: tuple[int, int]) -> FloatArray:

@@ -66,7 +66,9 @@ def run(
     """Let a swarm of moving agents run from its initial state.
 
     In each step all agents observe the environment, send messages, hear what the channel
-    delivers, and decide on their inputs, by which particles and process then move.
+    delivers, and decide on their inputs, by which particles and process then move. What
+    the last step leads to is not observed: of a particle swarm the last positions are not
+    evaluated.
 
     Args:
         agents: the dynamic agents A_i.
@@ -92,7 +94,8 @@ def run(
     Raises:
         TypeError: an argument is of the wrong kind.
         ValueError: an argument is out of range; a position is NaN, infinite or farther
-            away than 1e150; or the channel delivers to another number of agents.
+            away than 1e150, which is an `acl_gym.swarm.pso.ExplosionError` in a
+            `Landscape`; or the channel delivers to another number of agents.
     """
     steps = validation.integer("steps", steps, at_least=0)
     channel = Everyone() if channel is None else channel
@@ -103,7 +106,7 @@ def run(
 
     environment.reset(rng)
     n = environment.n
-    checked_positions(environment.positions, n)
+    positions = checked_positions(environment.positions, n)
     agents.reset(n, rng)
     channel.reset(n)
     history = History(done=bool(environment.done))
@@ -116,15 +119,17 @@ def run(
         else:
             agents.observe(environment.observe())
             sent = agents.send()
-        delivered = channel.deliver(sent, environment.positions, rng)
+        delivered = channel.deliver(sent, positions, rng)
         agents.hear(checked_inbox(delivered, channel, n))
         environment.step(agents.decide(rng), rng)
-        checked_positions(environment.positions, n)
+        positions = checked_positions(environment.positions, n)
         history.steps += 1
         history.done = bool(environment.done)
         _record(environment, series)
         if callback is not None and _ends(callback(history.steps, agents, environment)):
             break
+        if callback is not None:  # which may have moved agents
+            positions = checked_positions(environment.positions, n)
     history.recorded = {name: np.stack(rows) for name, rows in series.items()}
     return history
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -20,6 +21,12 @@ class _ByNumber(Topology):
     """A topology of agents that know each other's numbers, wherever they are."""
 
     _kept: Links | None = None  # of the last number of agents
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        """Set an attribute; links that were made with another value are forgotten."""
+        super().__setattr__(name, value)
+        if name != "_kept":
+            super().__setattr__("_kept", None)
 
     def links(self, x: FloatArray) -> Links:
         """See `Topology.links`; positions do not matter."""

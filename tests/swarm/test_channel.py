@@ -177,3 +177,16 @@ def test_a_delay_checks_what_is_sent_when_it_is_sent(sent, error, message) -> No
     channel.deliver({"a": np.zeros(2)}, np.zeros((2, 1)), rng)
     with pytest.raises(error, match=message):
         channel.deliver(sent, np.zeros((2, 1)), rng)
+
+
+def test_agents_that_change_what_they_hear_do_not_change_later_messages() -> None:
+    channel, rng = Delayed(Everyone(), 2), np.random.default_rng(0)
+    channel.reset(3)
+    heard = []
+    for step in range(6):
+        sent = {"c": np.full(3, float(step))}
+        inbox = channel.deliver(sent, np.zeros((3, 2)), rng)
+        heard.append(inbox.messages["c"].tolist())
+        inbox.messages["c"] *= 2.0
+        inbox.messages["d"] = inbox.messages.pop("c")
+    assert heard == [[k] * 3 for k in (0.0, 0.0, 0.0, 1.0, 2.0, 3.0)]

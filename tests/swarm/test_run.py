@@ -415,3 +415,35 @@ class Mute(ConsensusAgents):
 def test_messages_that_are_none(channel: Channel, stale: bool) -> None:
     with pytest.raises(TypeError, match="messages must be a dict of arrays"):
         run(Mute(), Plane(), 2, 0, channel, stale=stale)
+
+
+@pytest.mark.parametrize("moved", [False, True])
+def test_channels_are_given_positions_that_have_been_checked(moved: bool) -> None:
+    seen = []
+
+    class Listed(Plane):
+        @property
+        def positions(self) -> Any:
+            return self.x.tolist()
+
+    class Seen(Everyone):
+        def links(self, x: Any) -> Links:
+            seen.append(x)
+            return super().links(x)
+
+    def move(steps: int, agents: Any, environment: Any) -> None:
+        environment.x = environment.x + 1.0
+
+    environment = Listed()
+    history = run(
+        ConsensusAgents(),
+        environment,
+        3,
+        0,
+        Seen(),
+        record=("x",),
+        callback=move if moved else None,
+    )
+    assert all(isinstance(x, np.ndarray) for x in seen)
+    wanted = history["x"][:3] + np.reshape([0, moved, moved], (3, 1, 1))
+    np.testing.assert_array_equal(seen, wanted)

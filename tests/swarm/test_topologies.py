@@ -183,8 +183,8 @@ def test_the_number_of_agents_may_change(topology: Topology) -> None:
         ([[0.0], [math.inf]], "for agent 1; look for what makes it diverge"),
         ([[-1e151], [0.0]], "for agent 0"),
         ([0.0, 1.0], r"of shape \(n, dim\), a row for each agent"),
-        (np.empty((0, 2)), r"of shape \(n, dim\)"),
-        ([["a"], ["b"]], "must be an array of numbers"),
+        (np.empty((0, 2)), "there must be at least one agent"),
+        ([["a"], ["b"]], "must be real numbers, got .* of dtype"),
     ],
 )
 def test_positions_must_be_numbers(topology, x, words) -> None:
@@ -234,3 +234,26 @@ def test_a_ring_counts_its_links_before_it_makes_them() -> None:
     x = np.broadcast_to(0.0, (10**6, 1))
     with pytest.raises(ValueError, match=r"200,001,000,000 links .* use a smaller k"):
         Ring(100_000).links(x)
+
+
+@pytest.mark.parametrize(
+    ("channel", "name", "value"),
+    [
+        (Everyone(), "include_self", False),
+        (Ring(), "include_self", False),
+        (Ring(), "k", 2),
+        (VonNeumann(), "include_self", False),
+        (VonNeumann(), "rows", 1),
+    ],
+    ids=repr,
+)
+def test_an_attribute_that_is_changed_counts(channel, name, value) -> None:
+    x = np.zeros((12, 2))
+    kept = channel.links(x)
+    assert channel.links(x) is kept
+    setattr(channel, name, value)
+    wanted = type(channel)(**{name: value}).links(x)
+    for attribute in ("receiver", "sender"):
+        found = getattr(channel.links(x), attribute)
+        assert np.array_equal(found, getattr(wanted, attribute))
+    assert wanted.n_links != kept.n_links

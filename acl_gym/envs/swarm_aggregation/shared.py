@@ -45,10 +45,13 @@ def inputs_of(actions: Any, count: int, system: SwarmAggregation) -> FloatArray:
 def checked_states(rows: NDArray[Any], world: World) -> FloatArray:
     """States that a reset was given, of the learners or of all agents."""
     if rows.shape[:1] not in ((world.learners,), (world.n,)):
+        wanted = f"{world.learners} rows, one for each agent"
+        if world.n > world.learners:
+            wanted += (
+                f" that takes actions, or {world.n}, one for each agent of the world"
+            )
         raise ValueError(
-            f"options['state'] must hold {world.learners} rows, one for each agent that "
-            f"takes actions, or {world.n}, one for each agent of the world, got shape "
-            f"{rows.shape}."
+            f"options['state'] must hold {wanted}, got shape {rows.shape}."
         )
     return world.system.checked_states(rows)
 

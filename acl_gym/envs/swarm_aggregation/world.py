@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from acl_gym.envs.swarm_aggregation.boxes import look_in_boxes, tree_of_boxes
 from acl_gym.envs.swarm_aggregation.kernels import look_around
 from acl_gym.envs.swarm_aggregation.system import MOST_WITHOUT_RADIUS, SwarmAggregation
 from acl_gym.swarm.aggregation import forces_within
@@ -20,6 +21,7 @@ TRAIL = 12
 """Steps of the past that a picture shows."""
 
 _MOST_DRAWS = 10_000
+_CROWD = 200  # agents in the cell of an agent, on average, from which boxes are faster
 _BYTES_AN_AGENT = 500  # of states, cells and what is observed
 _BYTES_A_NEIGHBOUR = 100  # of the two numbers observed of it, and of their bounds
 
@@ -255,15 +257,19 @@ class World:
         nearest = np.empty((n, 2 * system.nearest))
         side = max(system.collision_distance, self._cell_side(x))
         cells = sort_into_cells(x, side)
-        look_around(
-            cells,
-            system.reach,
-            system.collision_distance,
-            heard,
-            towards,
-            collisions,
-            nearest,
-        )
+        if system.sensing_radius is None and _crowd(cells[1]) > _CROWD:
+            tree = tree_of_boxes(x)
+            look_in_boxes(tree, system.collision_distance, collisions, nearest)
+        else:
+            look_around(
+                cells,
+                system.reach,
+                system.collision_distance,
+                heard,
+                towards,
+                collisions,
+                nearest,
+            )
         towards /= np.maximum(heard, 1)[:, None]
         return Look(heard, towards, collisions, nearest)
 
@@ -322,3 +328,13 @@ class World:
             f"obstacles must leave room for agents, got none in {_MOST_DRAWS:,} draws; "
             "make them smaller."
         )
+
+
+def _crowd(first: IntArray) -> float:
+    """How many agents are in the cell of an agent, on average over the agents.
+
+    Args:
+        first: where the agents of each cell begin, and where the last end.
+    """
+    counts = np.diff(first).astype(np.float64)
+    return float(counts @ counts / first[-1])

@@ -12,6 +12,7 @@ from acl_gym.swarm.aggregation.interaction import (
     BoundedRepulsion,
     Interaction,
     check_interaction,
+    coefficients_of,
 )
 from acl_gym.swarm.inbox import Inbox
 from acl_gym.swarm.protocols import DynamicAgents
@@ -41,7 +42,7 @@ class AggregatingAgents(DynamicAgents):
 
     def reset(self, n: int, rng: np.random.Generator) -> None:
         """Check that the parameters are those of n agents, and forget the last run."""
-        self.interaction.coefficients(n)
+        coefficients_of(self.interaction, n)
         self._position = self._force = np.zeros((n, 0))
         self._slope = None
 

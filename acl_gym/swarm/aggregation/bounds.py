@@ -35,7 +35,9 @@ def size_bound(
     m, a, b = _checked(n_agents, attraction, repulsion)
     c = _positive("spread", spread)
     _same_shape(n_agents=m, attraction=a, repulsion=b, spread=c)
-    return np.asarray(b / a * np.sqrt(0.5 * c) * math.exp(-0.5) * (m - 1.0) / m)
+    # In this order 0 is not multiplied by what overflows.
+    share = math.sqrt(0.5) * math.exp(-0.5) * ((m - 1.0) / m)
+    return np.asarray(share * b / a * np.sqrt(c))
 
 
 @np.errstate(over="ignore")
@@ -50,7 +52,8 @@ def rms_bound(
     m, a, b = _checked(n_agents, attraction, repulsion)
     c = _positive("spread", spread)
     _same_shape(n_agents=m, attraction=a, repulsion=b, spread=c)
-    return np.sqrt((m - 1.0) * b * c / (2.0 * a * math.e * m))
+    share = np.sqrt((m - 1.0) / m / (2.0 * math.e))
+    return np.asarray(share * np.sqrt(b) * np.sqrt(c) / np.sqrt(a))
 
 
 @np.errstate(over="ignore")
@@ -63,7 +66,7 @@ def resting_sum_of_squares(
     `acl_gym.swarm.aggregation.bounds` for the arguments.
     """
     m, a, b = _checked(n_agents, attraction, repulsion)
-    return np.asarray(b * (m - 1.0) / (2.0 * a))
+    return np.asarray(b * (0.5 * (m - 1.0)) / a)
 
 
 @np.errstate(over="ignore")

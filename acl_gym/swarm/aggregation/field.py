@@ -79,10 +79,10 @@ class Field(Environment):
         self.time_step = validation.number("time_step", time_step, above=0)
         self.profile, self.obstacles = profile, obstacles
         self._start: FloatArray | None = None
+        self._dim = validation.integer("dim", dim, at_least=1)
+        self._bounds = _checked_bounds(bounds)
         if validation.as_array(start) is not None and np.ndim(start) == 0:
             self._count = validation.integer("start", start, at_least=1)
-            self._dim = validation.integer("dim", dim, at_least=1)
-            self._bounds = _checked_bounds(bounds)
         else:
             self._start = _checked_start(start)
             self._count, self._dim = self._start.shape

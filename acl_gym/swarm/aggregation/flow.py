@@ -6,7 +6,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from acl_gym.swarm.aggregation.forces import forces_over_links
-from acl_gym.swarm.aggregation.interaction import Interaction, check_interaction
+from acl_gym.swarm.aggregation.interaction import (
+    Interaction,
+    check_interaction,
+    coefficients_of,
+)
 from acl_gym.swarm.aggregation.kernels import UNBOUNDED
 from acl_gym.swarm.aggregation.profiles import Profile, checked_gradient
 from acl_gym.swarm.links import Links
@@ -113,9 +117,10 @@ def _check_apart(x: FloatArray, interaction: Interaction, links: Links) -> None:
     Kernels give such a pair no force, because it has no direction to part in. In
     continuous time that would be a solution which any disturbance ends.
     """
-    if interaction.kind != UNBOUNDED:
+    law = coefficients_of(interaction, len(x))
+    if law is None or law.kind != UNBOUNDED:
         return
-    repelled = interaction.coefficients(len(x)).repulsion > 0.0
+    repelled = law.repulsion > 0.0
     _, place = np.unique(x + 0.0, axis=0, return_inverse=True)  # -0.0 becomes 0.0
     place = place.reshape(-1)
     shared = repelled & (np.bincount(place)[place] > 1)

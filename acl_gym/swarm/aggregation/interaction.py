@@ -41,25 +41,83 @@ class Coefficients(NamedTuple):
 class Interaction(ABC):
     """A function g(y) = -y [g_a(|y|) - g_r(|y|)] of the class (6.5), y = x_i - x_j.
 
-    It is what agent j adds to the input u_i of agent i. g_a attracts, g_r repels. The
-    attraction of both kinds is a constant, g_a = a, so that it pulls like a spring.
+    It is what agent j adds to the input u_i of agent i. g_a attracts, g_r repels. Compiled
+    kernels sum `BoundedRepulsion` and `UnboundedRepulsion`. A subclass of yours needs
+    `net_attraction` only, and NumPy sums it, which is slower.
 
     Parameters are numbers, or arrays with one value for each agent: then the swarm is
     heterogeneous (Definition 6.8), and agent i moves by the i-th values.
+
+    Example:
+        >>> class Constant(Interaction):
+        ...     def net_attraction(self, distance):
+        ...         return 1.0 - 0.5 / np.maximum(distance, 1e-9)
+        >>> Constant()([2.0, 0.0])
+        array([-1.5, -0. ])
     """
-
-    kind: ClassVar[int]
-
-    attraction: Parameter
-    repulsion: Parameter
 
     @abstractmethod
     def net_attraction(self, distance: ArrayLike) -> FloatArray:
         """g_a - g_r at a distance, > 0 where agents attract each other.
 
         Args:
-            distance: r = |y|, >= 0; `(..., n)` where the parameters are arrays.
+            distance: r = |y|, >= 0; `(..., n)` where the parameters are arrays, and
+                wherever a swarm of n agents is summed: a distance for each receiver.
+
+        Returns:
+            An array of the shape of `distance`; what it holds where r = 0 does not count.
         """
+
+    def __call__(self, y: ArrayLike) -> FloatArray:
+        """g(y) of (6.5).
+
+        Args:
+            y: x_i - x_j, `(..., dim)`; `(..., n, dim)` where the parameters are arrays.
+
+        Returns:
+            An array of the shape of `y`; 0 where y is 0, since two agents in one place
+            have no direction to part in.
+
+        Raises:
+            ValueError: `y` are not such numbers, or the parameters are for another
+                number of agents.
+        """
+        y = _checked("y", y)
+        if y.ndim == 0:
+            raise ValueError(
+                f"y must have an axis of coordinates, got the number {y:g}; use "
+                "net_attraction for a distance."
+            )
+        distance = np.sqrt(np.square(y).sum(axis=-1))
+        net = validation.as_array(self.net_attraction(distance))
+        if net is None or net.dtype.kind not in "iuf":
+            raise ValueError(
+                f"net_attraction of {type(self).__name__} must return numbers, got "
+                f"{validation.shown(net)}."
+            )
+        if net.shape not in ((), distance.shape):
+            raise ValueError(
+                f"net_attraction of {type(self).__name__} must have the shape of the "
+                f"distances, {distance.shape}, got {net.shape}; parameters with one value "
+                "for each agent need y with a row for each."
+            )
+        strength = np.where(distance > 0, net, 0.0)
+        return np.asarray(-y * strength[..., None])
+
+
+class _Summed(Interaction):
+    """An interaction that kernels sum: its attraction is a constant, g_a = a, a spring.
+
+    Attributes:
+        kind: `BOUNDED` or `UNBOUNDED`.
+        attraction: a.
+        repulsion: b.
+    """
+
+    kind: ClassVar[int]
+
+    attraction: Parameter
+    repulsion: Parameter
 
     @abstractmethod
     def potential(self, distance: ArrayLike) -> FloatArray:
@@ -81,21 +139,6 @@ class Interaction(ABC):
     @abstractmethod
     def _rate(self) -> Parameter:
         """1 / c."""
-
-    def __call__(self, y: ArrayLike) -> FloatArray:
-        """g(y) of (6.5).
-
-        Args:
-            y: x_i - x_j, `(..., dim)`; `(..., n, dim)` where the parameters are arrays.
-
-        Returns:
-            An array of the shape of `y`; 0 where y is 0, since two agents in one place
-            have no direction to part in.
-        """
-        y = _checked("y", y)
-        distance = np.sqrt(np.square(y).sum(axis=-1))
-        strength = np.where(distance > 0, self.net_attraction(distance), 0.0)
-        return np.asarray(-y * strength[..., None])
 
     def _distances(self, distance: ArrayLike) -> FloatArray:
         """Distances as an array, whose last axis is that of the agents, if they differ."""
@@ -136,7 +179,7 @@ class Interaction(ABC):
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class BoundedRepulsion(Interaction):
+class BoundedRepulsion(_Summed):
     """g(y) = -y [a - b exp(-|y|^2 / c)], the bounded repulsion of Gazi and Passino.
 
     The defaults are those of Gazi and Passino (2003): agents rest 0.774 apart.
@@ -170,7 +213,14 @@ class BoundedRepulsion(Interaction):
         return np.asarray(self.attraction - self.repulsion * decay)
 
     def potential(self, distance: ArrayLike) -> FloatArray:
-        """a r^2 / 2 + (b c / 2) exp(-r^2 / c); see `Interaction.potential`."""
+        """V(r) = a r^2 / 2 + (b c / 2) exp(-r^2 / c), of which g is the descent.
+
+        Args:
+            distance: r = |y|, >= 0.
+
+        Returns:
+            V, g(y) = -grad V(|y|).
+        """
         square = np.square(self._distances(distance))
         height = 0.5 * self.repulsion * self.spread
         pull = 0.5 * self.attraction * square
@@ -179,7 +229,10 @@ class BoundedRepulsion(Interaction):
 
     @property
     def rest_distance(self) -> FloatArray:
-        """sqrt(c ln(b / a)); see `Interaction.rest_distance`."""
+        """delta = sqrt(c ln(b / a)), at which two or three agents rest: g_a = g_r.
+
+        0 where the attraction prevails at any distance, infinity where there is none.
+        """
         with np.errstate(divide="ignore", invalid="ignore"):
             ratio = np.asarray(self.repulsion) / np.asarray(self.attraction)
             square = self.spread * np.log(np.maximum(ratio, 1.0))
@@ -192,7 +245,7 @@ class BoundedRepulsion(Interaction):
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class UnboundedRepulsion(Interaction):
+class UnboundedRepulsion(_Summed):
     """g(y) = -y [a - b / |y|^2]: a repulsion that no two agents can overcome.
 
     Attributes:
@@ -221,14 +274,14 @@ class UnboundedRepulsion(Interaction):
         return np.asarray(self.attraction - repulsion)
 
     def potential(self, distance: ArrayLike) -> FloatArray:
-        """a r^2 / 2 - b ln(r); see `Interaction.potential`."""
+        """V(r) = a r^2 / 2 - b ln(r); see `BoundedRepulsion.potential`."""
         r = self._distances(distance)
         pull = 0.5 * self.attraction * np.square(r)
         return np.asarray(pull - xlogy(self.repulsion, r))
 
     @property
     def rest_distance(self) -> FloatArray:
-        """sqrt(b / a); see `Interaction.rest_distance`."""
+        """delta = sqrt(b / a); see `BoundedRepulsion.rest_distance`."""
         with np.errstate(divide="ignore", invalid="ignore"):
             square = np.asarray(self.repulsion) / np.asarray(self.attraction)
         return np.sqrt(np.where(np.isnan(square), 0.0, square))
@@ -262,7 +315,33 @@ def check_interaction(interaction: object) -> None:
         )
 
 
-def _set(interaction: Interaction, name: str, at_least: float = 0.0) -> None:
+def coefficients_of(interaction: Interaction, n: int) -> Coefficients | None:
+    """The parameters of n agents for kernels; None where no kernel sums the interaction.
+
+    Args:
+        interaction: g. A subclass that changes what `BoundedRepulsion` or
+            `UnboundedRepulsion` computes is an interaction of its own.
+        n: the number of agents, >= 1.
+
+    Raises:
+        TypeError: it is no `Interaction`.
+        ValueError: a parameter has values for another number of agents.
+    """
+    check_interaction(interaction)
+    for law in (BoundedRepulsion, UnboundedRepulsion):
+        if isinstance(interaction, law):
+            parameters = interaction.coefficients(n)
+            kind = type(interaction)
+            same = (getattr(kind, name) is getattr(law, name) for name in _MADE_OF)
+            return parameters if all(same) else None
+    return None
+
+
+_MADE_OF = ("__call__", "net_attraction", "coefficients", "_rate", "kind")
+"""What a subclass may change of an interaction that kernels sum."""
+
+
+def _set(interaction: _Summed, name: str, at_least: float = 0.0) -> None:
     """Check a parameter and keep it as an array that cannot be changed."""
     array = per_agent(name, getattr(interaction, name), None, at_least=at_least)
     object.__setattr__(interaction, name, validation.read_only(array))

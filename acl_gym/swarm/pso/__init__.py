@@ -7,7 +7,7 @@ the environment of a `ParticleSwarm`, and any `Channel` says who hears of whose 
 
 from acl_gym.swarm.pso.agents import ParticleSwarm
 from acl_gym.swarm.pso.coefficients import constriction_coefficients
-from acl_gym.swarm.pso.landscape import Landscape
+from acl_gym.swarm.pso.landscape import ExplosionError, Landscape
 from acl_gym.swarm.pso.optimize import minimize
 from acl_gym.swarm.pso.stability import (
     Moments,
@@ -18,6 +18,7 @@ from acl_gym.swarm.pso.stability import (
 )
 
 __all__ = [
+    "ExplosionError",
     "Landscape",
     "Moments",
     "ParticleSwarm",

@@ -20,8 +20,8 @@ from acl_gym.utils.typing import FloatArray
 _FLOAT64 = np.dtype(np.float64)
 
 
-class ExplosionError(OverflowError):
-    """A position of a swarm is beyond `FARTHEST`, or a velocity beyond all floats."""
+class ExplosionError(ValueError, OverflowError):
+    """A particle is farther away than 1e150, or its velocity larger than floats can be."""
 
 
 class Landscape(Environment):
@@ -36,7 +36,8 @@ class Landscape(Environment):
 
     The thesis prints the second one. Everybody else uses the first, and for a reason:
     with the old velocity a swarm is stable for far smaller accelerations only, and with
-    the usual ones it explodes (`acl_gym.swarm.pso.stability`).
+    the usual ones it explodes, or, within bounds, does not converge
+    (`acl_gym.swarm.pso.stability`).
 
     The process is the function F itself, which does not change. F is a cost here: the
     lower, the better, where the thesis maximizes a fitness.
@@ -224,9 +225,12 @@ class Landscape(Environment):
             FARTHEST,
         )
         if not finite:
+            held = (np.abs(x[:, :d]) <= FARTHEST) & np.isfinite(x[:, d:])
+            particle = (rows.start or 0) + int(held.all(axis=1).argmin())
             raise ExplosionError(
                 f"positions must stay within {FARTHEST:g} and velocities finite, but the "
-                f"swarm has exploded in iteration {self.iteration}; use "
+                f"swarm has exploded in iteration {self.iteration}, first seen at "
+                f"particle {particle}; use "
                 "order='standard', a smaller inertia or acceleration "
                 "(acl_gym.swarm.pso.is_stable tells which), bounds or a velocity_limit."
             )

@@ -65,8 +65,10 @@ def minimize(
     see `constriction_coefficients`.
 
     `run(ParticleSwarm(..), Landscape(..), steps, seed, channel)` makes the same moves with
-    the same bits, iteration by iteration. Where a position gets farther away than 1e150,
-    `run` ends with an error, and a search as one that has exploded.
+    the same bits, iteration by iteration. Agents of `run` observe at the beginning of a
+    step, and the positions after the last one are not evaluated: K steps find what K - 1
+    iterations find. Where a position gets farther away than 1e150, `run` ends with an
+    `ExplosionError`, and a search as one that has exploded.
 
     Args:
         function: of an array of points `(n, d)`; returns their values, `(n,)`. Infinity is
@@ -83,7 +85,7 @@ def minimize(
         target: a value to reach, with which the search ends.
         tolerance: >= 0. The search ends when the values of all personal bests lie within
             so much of each other: the swarm has agreed. Infinite values agree about
-            nothing. None: it goes on.
+            nothing. It needs two particles or more. None: the search goes on.
         seed: of the random numbers, or a generator; None draws one.
         x0: where the first particle or the first m particles begin, `(d,)` or `(m, d)`.
         inertia: w: a number, one for each particle, or a function of the iteration, see
@@ -97,8 +99,9 @@ def minimize(
             `Channel`, such as `Radius(0.5)` or `Lossy(Ring(), 0.3)`.
         boundary: `"reflect"`, `"absorb"`, `"clip"` or `"none"`, see `Landscape`.
         velocity_limit: the largest absolute velocity, see `Landscape`.
-        order: `"standard"`, or `"literal"` as (6.1) is printed, which explodes, see
-            `Landscape`.
+        order: `"standard"`, or `"literal"` as (6.1) is printed. With the usual
+            coefficients a swarm then explodes if `boundary="none"`, and within bounds it
+            does not converge, see `Landscape`.
         update: `"synchronous"`, all particles move at once, or `"asynchronous"`, one after
             the other, each knowing what those before it have just found. `function` is
             then called with one point at a time, an array `(1, d)` if it is vectorized.
@@ -146,6 +149,11 @@ def minimize(
         target = validation.number("target", target)
     if tolerance is not None:
         tolerance = validation.number("tolerance", tolerance, at_least=0)
+        if landscape.n_particles == 1:
+            raise ValueError(
+                "n_particles must be at least 2 with a tolerance, got 1, which always "
+                "agrees with itself; use more particles, or target."
+            )
     if callback is not None and not callable(callback):
         raise TypeError(
             "callback must be a function of an OptimizeResult, got "

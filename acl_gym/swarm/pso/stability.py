@@ -232,37 +232,45 @@ def position_moments(
     steps = validation.integer("steps", steps, at_least=0)
     fixed, random = _recursion(inertia, order)
     c1, c2 = _accelerations(cognitive, social)
+    p = validation.number("personal_best", personal_best)
     g = validation.number("local_best", local_best)
-    # Seen from the local best: squares of large coordinates would hide the variance.
-    p = validation.number("personal_best", personal_best) - g
-    start = [
-        validation.number("position", position) - g,
-        validation.number("velocity", velocity),
-        1.0,
-    ]
-    # z = (theta, nu, 1), and z' = (D + r1 P + r2 Q) z.
-    d, of_p, of_q = np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((3, 3))
-    d[:2, :2], d[2, 2] = fixed, 1.0
+    # Seen from the point to which the mean tends, and the variance on its own: squares of
+    # large coordinates would hide the variance.
+    total = c1 + c2
+    origin = p if c2 == 0.0 else g if c1 == 0.0 else p + c2 / total * (g - p)
+    mean = np.array(
+        [
+            validation.number("position", position) - origin,
+            validation.number("velocity", velocity),
+        ]
+    )
+    # z' = (A - (c1 r1 + c2 r2) B) z + (c1 r1 p + c2 r2 g) b with z = (theta, nu).
     receives = random[:, 0]  # which of theta and nu the attraction enters
-    for matrix, c, best in ((of_p, c1, p), (of_q, c2, 0.0)):
-        matrix[:2, 0] = -c * receives
-        matrix[:2, 2] = c * best * receives
-    mean = d + MEAN * (of_p + of_q)
-    moment = np.outer(start, start)
+    pulls = ((c1, p - origin), (c2, g - origin))
+    step_mean = fixed - MEAN * total * random
+    # 0 but for the rounding of the origin.
+    drift = MEAN * (c1 * (p - origin) + c2 * (g - origin)) * receives
+    noise = VARIANCE * np.outer(receives, receives)
+    covariance = np.zeros((2, 2))
     means, variances = np.empty(steps + 1), np.empty(steps + 1)
     for step in range(steps + 1):
-        if not np.isfinite(moment).all():
+        with np.errstate(over="ignore", invalid="ignore"):
+            squares = np.outer(mean, mean)
+        if not (np.isfinite(squares).all() and np.isfinite(covariance).all()):
             raise ValueError(
                 f"steps must be fewer than {step}, got {steps}: the moments of a swarm "
                 "that is not stable are then larger than a float can hold."
             )
-        means[step] = moment[0, 2]
-        variances[step] = moment[0, 0] - moment[0, 2] ** 2
+        means[step], variances[step] = mean[0], covariance[0, 0]
         with np.errstate(over="ignore", invalid="ignore"):
-            moment = mean @ moment @ mean.T + VARIANCE * (
-                of_p @ moment @ of_p.T + of_q @ moment @ of_q.T
+            # r1 and r2 add c_i (best_i - theta) r_i to the coordinates that receive it,
+            # independently of each other and of theta.
+            spread = sum(
+                c * c * ((best - mean[0]) ** 2 + covariance[0, 0]) for c, best in pulls
             )
-    return Moments(means + g, np.maximum(variances, 0.0))
+            covariance = step_mean @ covariance @ step_mean.T + spread * noise
+            mean = step_mean @ mean + drift
+    return Moments(means + origin, variances)
 
 
 def _recursion(inertia: float, order: str) -> tuple[FloatArray, FloatArray]:

@@ -319,3 +319,16 @@ def test_rows_of_agents_that_are_not_reset_may_be_anything(rows: int) -> None:
     with pytest.raises(ValueError, match="must lie within"):
         env.reset(options={"state": given, "reset_mask": ~mask})
     env.close()
+
+
+@pytest.mark.parametrize(
+    ("followers", "message"),
+    [
+        (0, r"must hold 4 rows, one for each agent, got shape \(3, 2\)"),
+        (5, "must hold 4 rows, one for each agent that takes actions, or 9, one for"),
+    ],
+)
+def test_too_few_states_for_a_reset(followers: int, message: str) -> None:
+    env = SwarmAggregationVectorEnv(4, followers=followers)
+    with pytest.raises(ValueError, match=message):
+        env.reset(options={"state": np.zeros((3, 2))})

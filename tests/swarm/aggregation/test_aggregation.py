@@ -475,3 +475,15 @@ def test_a_channel_that_drops_a_message() -> None:
 def test_tolerances_that_no_solver_can_keep(tolerance: float) -> None:
     with pytest.raises(ValueError, match=r"tolerance must lie in \[1e-15, 1\]"):
         flow([[0.0], [1.0]], BoundedRepulsion(), [0.1], tolerance=tolerance)
+
+
+@pytest.mark.parametrize("a", [1e-300, 1.0, 1e300])
+@pytest.mark.parametrize("b", [0.0, 1e-300, 1e300])
+@pytest.mark.parametrize("c", [1e-300, 1e300])
+def test_bounds_of_extreme_parameters_are_numbers(a: float, b: float, c: float) -> None:
+    for m in (1, 2, 10**6):
+        found = size_bound(m, a, b, c), rms_bound(m, a, b, c)
+        assert all(each >= 0.0 for each in found)
+        assert bounds.resting_sum_of_squares(m, a, b) >= 0.0
+        if m == 1 or b == 0.0:
+            assert found == (0.0, 0.0)

@@ -527,3 +527,18 @@ def test_what_overflows_ends_in_an_error(settings: dict[str, Any]) -> None:
     field.reset(RNG(0))
     with pytest.raises(ValueError, match=r"positions must be numbers|must be finite"):
         field.step(-field.observe()["slope"] + [3.0, 3.0], RNG(0))
+
+
+@pytest.mark.parametrize(
+    ("settings", "error", "message"),
+    [
+        ({"bounds": "x"}, ValueError, "bounds must"),
+        ({"dim": "y"}, TypeError, "dim must"),
+    ],
+)
+@pytest.mark.parametrize("start", [2, [[0.0, 0.0], [1.0, 1.0]]], ids=repr)
+def test_settings_are_checked_whether_they_are_used_or_not(
+    start: Any, settings: dict[str, Any], error: type[Exception], message: str
+) -> None:
+    with pytest.raises(error, match=message):
+        Field(start, **settings)

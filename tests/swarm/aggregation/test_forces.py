@@ -247,3 +247,18 @@ def test_agents_that_no_cell_can_tell_apart(distance: float) -> None:
         assert (cells.cell < cells.shape.prod()).all()
     assert np.isfinite(forces_within(x, BoundedRepulsion(), distance)).all()
     assert Radius(distance).links(x[:50]).n == 50
+
+
+@pytest.mark.parametrize(
+    ("x", "message"),
+    [
+        (np.zeros((0, 2)), "there must be at least one agent"),
+        ([["a", "b"]], "positions must be real numbers, got .* of dtype <U1"),
+        (np.zeros((2, 2), np.complex128), "real numbers, got .* of dtype complex128"),
+        (np.zeros((3, 0)), r"of shape \(n, dim\), a row for each agent and dim >= 1"),
+        ([1.0, 2.0], r"of shape \(n, dim\), a row for each agent and dim >= 1"),
+    ],
+)
+def test_what_is_wrong_with_positions_is_said(x: Any, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        forces_within(x, BoundedRepulsion())

@@ -257,9 +257,50 @@ def test_run_and_minimize_explode_in_the_same_iteration(channel: Channel) -> Non
     landscape = Landscape(
         sphere, [(-5, 5)] * 2, n_particles=12, order="literal", boundary="none"
     )
-    with pytest.raises(ExplosionError):
+    with pytest.raises(ExplosionError) as raised:
         run(ParticleSwarm(social=3.0), landscape, 3_000, 0, channel)
     assert landscape.iteration == found.nit + 1
+    assert str(raised.value) == found.message
+    assert isinstance(raised.value, ValueError)
+
+
+@pytest.mark.parametrize("update", ["synchronous", "asynchronous"])
+def test_an_explosion_names_the_particle(update: str) -> None:
+    found = minimize(
+        sphere,
+        [(-5, 5)] * 2,
+        n_particles=6,
+        order="literal",
+        boundary="none",
+        inertia=[0.5, 0.5, 0.5, 1e80, 0.5, 1e80],
+        update=update,
+        seed=0,
+    )
+    assert "exploded in iteration 3, first seen at particle 3" in found.message
+
+
+def test_the_printed_order_does_not_converge_within_bounds() -> None:
+    settings: Any = {"max_iterations": 300, "seed": 0, "history": True}
+    bounds = [(-100, 100)] * 30
+    printed = minimize(sphere, bounds, order="literal", **settings)
+    usual = minimize(sphere, bounds, **settings)
+    assert printed.nit == 300
+    assert printed.history["spread"][-1] > 0.5 * printed.history["spread"][0]
+    assert usual.history["spread"][-1] < 0.1 * usual.history["spread"][0]
+
+
+def test_a_step_of_a_run_less_one_is_an_iteration() -> None:
+    found = minimize(sphere, [(-5, 5)] * 2, max_iterations=6, seed=0)
+    landscape, swarm = Landscape(sphere, [(-5, 5)] * 2), ParticleSwarm()
+    run(swarm, landscape, 7, 0, VonNeumann())
+    assert swarm.best_values.min() == found.fun
+    assert landscape.objective.evaluations == found.nfev == 7 * 40
+
+
+def test_one_particle_has_nobody_to_agree_with() -> None:
+    message = "n_particles must be at least 2 with a tolerance, got 1"
+    with pytest.raises(ValueError, match=message):
+        minimize(sphere, [(-5, 5)], n_particles=1, tolerance=1e-3)
 
 
 @pytest.mark.parametrize("update", ["synchronous", "asynchronous"])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -221,6 +222,45 @@ def test_moments_do_not_depend_on_where_zero_is() -> None:
     )
     np.testing.assert_allclose(there.mean - 2.0**40, here.mean, atol=1e-3)
     np.testing.assert_allclose(there.variance, here.variance, rtol=1e-12)
+
+
+@pytest.mark.parametrize("order", ["standard", "literal"])
+@pytest.mark.parametrize("far", [-2.0, 1e7, 1e100])
+def test_a_best_that_does_not_attract_does_not_count(order: str, far: float) -> None:
+    """With one best alone, the second moments follow a recursion in exact fractions."""
+    w, c, steps = Fraction(7, 10), Fraction(1, 2), 30
+    first, wanted = Fraction(-1), [0.0]  # theta seen from the best
+    square, product, velocity, nu = Fraction(1), Fraction(0), Fraction(0), Fraction(0)
+    mean_c, mean_cc = c / 2, c * c / 3
+    for _ in range(steps):
+        # nu' = w nu - C theta; theta' = theta + nu' or theta + nu.
+        new = (
+            w * w * velocity - 2 * w * mean_c * product + mean_cc * square,
+            w * product - mean_c * square,
+            w * velocity - mean_c * product,
+        )
+        nu_next = w * nu - mean_c * first
+        if order == "standard":
+            square = square + 2 * new[1] + new[0]
+            product, velocity, first = new[1] + new[0], new[0], first + nu_next
+        else:
+            square, product = square + 2 * product + velocity, new[1] + new[2]
+            velocity, first = new[0], first + nu
+        nu = nu_next
+        wanted.append(float(square - first * first))
+    for bests in ((1.0, far), (far, 1.0)):
+        c1, c2 = (0.5, 0.0) if bests[0] == 1.0 else (0.0, 0.5)
+        found = position_moments(
+            0.7,
+            c1,
+            c2,
+            position=0.0,
+            personal_best=bests[0],
+            local_best=bests[1],
+            steps=steps,
+            order=order,
+        )
+        np.testing.assert_allclose(found.variance, wanted, rtol=1e-11)
 
 
 @pytest.mark.parametrize(

@@ -165,7 +165,7 @@ def test_an_explosion_is_one_clear_error() -> None:
     for _ in range(74):
         landscape.step(np.zeros((3, 1)), rng)
     assert 1e148 < np.abs(landscape.positions).max() <= 1e150
-    words = r"stay within 1e\+150 .* exploded in iteration 76; use"
+    words = r"stay within 1e\+150 .* exploded in iteration 76, first seen at particle 0; use"
     with pytest.raises(ExplosionError, match=words):
         landscape.step(np.zeros((3, 1)), rng)
 

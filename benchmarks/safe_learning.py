@@ -233,33 +233,38 @@ def medians(runs: Sequence[Row]) -> Row:
     }
 
 
-COLUMNS = {
-    "episodes": "violated, of 1,000 episodes",
+LEARNING = {
+    "episodes": "violated while learning, of 1,000 episodes",
     "violations": "outside, of 1,000 steps",
     "interventions": "replaced, of 1,000 actions",
     "cost_first_tenth": "cost of a step, first tenth",
     "cost": "cost of a step, all",
-    "final_cost": "policy cost",
-    "worst": "worst",
-    "final_episodes": "violated",
-    "bare_cost": "without its shield: policy cost",
-    "bare_episodes": "violated",
     "seconds": "seconds",
+}
+POLICY = {
+    "final_cost": "policy cost",
+    "worst": "the worst of all runs",
+    "final_episodes": "violated by the policy, of 1,000 episodes",
+    "bare_cost": "policy cost without its shield",
+    "bare_episodes": "violated without its shield, of 1,000 episodes",
 }
 
 
 def as_markdown(rows: Sequence[Row]) -> str:
-    """A table for each task."""
+    """Two tables for each task: of learning, and of the policy at the end."""
     tables = []
     for task in dict.fromkeys(row["task"] for row in rows):
-        lines = []
+        own = []
         for row in rows:
             if row["task"] == task:
                 costs = [one["final_cost"] for one in row["runs"]]
-                full = {**row, "worst": max(costs) if costs else None}
-                lines.append([row["kind"], *(shown(full.get(k)) for k in COLUMNS)])
-        heads = ["arrangement", *COLUMNS.values()]
-        tables.append(f"{task}:\n\n{markdown(heads, lines)}")
+                own.append({**row, "worst": max(costs) if costs else None})
+        for what, columns in ("learning", LEARNING), ("the policy", POLICY):
+            lines = [
+                [row["kind"], *(shown(row.get(k)) for k in columns)] for row in own
+            ]
+            heads = ["arrangement", *columns.values()]
+            tables.append(f"{task}, {what}:\n\n{markdown(heads, lines)}")
     return "\n\n".join(tables)
 
 

@@ -8,7 +8,7 @@ from acl_gym.envs.pendulum.system import Pendulum
 
 
 class PendulumEnv(ControlEnv):
-    """Swing a pendulum up and hold it there with a motor that is too weak.
+    """Swing a pendulum up and bring it to rest upright with a weak motor.
 
     ## Description
     A pole hangs from a pivot on which a motor exerts a limited torque (§5.2). The

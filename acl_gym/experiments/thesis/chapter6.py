@@ -89,6 +89,12 @@ ONE_WAY = {
 LETTER = aggregation(stale=True)
 LATE = {0: aggregation()} | {steps: aggregation(delay=steps) for steps in DELAYS}
 
+
+def steps_of(delay: int) -> str:
+    """A delay in words: 1 step, 2 steps."""
+    return f"{delay} step" if delay == 1 else f"{delay} steps"
+
+
 FORAGING_CHANNELS: dict[str, dict[str, Any]] = {
     "everyone": {},
     "30% lost": {"loss": 0.3},
@@ -192,7 +198,7 @@ EXPERIMENTS: tuple[Experiment[Any], ...] = (
     ),
     _experiment(
         *("fig6.delays", "A swarm that hears late", "§6.3.3"),
-        studies={f"{steps} steps late": study for steps, study in LATE.items()},
+        studies={f"{steps_of(delay)} late": study for delay, study in LATE.items()},
         plots=("delays",),
         table="aggregation",
         claims=("C27", "C28"),

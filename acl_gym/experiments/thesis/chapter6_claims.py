@@ -20,6 +20,7 @@ from acl_gym.experiments.swarms.measures import (
     size_swing,
     solved,
 )
+from acl_gym.experiments.swarms.study import SwarmStudy
 from acl_gym.experiments.thesis import chapter6
 from acl_gym.experiments.thesis.common import below_one, claim, listed
 from acl_gym.utils.text import digits
@@ -117,10 +118,13 @@ def _c27(results: Results) -> Iterator[Part]:
 
 
 def _speeds(results: Results) -> Tried:
+    def words(study: SwarmStudy) -> str:
+        measures = late_speed(results, study), results.last(study, "drift")
+        speed, drift = (digits(float(median(each))) for each in measures)
+        return f"{speed} per s, drift {drift}"
+
     found = {
-        f"{steps} steps": f"{digits(float(median(late_speed(results, study))))} per s, drift "
-        f"{digits(float(median(results.last(study, 'drift'))))}"
-        for steps, study in chapter6.LATE.items()
+        chapter6.steps_of(delay): words(study) for delay, study in chapter6.LATE.items()
     }
     what = "the speed of the centre over the last quarter, and its drift, medians of the runs"
     return Tried(what, listed(found, "; "))
@@ -129,9 +133,11 @@ def _speeds(results: Results) -> Tried:
 def _linear_theory(results: Results) -> Tried:
     rest = results.runs(chapter6.LATE[0])[0].table.reshape(chapter6.AGENTS, -1)
     found = {
-        f"{steps} steps": f"{growth_of_disturbances(rest, chapter6.TIME_STEP, steps):.4f}"
-        for steps in chapter6.LATE
-        if steps <= SHORT
+        chapter6.steps_of(delay): (
+            f"{growth_of_disturbances(rest, chapter6.TIME_STEP, delay):.4f}"
+        )
+        for delay in chapter6.LATE
+        if delay <= SHORT
     }
     what = "the factor by which a small disturbance at rest grows in a step, in theory"
     return Tried(what, listed(found))
@@ -139,23 +145,24 @@ def _linear_theory(results: Results) -> Tried:
 
 @claim(_speeds, _linear_theory)
 def _c28(results: Results) -> Iterator[Part]:
-    for steps, study in list(chapter6.LATE.items())[1:]:
+    for delay, study in list(chapter6.LATE.items())[1:]:
+        late = f"{chapter6.steps_of(delay)} late"
         speed = float(median(late_speed(results, study)))
         yield Part(
-            f"{steps} steps late: over the last quarter the centre is slower than "
+            f"{late}: over the last quarter the centre is slower than "
             f"{RESTS:g} per s, median of the runs",
             f"{digits(speed)} per s",
             speed < RESTS,
         )
         steady = float((size_swing(results, study) <= SETTLED).mean())
         yield Part(
-            f"{steps} steps late: over the last quarter the rms distance swings by at "
+            f"{late}: over the last quarter the rms distance swings by at "
             f"most {SETTLED:.0%} in nine of ten runs",
             f"in {steady:.0%} of runs",
             steady >= MOST,
         )
         one = float((results.last(study, "parts") == 1).mean())
-        statement = f"{steps} steps late: at least nine of ten runs end as one part"
+        statement = f"{late}: at least nine of ten runs end as one part"
         yield Part(statement, f"{one:.0%}", one >= MOST)
 
 

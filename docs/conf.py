@@ -113,6 +113,7 @@ page_description = (
     "acl-gym: colonies of ants learn control policies for Gymnasium environments."
 )
 html_copy_source = False
+html_domain_indices = False  # of modules: the reference has them by subject
 html_show_sourcelink = False
 copybutton_prompt_text = r">>> |\.\.\. |\$ "
 copybutton_prompt_is_regexp = True

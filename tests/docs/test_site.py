@@ -104,7 +104,8 @@ def test_every_page_is_in_a_table_of_contents() -> None:
         trees = re.findall(r"```\{toctree\}\n(.*?)```", page.read_text("utf-8"), re.S)
         for line in "\n".join(trees).splitlines():
             if line and not line.startswith(":"):
-                target = Path(os.path.normpath(page.parent / f"{line}.md"))
+                name = re.sub(r".* <(.*)>", r"\1", line)  # a title may precede it
+                target = Path(os.path.normpath(page.parent / f"{name}.md"))
                 assert target.exists(), f"{page} names {line}"
                 if target not in reached:
                     ahead.append(target)

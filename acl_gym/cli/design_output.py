@@ -83,6 +83,10 @@ def print_design(made: Design) -> None:
         screen.print(line, markup=False, highlight=False, soft_wrap=True)
     screen.print(table)
     lines = []
+    if made.limits.touched_rate > 0.0:
+        lines.append(made.limits.in_words())
+    if made.succeeded:  # otherwise the error says what to try
+        lines += [f"What to try: {tip}" for tip in made.advice]
     model = made.summary["model"]
     if model is not None:
         spread = model["spread"]

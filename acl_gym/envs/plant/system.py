@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import copy
 import itertools
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from gymnasium import spaces
@@ -173,6 +174,21 @@ class Plant(ControlSystem):
     def has_goal(self) -> bool:
         """Whether an episode may end in success."""
         return self._goal.centre is not None or self._goal.function is not None
+
+    @property
+    def clipped(self) -> BoolArray:
+        """Which variables stop at `low` and `high`: those not circular, `(state_size,)`."""
+        return np.asarray(self._period == 0)
+
+    def unlimited(self) -> Self:
+        """The same plant, whose variables go on beyond `low` and `high`.
+
+        Initial states, goal and cost are as before; circular variables wrap as before.
+        """
+        made = copy.copy(self)
+        made.low = np.where(self.clipped, -np.inf, self.low)
+        made.high = np.where(self.clipped, np.inf, self.high)
+        return made
 
     @property
     def max_stage_cost(self) -> float:

@@ -75,7 +75,7 @@ def print_design(made: Design) -> None:
     screen = console()
     lines = [
         f"The goal is reached from {measures.success_rate:.1%} of {measures.starts:,} "
-        f"random starts; {measures.settled_rate:.1%} stay there.",
+        f"random starts; from {measures.settled_rate:.1%} the state then stays inside it.",
         f"{made.learned.ants} ants learned from {made.learned.interactions:,} interactions "
         f"in {made.learned.seconds:.1f} s; {made.summary['seconds']:.1f} s in all.",
     ]

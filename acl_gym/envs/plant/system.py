@@ -209,7 +209,7 @@ class Plant(ControlSystem):
 
         Uncertain parameters are drawn with them, unless `initial` holds these too.
         """
-        states = self._initial.draw(rng, count)
+        states = self._drawn(rng, count)
         if len(states) > self.low.size or not self.parameters.count:
             return states
         return np.concatenate([states, self.parameters.draw(rng, count)])
@@ -340,11 +340,18 @@ class Plant(ControlSystem):
         span = (self.high - self.low)[:, None]
         return self.low[:, None] + span * rng.random((self.low.size, count))
 
+    def _drawn(self, rng: np.random.Generator, count: int) -> FloatArray:
+        """Initial states; a box of them may lead over the end of a circle."""
+        states = self._initial.draw(rng, count)
+        own = states[: self.low.size]
+        kernels.settle(own, self.low, self.high, self._period)
+        return states
+
     def _default_evaluation_states(self) -> FloatArray:
         few = self._initial.rows
         if few is not None and len(few) <= _EVALUATED:
             return self._with_nominal(few)
-        drawn = self._initial.draw(np.random.default_rng(0), _EVALUATED)
+        drawn = self._drawn(np.random.default_rng(0), _EVALUATED)
         return self._with_nominal(np.ascontiguousarray(drawn.T))
 
 

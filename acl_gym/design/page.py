@@ -9,7 +9,7 @@ from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
-from acl_gym.design.advice import state_in_words
+from acl_gym.design.advice import advice_on_limits, state_in_words
 from acl_gym.design.learning import CHOOSING, GOOD, Learned
 from acl_gym.design.limits import Limits
 from acl_gym.design.measures import Measures, Spread, distances
@@ -62,6 +62,7 @@ def write_page(
         choosing=CHOOSING,
         measures=measures,
         limits=limits,
+        owed_to_limits=bool(advice_on_limits(limits, measures, plant)),
         learned=learned,
         ended=_ENDED[learned.ended],
         rows=_rows(measures),

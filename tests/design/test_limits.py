@@ -148,6 +148,7 @@ def test_a_design_that_needs_the_floor_says_so(tmp_path: Path) -> None:
     page = (made.folder / "report.html").read_text()
     assert tip in page
     assert made.limits.in_words() in page
+    assert "In the model, which stops the state at the ends of its range" in page
 
 
 def test_a_range_that_is_wide_enough_gives_no_advice(tmp_path: Path) -> None:

@@ -137,8 +137,8 @@ def design(
         str | None,
         typer.Option(
             metavar="X,...",
-            help="For DATA.csv: lower ends of the variables; an empty one is taken from "
-            "the data.  [default: from the data]",
+            help="For DATA.csv: lower ends of the variables, where the model stops them "
+            "as a wall would; an empty one is taken from the data.  [default: from the data]",
             show_default=False,
         ),
     ] = None,
@@ -147,6 +147,16 @@ def design(
         typer.Option(
             metavar="X,...",
             help="For DATA.csv: upper ends of the variables.  [default: from the data]",
+            show_default=False,
+        ),
+    ] = None,
+    starts: Annotated[
+        str | None,
+        typer.Option(
+            metavar="X,...:X,...",
+            help="For DATA.csv: lower and upper ends of the states in which episodes "
+            "begin, such as 3,-0.5:3.3,0.5; uniformly within these.  [default: recorded "
+            "states]",
             show_default=False,
         ),
     ] = None,
@@ -223,6 +233,7 @@ def design(
         "--circular": circular,
         "--low": low,
         "--high": high,
+        "--starts": starts,
         "--actions": actions,
         "--time": time_name,
         "--run": run_name,

@@ -75,7 +75,7 @@ def print_design(made: Design) -> None:
     screen = console()
     lines = [
         f"The goal is reached from {measures.success_rate:.1%} of {measures.starts:,} "
-        f"random starts; {measures.settled_rate:.1%} stay there.",
+        f"random starts; from {measures.settled_rate:.1%} the state then stays inside it.",
         f"{made.learned.ants} ants learned from {made.learned.interactions:,} interactions "
         f"in {made.learned.seconds:.1f} s; {made.summary['seconds']:.1f} s in all.",
     ]
@@ -83,6 +83,10 @@ def print_design(made: Design) -> None:
         screen.print(line, markup=False, highlight=False, soft_wrap=True)
     screen.print(table)
     lines = []
+    if made.limits.touched_rate > 0.0:
+        lines.append(made.limits.in_words())
+    if made.succeeded:  # otherwise the error says what to try
+        lines += [f"What to try: {tip}" for tip in made.advice]
     model = made.summary["model"]
     if model is not None:
         spread = model["spread"]

@@ -44,6 +44,7 @@ def load(file: Path, given: Mapping[str, Any]) -> Any:
         circular=_names(given["--circular"] or ""),
         low=_ends("--low", given["--low"]),
         high=_ends("--high", given["--high"]),
+        starts=_starts(given["--starts"]),
         actions=None
         if actions is None
         else tuple(_numbers("--actions", each) for each in actions.split(";")),
@@ -86,6 +87,19 @@ def _ends(option: str, text: str | None) -> tuple[float | None, ...] | None:
     return tuple(
         _numbers(option, part)[0] if part.strip() else None for part in text.split(",")
     )
+
+
+def _starts(text: str | None) -> Any:
+    """The lower and the upper ends of the starts."""
+    if text is None:
+        return None
+    low, colon, high = text.partition(":")
+    if not colon:
+        raise BadArgumentError(
+            "--starts must be the lower and the upper ends of the starts with a colon "
+            f"between them, such as 3,-0.5:3.3,0.5, got {text!r}."
+        )
+    return _numbers("--starts", low), _numbers("--starts", high)
 
 
 def _cost(text: str | None) -> Any:

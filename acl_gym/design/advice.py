@@ -7,10 +7,11 @@ import re
 from collections.abc import Mapping
 from typing import Any
 
-from acl_gym.design.learning import GOOD, Learned
+from acl_gym.design.learning import CLOSE, GOOD, Learned
+from acl_gym.design.limits import Limits
 from acl_gym.design.measures import Measures
 from acl_gym.envs.plant import Plant
-from acl_gym.utils.text import digits
+from acl_gym.utils.text import digits, percent
 
 NEAR = 3.0
 """Multiples of the half-widths of the goal within which a failure was close."""
@@ -44,6 +45,7 @@ _OPTIONS = {
     "inputs=": "--actions",
     "low=": "--low",
     "high=": "--high",
+    "initial=": "--starts",
 }
 """What the arguments are called where a plant is known by recordings."""
 
@@ -169,6 +171,42 @@ def advice(learned: Learned, measures: Measures, plant: Plant) -> list[str]:
     if from_data:
         found = [_as_options(each) for each in found]
     return found
+
+
+def advice_on_limits(limits: Limits, measures: Measures, plant: Plant) -> list[str]:
+    """What to do where success may be owed to the limits of the range; mostly empty.
+
+    The model stops a state at `low` and `high` like a wall, which the plant may not have.
+    A limit that is only touched does no harm, such as that of a speed which is there to
+    bound the table. So what counts is by how much the success rate falls if nothing stops
+    the state; where this is not known, the share of the paths to the goal that touch a
+    limit. Up to `CLOSE` is neglected, below which success rates count as equal when
+    policies are compared.
+
+    Args:
+        limits: how often they are touched.
+        measures: of the policy.
+        plant: the system.
+    """
+    free = limits.success_rate_unlimited
+    if free is None:
+        doubtful = limits.touched_success_rate > CLOSE
+        what = (
+            f"{percent(limits.touched_success_rate)} of the paths to the goal may not "
+            "reach it"
+        )
+    else:
+        doubtful = measures.success_rate - free > CLOSE
+        what = f"the goal is reached from only {percent(free)} of the starts"
+    if not doubtful:
+        return []
+    found = (
+        "Unless the plant stops at the ends of its range as the model does, in particular "
+        f"at those of {limits.most}, {what}. Make the range (low=, high=) wider than "
+        "anything that the plant can reach, give the states in which episodes begin by "
+        "initial=, and design again."
+    )
+    return [_as_options(found) if hasattr(plant, "dynamics") else found]
 
 
 def forgotten_angles(plant: Plant) -> list[int]:

@@ -9,12 +9,13 @@ from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
-from acl_gym.design.advice import state_in_words
+from acl_gym.design.advice import advice_on_limits, state_in_words
 from acl_gym.design.learning import CHOOSING, GOOD, Learned
+from acl_gym.design.limits import Limits
 from acl_gym.design.measures import Measures, Spread, distances
 from acl_gym.envs.plant import Plant
 from acl_gym.utils.files import write_atomically
-from acl_gym.utils.text import digits
+from acl_gym.utils.text import digits, percent
 
 _ENDED = {
     "converged": "because the policy no longer improved",
@@ -29,6 +30,7 @@ def write_page(
     summary: dict[str, Any],
     learned: Learned,
     measures: Measures,
+    limits: Limits,
     plant: Plant,
     figures: Sequence[str],
 ) -> None:
@@ -39,6 +41,7 @@ def write_page(
         summary: what `summary.json` holds.
         learned: how the controller was learned.
         measures: what it does.
+        limits: how often its paths touch the ends of the range.
         plant: the system.
         figures: the pictures, without `.png`.
     """
@@ -58,6 +61,8 @@ def write_page(
         good=GOOD,
         choosing=CHOOSING,
         measures=measures,
+        limits=limits,
+        owed_to_limits=bool(advice_on_limits(limits, measures, plant)),
         learned=learned,
         ended=_ENDED[learned.ended],
         rows=_rows(measures),
@@ -73,16 +78,6 @@ def write_page(
         images={name: _encoded(folder / f"{name}.png") for name in figures},
     )
     write_atomically(folder / "report.html", page.encode())
-
-
-def percent(share: float) -> str:
-    """A share in percent, rounded so that only all is 100% and only none is 0%."""
-    text = f"{100.0 * share:.1f}"
-    if share < 1.0 and text == "100.0":
-        text = "99.9"
-    if share > 0.0 and text == "0.0":
-        text = "0.1"
-    return f"{text.removesuffix('.0')}%"
 
 
 def _title(summary: dict[str, Any]) -> str:

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from gymnasium import spaces
 
 from acl_gym.design.simulation import Responses
 from acl_gym.envs.learned.env import LearnedVectorEnv
@@ -30,6 +31,8 @@ class Recording:
         circular: names of the variables that wrap around.
         low: lower ends of the variables, None where the data say.
         high: upper ends.
+        starts: lower and upper ends of the states in which episodes begin, uniformly; which
+            must lie within the range. None begins in recorded states.
         actions: the inputs of each action, `(n_actions, n_inputs)`; None takes those that
             occur in the data.
         time: the column of the time, s; None where rows follow at `sampling_time`.
@@ -46,6 +49,7 @@ class Recording:
     circular: tuple[str, ...] = ()
     low: tuple[float | None, ...] | None = None
     high: tuple[float | None, ...] | None = None
+    starts: tuple[tuple[float, ...], tuple[float, ...]] | None = None
     actions: tuple[tuple[float, ...], ...] | None = None
     time: str | None = None
     run: str | None = None
@@ -95,6 +99,9 @@ def plant_of_recording(path: str | Path, recording: Recording) -> LearnedVectorE
         circular=list(recording.circular),
         **ends,
     )
+    initial: Any = "data"
+    if recording.starts is not None:
+        initial = _box_of_starts(recording.starts, size)
     return LearnedVectorEnv(
         data,
         goal=list(recording.goal),
@@ -103,8 +110,23 @@ def plant_of_recording(path: str | Path, recording: Recording) -> LearnedVectorE
         inputs=recording.actions,
         low=recording.low,
         high=recording.high,
+        initial=initial,
         max_episode_steps=recording.max_steps,
     )
+
+
+def _box_of_starts(
+    starts: tuple[tuple[float, ...], tuple[float, ...]], size: int
+) -> spaces.Box:
+    """The states in which episodes begin."""
+    low, high = (np.array(ends, dtype=np.float64) for ends in starts)
+    good = low.shape == high.shape == (size,)
+    if not good or not np.isfinite(high - low).all() or (low > high).any():
+        raise ValueError(
+            f"starts must hold {size} lower and {size} upper ends, one for each column of "
+            f"the state, finite and low <= high, got {low.tolist()} and {high.tolist()}."
+        )
+    return spaces.Box(low, high, dtype=np.float64)
 
 
 def _circular_only(recording: Recording, end: str) -> list[float | None]:
@@ -130,8 +152,8 @@ def model_facts(env: LearnedVectorEnv, responses: Responses) -> dict[str, Any]:
 
     Returns:
         Plain numbers and texts: `steps` and `runs` that were recorded, `regressor`, the
-        `errors` of each variable in cross-validation, `doubts` about the data, and
-        the `spread`, the largest on the way to the goal from each start: its median, 95%
+        `errors` of each variable in cross-validation, `doubts` about the data, the
+        `starts`, lower and upper ends where these were given, else None, and the `spread`, the largest on the way to the goal from each start: its median, 95%
         quantile and worst, and the share of starts, `unsure`, for which it exceeds the `limit`.
     """
     data, dynamics = env.transitions, env.dynamics
@@ -142,6 +164,7 @@ def model_facts(env: LearnedVectorEnv, responses: Responses) -> dict[str, Any]:
         "regressor": dynamics.regressor,
         "errors": dynamics.errors,
         "doubts": data.doubts(),
+        "starts": _ends_of_starts(env),
         "sampling_time": env.system.sampling_time,
         "spread": {
             "median": float(np.median(largest)),
@@ -151,6 +174,13 @@ def model_facts(env: LearnedVectorEnv, responses: Responses) -> dict[str, Any]:
             "unsure": float((largest > UNSURE).mean()),
         },
     }
+
+
+def _ends_of_starts(env: LearnedVectorEnv) -> list[list[float]] | None:
+    box = env.parameters["initial"]
+    return (
+        [box.low.tolist(), box.high.tolist()] if isinstance(box, spaces.Box) else None
+    )
 
 
 def spread_over(env: LearnedVectorEnv, states: FloatArray) -> FloatArray:

@@ -14,8 +14,14 @@ from typing import Any
 import numpy as np
 
 from acl_gym.design import pictures
-from acl_gym.design.advice import advice, advice_on_model, fault_of_model
+from acl_gym.design.advice import (
+    advice,
+    advice_on_limits,
+    advice_on_model,
+    fault_of_model,
+)
 from acl_gym.design.learning import CHOOSING, GOOD, Learned, Progress, learn
+from acl_gym.design.limits import Limits, measure_limits
 from acl_gym.design.measures import Measures, measure, typical, worst
 from acl_gym.design.page import write_page
 from acl_gym.design.plants import as_vector_env, load_plant
@@ -46,9 +52,10 @@ class Design:
         folder: where the files are.
         policy: the controller.
         measures: what it does from the random starts.
+        limits: what its success owes to `low` and `high`, where the model stops.
         learned: how it was learned.
-        advice: what to try, where the goal is not reached from 95% of the starts, or
-            where the model has a fault.
+        advice: what to try, where the goal is not reached from 95% of the starts, where
+            success is owed to a limit of the range, or where the model has a fault.
         model_fault: why the figures say nothing about the plant, where its model was
             learned from a recording and is unsure almost everywhere; else None.
         summary: what `summary.json` holds.
@@ -57,6 +64,7 @@ class Design:
     folder: Path
     policy: TablePolicy
     measures: Measures
+    limits: Limits
     learned: Learned
     advice: tuple[str, ...]
     model_fault: str | None
@@ -155,12 +163,14 @@ class _Measured:
 
     Attributes:
         measures: over the random starts.
+        limits: how often its paths touch the ends of the range.
         robustness: over uncertain parameters, or None.
         model: of a learned model, or None.
         figures: the names of the pictures, which are written.
     """
 
     measures: Measures
+    limits: Limits
     robustness: dict[str, Any] | None
     model: dict[str, Any] | None
     figures: tuple[str, ...]
@@ -185,6 +195,7 @@ def _measured(learned: Learned, env: Any, folder: Path, seed: int) -> _Measured:
         files.write_atomically(folder / f"{name}.png", buffer.getvalue())
     return _Measured(
         measure(responses, system),
+        measure_limits(responses, learned.policy, env),
         _robustness(learned.policy, env, starts, seed),
         model,
         tuple(figures),
@@ -210,6 +221,7 @@ def _written(
         name = "plant.py" if measured.model is None else f"data{source.suffix}"
         files.write_atomically(folder / name, source.read_bytes())
     tips = advice(learned, measures, system)
+    tips += advice_on_limits(measured.limits, measures, system)
     fault = fault_of_model(measured.model)
     if fault is not None and measured.model is not None:
         # A better controller of a poor model is no gain: its data come first.
@@ -220,6 +232,7 @@ def _written(
         **measures.as_dict(),
         "cost": measures.cost.mean,
         "costs": asdict(measures.cost),
+        "limits": asdict(measured.limits),
         "uncertain": measured.robustness,
         "model": measured.model,
         "model_fault": fault,
@@ -238,9 +251,18 @@ def _written(
     summary: dict[str, Any] = _plain(facts)
     text = json.dumps(summary, indent=1)
     files.write_atomically(folder / "summary.json", text.encode())
-    write_page(folder, summary, learned, measures, system, measured.figures)
+    write_page(
+        folder, summary, learned, measures, measured.limits, system, measured.figures
+    )
     return Design(
-        folder, learned.policy, measures, learned, tuple(tips), fault, summary
+        folder=folder,
+        policy=learned.policy,
+        measures=measures,
+        limits=measured.limits,
+        learned=learned,
+        advice=tuple(tips),
+        model_fault=fault,
+        summary=summary,
     )
 
 

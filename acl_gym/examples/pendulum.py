@@ -26,8 +26,8 @@ def pendulum(x, u):
 
 env = acl_gym.plant(
     pendulum,
-    low=[-np.pi, -9.0],  # the range of each variable, within which episodes begin
-    high=[np.pi, 9.0],
+    low=[-np.pi, -9.0],  # the range: episodes begin in it,
+    high=[np.pi, 9.0],  # and the model stops a state at its ends
     circular=[0],  # variable 0 is an angle: pi and -pi are the same
     inputs=[-0.8, -0.2, 0.0, 0.2, 0.8],  # what the controller can choose among
     sampling_time=0.05,  # s, the input is held so long

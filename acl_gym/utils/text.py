@@ -46,3 +46,13 @@ def replace_unprintable_letters() -> None:
 def first_line(error: Exception) -> str:
     """The first line of what an error of another library says, without a full stop."""
     return (str(error) or type(error).__name__).splitlines()[0].rstrip(".")
+
+
+def percent(share: float) -> str:
+    """A share in percent, rounded so that only all is 100% and only none is 0%."""
+    text = f"{100.0 * share:.1f}"
+    if share < 1.0 and text == "100.0":
+        text = "99.9"
+    if share > 0.0 and text == "0.0":
+        text = "0.1"
+    return f"{text.removesuffix('.0')}%"

@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ import pytest
 from acl_gym.cli.design import _free_folder
 from acl_gym.cli.design_help import EXAMPLES, example
 from acl_gym.cli.recorded import split_names
+from acl_gym.design.recordings import Recording, plant_of_recording
 from tests.cli.runner import STARTED, figures, invoke, refused, run
 
 # A mass on a line is brought to rest; learned in a second.
@@ -106,6 +108,11 @@ def test_bad_arguments_are_one_line_and_2(arguments: list[str], message: str) ->
         ("--low 1", "low must hold a number, or nothing, for each of the 2"),
         ("--state place,sped", "must have a column 'sped'"),
         ("--circular height", "circular must hold names"),
+        ("--starts 1,0", "--starts must be the lower and the upper ends"),
+        ("--starts 0,0:1", "starts must hold 2 lower and 2 upper ends"),
+        ("--starts 1,0:0,1", "finite and low <= high"),
+        ("--starts 0,0:1,inf", "finite and low <= high"),
+        ("--starts 0,0:1,99", "initial must lie within low and high, variable 1"),
         ("--actions 1,2", "inputs must hold a row of 1 numbers"),
     ],
 )
@@ -126,6 +133,33 @@ def test_bad_words_about_measurements(options: str, message: str) -> None:
     assert message in refused(2, "design", "data.csv", *usual, *options.split())
 
 
+def test_starts_of_measurements_lie_where_they_are_wanted() -> None:
+    record("data.csv", 20)
+    columns: dict[str, Any] = {
+        "state": ("place", "speed"),
+        "input": ("force",),
+        "goal": (0.0, 0.0),
+    }
+    known: dict[str, Any] = {
+        **columns,
+        "time": "t",
+        "run": "run",
+        "tolerance": (0.1, 0.1),
+    }
+    box = ((0.3, -0.2), (0.6, 0.2))
+    system = plant_of_recording("data.csv", Recording(**known, starts=box)).system
+    drawn = system.sample_states(np.random.default_rng(0), 500).T
+    np.testing.assert_array_less(np.tile(box[0], (500, 1)), drawn)
+    np.testing.assert_array_less(drawn, np.tile(box[1], (500, 1)))
+    assert np.ptp(drawn, axis=0) == pytest.approx([0.3, 0.4], rel=0.05)
+    # Without them, recorded states.
+    system = plant_of_recording("data.csv", Recording(**known)).system
+    recorded = np.loadtxt("data.csv", delimiter=",", skiprows=1)[:, 2:4]
+    drawn = system.sample_states(np.random.default_rng(0), 50).T
+    apart = np.abs(drawn[:, None] - recorded).max(axis=2).min(axis=1)
+    assert apart.max() < 1e-9
+
+
 def record(name: str, runs: int) -> None:
     """A table of a mass on a line under random forces, eight rows a run."""
     rng = np.random.default_rng(0)
@@ -144,7 +178,7 @@ def test_measurements_become_a_folder() -> None:
     record("data.csv", 40)
     words = "--state place,speed --input force --time t --run run --goal 0,0"
     words += " --tolerance 0.2,0.2 --cost 1,0.1:0.01 --low -1,-1 --high 1,1"
-    words += " --max-steps 40 --steps 2500"
+    words += " --max-steps 40 --steps 2500 --starts -0.9,-0.8:0.9,0.8"
     summary = figures("design", "data.csv", *words.split())
     assert summary["success_rate"] >= 0.95
     model = summary["model"]
@@ -157,6 +191,10 @@ def test_measurements_become_a_folder() -> None:
     page = (folder / "report.html").read_text()
     assert "280 recorded steps in 40 runs" in page
     assert "What was assumed" in page
+    assert model["starts"] == [[-0.9, -0.8], [0.9, 0.8]]
+    assert "states between -0.9, -0.8 and 0.9, 0.8, as <code>--starts</code>" in page
+    assert "--starts=-0.9,-0.8:0.9,0.8" in summary["command"]
+    assert -0.9 <= summary["worst_start"][0] <= 0.9
 
 
 @pytest.mark.filterwarnings("ignore::acl_gym.envs.learned.DataWarning")

@@ -19,10 +19,10 @@ from acl_gym.design.advice import (
 )
 from acl_gym.design.learning import Choice, Learned, Quality
 from acl_gym.design.measures import measure, typical, worst
-from acl_gym.design.page import percent
 from acl_gym.design.simulation import Responses, simulate
 from acl_gym.evaluation import evaluate_policy_cost
 from acl_gym.policies import TablePolicy
+from acl_gym.utils.text import percent
 
 
 def integrator(**changes: Any) -> Any:

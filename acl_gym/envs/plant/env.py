@@ -122,7 +122,9 @@ def plant(
             states of `goal` and `cost`; a compiled one gets copies. To send
             the environment to other processes, define it at the top of a module.
         low: lower end of each state variable, `(state_size,)`.
-        high: upper end of each; states are clipped to both after each step.
+        high: upper end of each. After each step, a variable beyond an end is set back to
+            it, as if it had hit a wall. Where the plant has no such stop, make the range
+            wider than anything it can reach, and say by `initial` where episodes begin.
         inputs: what each action sets, `(n_actions,)`, or `(n_actions, n_inputs)`; or a
             bounded `gymnasium.spaces.Box` of one axis: the actions are then real inputs,
             `(n_inputs,)`, set to its bounds where they are beyond. `ActionGrid` gives
@@ -145,9 +147,10 @@ def plant(
         substeps: Runge-Kutta steps in a sampling time, >= 1.
         discrete_time: whether `dynamics` gives the next state, not the derivative.
         initial: states in which episodes begin: None, uniform within the bounds but
-            outside the goal; a `gymnasium.spaces.Box`, the same within it; a state or
-            rows of states, drawn with equal chances; or a function of a
-            `numpy.random.Generator` and n that returns n rows.
+            outside the goal; a box of states,
+            `gymnasium.spaces.Box(low, high, dtype=np.float64)` with two arrays, the same
+            within it; a state or rows of states, drawn with equal chances; or a function
+            of a `numpy.random.Generator` and n that returns n rows.
         evaluation_states: rows of states from which policies are evaluated; None draws
             100 initial states once, the same each time.
         state_names: of the variables, with units, for exported policies.

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import copy
 import itertools
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from gymnasium import spaces
@@ -175,6 +176,21 @@ class Plant(ControlSystem):
         return self._goal.centre is not None or self._goal.function is not None
 
     @property
+    def clipped(self) -> BoolArray:
+        """Which variables stop at `low` and `high`: those not circular, `(state_size,)`."""
+        return np.asarray(self._period == 0)
+
+    def unlimited(self) -> Self:
+        """The same plant, whose variables go on beyond `low` and `high`.
+
+        Initial states, goal and cost are as before; circular variables wrap as before.
+        """
+        made = copy.copy(self)
+        made.low = np.where(self.clipped, -np.inf, self.low)
+        made.high = np.where(self.clipped, np.inf, self.high)
+        return made
+
+    @property
     def max_stage_cost(self) -> float:
         """A bound on the cost of one step; for a cost of your own, an estimate.
 
@@ -193,7 +209,7 @@ class Plant(ControlSystem):
 
         Uncertain parameters are drawn with them, unless `initial` holds these too.
         """
-        states = self._initial.draw(rng, count)
+        states = self._drawn(rng, count)
         if len(states) > self.low.size or not self.parameters.count:
             return states
         return np.concatenate([states, self.parameters.draw(rng, count)])
@@ -324,11 +340,18 @@ class Plant(ControlSystem):
         span = (self.high - self.low)[:, None]
         return self.low[:, None] + span * rng.random((self.low.size, count))
 
+    def _drawn(self, rng: np.random.Generator, count: int) -> FloatArray:
+        """Initial states; a box of them may lead over the end of a circle."""
+        states = self._initial.draw(rng, count)
+        own = states[: self.low.size]
+        kernels.settle(own, self.low, self.high, self._period)
+        return states
+
     def _default_evaluation_states(self) -> FloatArray:
         few = self._initial.rows
         if few is not None and len(few) <= _EVALUATED:
             return self._with_nominal(few)
-        drawn = self._initial.draw(np.random.default_rng(0), _EVALUATED)
+        drawn = self._drawn(np.random.default_rng(0), _EVALUATED)
         return self._with_nominal(np.ascontiguousarray(drawn.T))
 
 

@@ -218,6 +218,18 @@ def test_initial_box_and_evaluation_states() -> None:
     assert env.system.evaluation_steps == 60
 
 
+def test_an_initial_box_may_lead_over_the_end_of_a_circle() -> None:
+    # PENDULUM counts angles from 0 to 2 pi: half of the box is just below 2 pi.
+    box = spaces.Box(np.array([-0.5, -1.0]), np.array([0.5, 1.0]), dtype=np.float64)
+    settings = {**PENDULUM, "initial": box, "num_envs": 1_000}
+    env = acl_gym.plant(plants.pendulum, **settings)
+    observed, _ = env.reset(seed=0)
+    for angles in (observed[:, 0], env.system.evaluation_states()[:, 0]):
+        assert ((angles >= 0.0) & (angles < 2 * np.pi)).all()
+        assert ((angles <= 0.5) | (angles >= 2 * np.pi - 0.5)).all()
+        assert 0.3 < (angles < 1.0).mean() < 0.7
+
+
 @BOTH
 def test_one_environment_and_many_are_the_same(dynamics: Any) -> None:
     many = make_mass(dynamics=dynamics, num_envs=5, cost=([1, 1], 1))

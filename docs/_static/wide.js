@@ -37,10 +37,15 @@ function mark(box) {
   }
 }
 
-const observer = new ResizeObserver(entries => entries.forEach(entry => mark(entry.target)));
+// What is in a box may grow while the box does not, for instance when a font has arrived.
+const boxes = new Map();
+const observer = new ResizeObserver(entries => entries.forEach(entry => mark(boxes.get(entry.target))));
 function watch(box) {
   box.addEventListener("scroll", () => mark(box), {passive: true});
-  observer.observe(box);
+  for (const element of [box, box.querySelector("table, img")]) {
+    boxes.set(element, box);
+    observer.observe(element);
+  }
 }
 
 for (const box of document.querySelectorAll(".table-wrapper, .cell_output .output.text_html"))

@@ -22,11 +22,19 @@ function name(box) {
     .map(n => n.textContent).join("").trim() : document.title;
 }
 
-function mark(box) {
-  const wide = box.scrollWidth > box.clientWidth + 1;
-  box.classList.toggle("scrolls", wide);
+function markEnds(box) {
   box.classList.toggle("at-start", box.scrollLeft < 2);
   box.classList.toggle("at-end", box.scrollLeft + box.clientWidth > box.scrollWidth - 2);
+}
+
+function mark(box) {
+  // Measured without the class, whose style makes a table narrower: it would come and go.
+  const left = box.scrollLeft;
+  box.classList.remove("scrolls");
+  const wide = box.scrollWidth > box.clientWidth + 1;
+  box.classList.toggle("scrolls", wide);
+  box.scrollLeft = left;
+  markEnds(box);
   if (wide) {
     box.tabIndex = 0;
     box.setAttribute("role", "region");
@@ -41,7 +49,7 @@ function mark(box) {
 const boxes = new Map();
 const observer = new ResizeObserver(entries => entries.forEach(entry => mark(boxes.get(entry.target))));
 function watch(box) {
-  box.addEventListener("scroll", () => mark(box), {passive: true});
+  box.addEventListener("scroll", () => markEnds(box), {passive: true});
   for (const element of [box, box.querySelector("table, img")]) {
     boxes.set(element, box);
     observer.observe(element);

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
+from acl_gym.envs.swarm_aggregation.kernels import keep_nearest, write_nearest
 from acl_gym.swarm.cells import squared_reach
 from acl_gym.utils.compiling import njit
 from acl_gym.utils.typing import FloatArray, IntArray
@@ -127,20 +128,12 @@ def look_in_boxes(
                     continue
                 n_hit += square < contact
                 if square < beyond:
-                    # The place after the last is for the one that drops out.
-                    k = min(found, count)
-                    while k > 0 and square < squares[k - 1]:
-                        squares[k], who[k] = squares[k - 1], who[k - 1]
-                        k -= 1
-                    squares[k], who[k] = square, j
-                    found = min(found + 1, count)
+                    found = keep_nearest(found, square, j, squares, who)
                     if found == count:
                         beyond = squares[count - 1]
         agent = order[at]
         collisions[agent] = n_hit
-        for k in range(count):
-            nearest[agent, 2 * k] = x[who[k]] - here if k < found else 0.0
-            nearest[agent, 2 * k + 1] = y[who[k]] - there if k < found else 0.0
+        write_nearest(nearest[agent], found, who, x, y, here, there)
     return looks
 
 

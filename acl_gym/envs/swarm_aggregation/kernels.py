@@ -75,13 +75,7 @@ def look_around(
                             east += dx if near else 0.0
                             north += dy if near else 0.0
                         if near & (square < beyond):
-                            # The place after the last is for the one that drops out.
-                            k = min(found, count)
-                            while k > 0 and square < squares[k - 1]:
-                                squares[k], who[k] = squares[k - 1], who[k - 1]
-                                k -= 1
-                            squares[k], who[k] = square, j
-                            found = min(found + 1, count)
+                            found = keep_nearest(found, square, j, squares, who)
                             if found == count:
                                 beyond = squares[count - 1]
             # All within this distance have been seen; one cell may be infinitely wide.
@@ -99,6 +93,56 @@ def look_around(
         collisions[i] = n_hit
         if limited:
             heard[i], towards[i, 0], towards[i, 1] = n_heard, east, north
-        for k in range(count):
-            nearest[i, 2 * k] = x[who[k]] - here if k < found else 0.0
-            nearest[i, 2 * k + 1] = y[who[k]] - there if k < found else 0.0
+        write_nearest(nearest[i], found, who, x, y, here, there)
+
+
+@njit(inline="always")
+def keep_nearest(
+    found: int, square: float, j: int, squares: FloatArray, who: IntArray
+) -> int:
+    """Put an agent among the nearest ones found so far, the nearest one first.
+
+    Args:
+        found: how many there are.
+        square: the square of its distance, less than that of the last one of a full list.
+        j: its number.
+        squares: of the nearest ones, `(count + 1,)`; the place after the last is for the
+            one that drops out.
+        who: their numbers, likewise.
+
+    Returns:
+        How many there are now, at most count.
+    """
+    count = squares.size - 1
+    k = min(found, count)
+    while k > 0 and square < squares[k - 1]:
+        squares[k], who[k] = squares[k - 1], who[k - 1]
+        k -= 1
+    squares[k], who[k] = square, j
+    return min(found + 1, count)
+
+
+@njit(inline="always")
+def write_nearest(
+    row: FloatArray,
+    found: int,
+    who: IntArray,
+    x: FloatArray,
+    y: FloatArray,
+    here: float,
+    there: float,
+) -> None:
+    """Write the positions of the nearest agents relative to one at (here, there).
+
+    Args:
+        row: receives them, `(2 count,)`, and 0 where fewer were found.
+        found: how many were.
+        who: their numbers.
+        x: first coordinates of all agents.
+        y: second coordinates.
+        here: first coordinate of the agent.
+        there: second coordinate.
+    """
+    for k in range(row.size // 2):
+        row[2 * k] = x[who[k]] - here if k < found else 0.0
+        row[2 * k + 1] = y[who[k]] - there if k < found else 0.0

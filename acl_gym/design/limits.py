@@ -78,21 +78,20 @@ def measure_limits(
     shares = np.zeros(plant.low.size)
     if success.any():
         shares = touched[success].mean(axis=0)
-    reaches: BoolArray | None = success.copy()
+    unlimited: float | None = float(success.mean())
     if any_limit.any():
-        starts = responses.states[0, any_limit]
         again = None
         if not hasattr(env, "transitions"):
+            starts = responses.states[0, any_limit]
             again = _reach_unlimited(policy, env, starts, responses.limit)
-        if again is None:
-            reaches = None
-        elif reaches is not None:
-            reaches[any_limit] = again
+        unlimited = None
+        if again is not None:
+            unlimited = float(np.concatenate([success[~any_limit], again]).mean())
     return Limits(
         float(any_limit.mean()),
         float(any_limit[success].mean()) if success.any() else 0.0,
         dict(zip(plant.variable_names, shares.tolist(), strict=False)),
-        None if reaches is None else float(reaches.mean()),
+        unlimited,
     )
 
 

@@ -254,7 +254,9 @@ def test_an_episode_that_cannot_be_repeated_ends_where_it_was() -> None:
     _, infos = env.reset(seed=0)
     before = env.step(np.zeros(2, np.int64))[0]
     os.kill(int(infos["pid"][0]), signal.SIGKILL)
-    with pytest.warns(RuntimeWarning, match=r"slot [01] was repeated .* another observation"):
+    with pytest.warns(
+        RuntimeWarning, match=r"slot [01] was repeated .* another observation"
+    ):
         after, rewards, terminated, truncated, _ = env.step(np.zeros(2, np.int64))
     assert np.array_equal(after, before)
     assert rewards.tolist() == [0.0, 0.0]
